@@ -1,0 +1,12 @@
+# Flags that every target shares. Same input, same bytes: no contraction of a*b+c into one rounding, no fast-math.
+add_compile_options(-ffp-contract=off -Wall -Wextra -Wpedantic -Wshadow -Wnon-virtual-dtor -Werror)
+# Eigen's inlined loads trip GCC 12's false positives; GCC bugs 105562 and 106199 are of this family.
+add_compile_options(-Wno-maybe-uninitialized -Wno-array-bounds -Wno-stringop-overflow -Wno-stringop-overread)
+include_directories(${PROJECT_SOURCE_DIR})
+if(LIMBER_SANITIZE)
+  add_compile_options(-fsanitize=${LIMBER_SANITIZE} -fno-omit-frame-pointer -fno-sanitize-recover=all)
+  add_link_options(-fsanitize=${LIMBER_SANITIZE})
+endif()
+
+# A file that includes CGAL takes up to 3 GB and 98 s to compile: one at a time.
+set_property(GLOBAL PROPERTY JOB_POOLS cgal=1)

@@ -1,0 +1,117 @@
+#include "core/file.h"
+
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <cerrno>
+#include <cstring>
+
+#include "core/error.h"
+
+namespace limber {
+
+namespace {
+
+[[noreturn]] void throw_disk_error(const fs::path& path, const char* doing) {
+  throw DiskError(fmt::format("{}: {} failed: {}", path.string(), doing, std::strerror(errno)));
+}
+
+class Descriptor {
+ public:
+  explicit Descriptor(int fd) : fd_(fd) {}
+  ~Descriptor() {
+    if (fd_ >= 0) ::close(fd_);
+  }
+  Descriptor(const Descriptor&) = delete;
+  Descriptor& operator=(const Descriptor&) = delete;
+  operator int() const { return fd_; }
+
+ private:
+  int fd_;
+};
+
+// Best effort: some file systems refuse fsync on a folder.
+void sync_folder(const fs::path& folder) {
+  const Descriptor fd(::open(folder.empty() ? "." : folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+  if (fd >= 0) ::fsync(fd);
+}
+
+fs::path temporary_name(const fs::path& final_path) {
+  static std::atomic<unsigned> counter{0};
+  fs::path name = final_path;
+  name.replace_filename(fmt::format(".{}.{}.{}.tmp{}", final_path.stem().string(), ::getpid(), counter++,
+                                    final_path.extension().string()));
+  return name;
+}
+
+}  // namespace
+
+std::string read_file(const fs::path& path) {
+  std::error_code error;
+  if (fs::is_directory(path, error))
+    throw InputError(fmt::format("{}: is a folder, not a file", path.string()));
+  const Descriptor fd(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
+  if (fd < 0) throw InputError(fmt::format("{}: cannot be read: {}", path.string(), std::strerror(errno)));
+  struct stat status;
+  std::string content;
+  if (::fstat(fd, &status) == 0 && S_ISREG(status.st_mode)) content.reserve(std::size_t(status.st_size) + 1);
+  std::size_t size = 0;
+  while (true) {
+    content.resize(size + std::max<std::size_t>(1 << 16, content.capacity() - size));
+    const ssize_t got = ::read(fd, content.data() + size, content.size() - size);
+    if (got < 0 && errno == EINTR) continue;
+    if (got < 0) throw InputError(fmt::format("{}: reading failed: {}", path.string(), std::strerror(errno)));
+    size += std::size_t(got);
+    if (got == 0) break;
+  }
+  content.resize(size);
+  return content;
+}
+
+void write_file(const fs::path& path, std::string_view content) {
+  PendingFile pending(path);
+  {
+    const Descriptor fd(::open(pending.temporary().c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644));
+    if (fd < 0) throw_disk_error(path, "creating it");
+    while (!content.empty()) {
+      const ssize_t written = ::write(fd, content.data(), content.size());
+      if (written < 0 && errno == EINTR) continue;
+      if (written < 0) throw_disk_error(path, "writing it");
+      content.remove_prefix(std::size_t(written));
+    }
+  }
+  pending.commit();
+}
+
+PendingFile::PendingFile(fs::path final_path)
+    : final_(std::move(final_path)), temporary_(temporary_name(final_)) {}
+
+PendingFile::~PendingFile() {
+  if (committed_) return;
+  std::error_code ignored;
+  fs::remove(temporary_, ignored);
+}
+
+void PendingFile::commit() {
+  {
+    const Descriptor fd(::open(temporary_.c_str(), O_RDONLY | O_CLOEXEC));
+    if (fd < 0) throw_disk_error(temporary_, "opening it");
+    if (::fsync(fd) != 0) throw_disk_error(final_, "fsync");
+  }
+  if (::rename(temporary_.c_str(), final_.c_str()) != 0)
+    throw_disk_error(final_, "renaming the finished file to it");
+  committed_ = true;
+  sync_folder(final_.parent_path());
+}
+
+void make_folder(const fs::path& folder) {
+  std::error_code error;
+  fs::create_directories(folder, error);
+  if (error) throw DiskError(fmt::format("{}: cannot be made: {}", folder.string(), error.message()));
+  if (!fs::is_directory(folder)) throw DiskError(fmt::format("{}: is a file, not a folder", folder.string()));
+  if (::access(folder.c_str(), W_OK) != 0) throw_disk_error(folder, "getting permission to write into it");
+}
+
+}  // namespace limber

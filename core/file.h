@@ -1,0 +1,38 @@
+// Files are read whole and written whole: under a temporary name, fsync, rename. A reader never sees half a
+// file.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <string_view>
+
+namespace limber {
+
+namespace fs = std::filesystem;
+
+// Throws InputError when there is no such file or it cannot be read.
+std::string read_file(const fs::path&);
+
+// Throws DiskError (nothing is left behind) when the disk is full, the folder is missing or not writable.
+void write_file(const fs::path&, std::string_view content);
+
+// For a program that writes the file itself (ffmpeg): it writes to temporary(), then commit() makes it final.
+class PendingFile {
+ public:
+  explicit PendingFile(fs::path final_path);
+  ~PendingFile();  // removes what was not committed
+  PendingFile(const PendingFile&) = delete;
+  PendingFile& operator=(const PendingFile&) = delete;
+  const fs::path& temporary() const { return temporary_; }  // in the same folder, same extension
+  void commit();                                            // fsync, rename; throws DiskError
+
+ private:
+  fs::path final_, temporary_;
+  bool committed_ = false;
+};
+
+// Makes the folder and its parents; throws DiskError naming the one that failed, also when it is a file or
+// not writable.
+void make_folder(const fs::path&);
+
+}  // namespace limber

@@ -1,0 +1,215 @@
+#include "core/npz.h"
+
+#include <zip.h>
+
+#include <cstring>
+#include <memory>
+
+#include "core/error.h"
+
+namespace limber {
+
+namespace {
+
+constexpr std::string_view npy_magic("\x93NUMPY\x01\x00", 8);
+
+std::size_t item_size(std::string_view dtype) {
+  for (const auto& [name, size] :
+       {std::pair{"<f4", 4}, {"<f8", 8}, {"<i4", 4}, {"<i8", 8}, {"<u8", 8}, {"|u1", 1}})
+    if (dtype == name) return std::size_t(size);
+  return 0;
+}
+
+// The .npy format, version 1.0: magic, header length, a Python dict padded to 64 bytes, then the elements.
+std::string npy_text(const NpyArray& array) {
+  std::string shape;
+  for (const std::int64_t n : array.shape) shape += fmt::format("{}, ", n);
+  std::string header = fmt::format(
+      "{{'descr': '{}', 'fortran_order': False, 'shape': ({}), }}", array.dtype,
+      array.shape.size() == 1 ? fmt::format("{},", array.shape[0])
+                              : shape.substr(0, shape.size() - std::min<std::size_t>(2, shape.size())));
+  header.append(63 - (npy_magic.size() + 2 + header.size()) % 64, ' ');
+  header += '\n';
+  std::string text(npy_magic);
+  text += char(header.size() & 255), text += char(header.size() >> 8);
+  text += header;
+  text.append(reinterpret_cast<const char*>(array.bytes.data()), array.bytes.size());
+  return text;
+}
+
+NpyArray npy_array(std::string_view text, const std::string& what) {
+  const auto refuse = [&](std::string_view why) -> void {
+    throw InputError(fmt::format("{}: {}", what, why));
+  };
+  if (text.size() < 10 || text.substr(0, 8) != npy_magic) refuse("is not a version 1.0 .npy array");
+  const std::size_t header_size =
+      std::size_t((unsigned char)text[8]) + 256 * std::size_t((unsigned char)text[9]);
+  if (text.size() < 10 + header_size) refuse("ends inside its header");
+  const std::string_view header = text.substr(10, header_size), data = text.substr(10 + header_size);
+  const auto field = [&](std::string_view key) {
+    const auto at = header.find(key);
+    if (at == header.npos) refuse(fmt::format("its header has no {}", key));
+    return header.substr(at + key.size());
+  };
+  NpyArray array;
+  const std::string_view dtype = field("'descr': '");
+  array.dtype = dtype.substr(0, dtype.find('\''));
+  if (item_size(array.dtype) == 0)
+    refuse(fmt::format("has elements of type {}, which limber does not use", array.dtype));
+  if (!field("'fortran_order': ").starts_with("False")) refuse("is in Fortran order; save it in C order");
+  std::string_view shape = field("'shape': (");
+  shape = shape.substr(0, shape.find(')'));
+  std::uint64_t total = 1;
+  while (true) {
+    const auto digit = shape.find_first_of("0123456789");
+    if (digit == shape.npos) break;
+    shape.remove_prefix(digit);
+    std::uint64_t n = 0;
+    while (!shape.empty() && shape[0] >= '0' && shape[0] <= '9' && n < (1ull << 40))
+      n = 10 * n + std::uint64_t(shape[0] - '0'), shape.remove_prefix(1);
+    total = total > data.size() ? total : total * n;
+    array.shape.push_back(std::int64_t(n));
+  }
+  if (total * item_size(array.dtype) != data.size())
+    refuse(fmt::format("holds {} bytes, which its shape does not explain", data.size()));
+  array.bytes.assign(reinterpret_cast<const std::byte*>(data.data()),
+                     reinterpret_cast<const std::byte*>(data.data() + data.size()));
+  return array;
+}
+
+template <class Close, class T>
+auto guarded(T* resource, Close close) {
+  return std::unique_ptr<T, Close>(resource, close);
+}
+
+}  // namespace
+
+template <>
+const char* NpyArray::dtype_of<float>() {
+  return "<f4";
+}
+template <>
+const char* NpyArray::dtype_of<double>() {
+  return "<f8";
+}
+template <>
+const char* NpyArray::dtype_of<std::int32_t>() {
+  return "<i4";
+}
+template <>
+const char* NpyArray::dtype_of<std::int64_t>() {
+  return "<i8";
+}
+template <>
+const char* NpyArray::dtype_of<std::uint64_t>() {
+  return "<u8";
+}
+template <>
+const char* NpyArray::dtype_of<std::uint8_t>() {
+  return "|u1";
+}
+
+std::int64_t NpyArray::size() const {
+  std::int64_t product = 1;
+  for (const std::int64_t n : shape) product *= n;
+  return product;
+}
+
+void NpyArray::require_dtype(const char* wanted, std::string_view name) const {
+  if (dtype != wanted)
+    throw InputError(fmt::format("array {} has elements of type {} where {} belong", name, dtype, wanted));
+}
+
+void NpyArray::require_consistent() const {
+  LIMBER_CHECK(std::size_t(size()) * item_size(dtype) == bytes.size(), size(), dtype, bytes.size());
+}
+
+const NpyArray& Npz::array(const std::string& name) const {
+  const auto found = arrays.find(name);
+  if (found == arrays.end()) throw InputError(fmt::format("{}: has no array \"{}\"", source.string(), name));
+  return found->second;
+}
+
+const std::string& Npz::text(const std::string& name) const {
+  const auto found = texts.find(name);
+  if (found == texts.end()) throw InputError(fmt::format("{}: has no entry \"{}\"", source.string(), name));
+  return found->second;
+}
+
+void write_npz(const fs::path& path, const Npz& npz) {
+  std::map<std::string, std::string> entries = npz.texts;
+  for (const auto& [name, array] : npz.arrays) entries[name + ".npy"] = npy_text(array);
+
+  // The archive is built in memory, so that the file is written by write_file alone.
+  zip_error_t error;
+  zip_error_init(&error);
+  zip_source_t* memory = zip_source_buffer_create(nullptr, 0, 0, &error);
+  LIMBER_CHECK(memory != nullptr, zip_error_strerror(&error));
+  zip_t* archive = zip_open_from_source(memory, ZIP_TRUNCATE, &error);
+  LIMBER_CHECK(archive != nullptr, zip_error_strerror(&error));
+  zip_source_keep(memory);
+  const auto kept = guarded(memory, zip_source_free);
+  for (const auto& [name, content] : entries) {
+    zip_source_t* entry = zip_source_buffer(archive, content.data(), content.size(), 0);
+    const zip_int64_t index = zip_file_add(archive, name.c_str(), entry, ZIP_FL_ENC_UTF_8);
+    LIMBER_CHECK(index >= 0, name, zip_strerror(archive));
+    zip_set_file_compression(archive, zip_uint64_t(index), ZIP_CM_STORE, 0);
+    zip_file_set_dostime(archive, zip_uint64_t(index), 0, 0x21, 0);  // 1980-01-01: same arrays, same bytes
+    zip_file_set_external_attributes(archive, zip_uint64_t(index), 0, ZIP_OPSYS_UNIX, 0644u << 16);
+  }
+  LIMBER_CHECK(zip_close(archive) == 0, zip_strerror(archive));
+
+  zip_stat_t status;
+  zip_source_stat(memory, &status);
+  std::string bytes(status.size, '\0');
+  zip_source_open(memory);
+  zip_source_read(memory, bytes.data(), bytes.size());
+  zip_source_close(memory);
+  write_file(path, bytes);
+}
+
+Npz read_npz(const fs::path& path) {
+  const std::string bytes = read_file(path);
+  zip_error_t error;
+  zip_error_init(&error);
+  zip_source_t* memory = zip_source_buffer_create(bytes.data(), bytes.size(), 0, &error);
+  LIMBER_CHECK(memory != nullptr, zip_error_strerror(&error));
+  zip_t* opened = zip_open_from_source(memory, ZIP_RDONLY | ZIP_CHECKCONS, &error);
+  if (!opened) {
+    zip_source_free(memory);
+    throw InputError(fmt::format("{}: is not a whole .npz archive ({}); it may be cut short", path.string(),
+                                 zip_error_strerror(&error)));
+  }
+  const auto archive = guarded(opened, zip_discard);
+  Npz npz;
+  npz.source = path;
+  for (zip_int64_t i = 0; i < zip_get_num_entries(archive.get(), 0); ++i) {
+    zip_stat_t status;
+    if (zip_stat_index(archive.get(), zip_uint64_t(i), 0, &status) != 0 || !(status.valid & ZIP_STAT_NAME) ||
+        !(status.valid & ZIP_STAT_SIZE))
+      throw InputError(fmt::format("{}: entry {} has no name or size", path.string(), i));
+    const std::string name = status.name, what = fmt::format("{}: entry {}", path.string(), name);
+    const auto file = guarded(zip_fopen_index(archive.get(), zip_uint64_t(i), 0), zip_fclose);
+    if (!file) throw InputError(fmt::format("{}: cannot be read: {}", what, zip_strerror(archive.get())));
+    // A stored or deflated entry is at most about a thousand times its packed size; anything else is no file
+    // of ours.
+    if (status.size / 1100 > bytes.size())
+      throw InputError(fmt::format("{}: claims to hold {} bytes", what, status.size));
+    std::string content(status.size, '\0');
+    std::size_t got = 0;
+    while (got < content.size()) {
+      const zip_int64_t n = zip_fread(file.get(), content.data() + got, content.size() - got);
+      if (n <= 0) throw InputError(fmt::format("{}: is damaged ({})", what, zip_file_strerror(file.get())));
+      got += std::size_t(n);
+    }
+    if (char extra; zip_fread(file.get(), &extra, 1) != 0)
+      throw InputError(fmt::format("{}: is damaged", what));  // checks the CRC
+    if (name.ends_with(".npy"))
+      npz.arrays[name.substr(0, name.size() - 4)] = npy_array(content, what);
+    else
+      npz.texts[name] = std::move(content);
+  }
+  return npz;
+}
+
+}  // namespace limber

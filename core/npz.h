@@ -1,0 +1,76 @@
+// Arrays in an ordinary zip of .npy files: numpy.load opens it. Written without timestamps: same arrays, same
+// bytes.
+#pragma once
+
+#include <cstddef>
+#include <map>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "core/file.h"
+
+namespace limber {
+
+struct NpyArray {
+  std::string dtype;                // "<f4", "<f8", "<i4", "<i8", "<u8", "|u1"
+  std::vector<std::int64_t> shape;  // C order
+  std::vector<std::byte> bytes;
+
+  std::int64_t size() const;  // product of the shape
+  // The elements; throws InputError naming `name` when T is not the array's type.
+  template <class T>
+  std::span<const T> as(std::string_view name) const {
+    require_dtype(dtype_of<T>(), name);
+    return {reinterpret_cast<const T*>(bytes.data()), std::size_t(size())};
+  }
+  template <class T>
+  static NpyArray of(std::span<const T> v, std::vector<std::int64_t> shape) {
+    NpyArray a{dtype_of<T>(), std::move(shape), {}};
+    a.bytes.assign(reinterpret_cast<const std::byte*>(v.data()),
+                   reinterpret_cast<const std::byte*>(v.data() + v.size()));
+    a.require_consistent();
+    return a;
+  }
+  template <class Matrix>
+  static NpyArray of_matrix(const Matrix& m) {  // row-major Eigen matrix or vector
+    using T = typename Matrix::Scalar;
+    std::vector<std::int64_t> shape{m.rows()};
+    if (Matrix::ColsAtCompileTime != 1) shape.push_back(m.cols());
+    return of(std::span<const T>(m.data(), std::size_t(m.size())), shape);
+  }
+
+ private:
+  template <class T>
+  static const char* dtype_of();
+  void require_dtype(const char* wanted, std::string_view name) const;
+  void require_consistent() const;
+};
+template <>
+const char* NpyArray::dtype_of<float>();
+template <>
+const char* NpyArray::dtype_of<double>();
+template <>
+const char* NpyArray::dtype_of<std::int32_t>();
+template <>
+const char* NpyArray::dtype_of<std::int64_t>();
+template <>
+const char* NpyArray::dtype_of<std::uint64_t>();
+template <>
+const char* NpyArray::dtype_of<std::uint8_t>();
+
+struct Npz {
+  std::map<std::string, NpyArray> arrays;    // "weights" is the entry weights.npy
+  std::map<std::string, std::string> texts;  // other entries as they are: "meta.json"
+
+  // Throws InputError that names the file's missing entry.
+  const NpyArray& array(const std::string& name) const;
+  const std::string& text(const std::string& name) const;
+  fs::path source;  // for messages
+};
+
+void write_npz(const fs::path&, const Npz&);
+// Throws InputError when it is not a zip, is cut short, fails a checksum, or holds an array of another kind.
+Npz read_npz(const fs::path&);
+
+}  // namespace limber

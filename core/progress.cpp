@@ -1,0 +1,95 @@
+#include "core/progress.h"
+
+#include <fmt/format.h>
+#include <sys/resource.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <csignal>
+
+#include "core/error.h"
+
+namespace limber {
+
+namespace {
+
+bool enabled = true;
+std::atomic<int> arrived_signal{0};
+
+double seconds_now() {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
+
+bool on_terminal() { return enabled && ::isatty(STDERR_FILENO) == 1; }
+
+void on_signal(int number) {
+  if (arrived_signal.exchange(number) != 0) ::_exit(128 + number);
+}
+
+std::string duration_text(double seconds) {
+  const int s = int(seconds + 0.5);
+  return s < 60 ? fmt::format("{} s", s) : fmt::format("{}:{:02} min", s / 60, s % 60);
+}
+
+}  // namespace
+
+Progress::Progress(std::string label, std::int64_t total)
+    : label_(std::move(label)), total_(total), started_(seconds_now()) {}
+
+Progress::~Progress() {
+  if (drawn_at_ >= 0) fmt::print(stderr, "\r\x1b[K");
+}
+
+void Progress::update(std::int64_t done, const std::string& note) {
+  if (!on_terminal()) return;
+  const double now = seconds_now();
+  if (drawn_at_ >= 0 && now - drawn_at_ < 0.1 && done < total_) return;
+  drawn_at_ = now;
+  constexpr int width = 24;
+  std::string line = fmt::format("\r\x1b[K{} ", label_);
+  if (total_ > 0) {
+    const double share = std::clamp(double(done) / double(total_), 0.0, 1.0);
+    const int filled = int(share * width);
+    line += fmt::format("[{}{}] {}/{}", std::string(std::size_t(filled), '='),
+                        std::string(std::size_t(width - filled), ' '), done, total_);
+    if (share > 0.02) line += fmt::format(", {} left", duration_text((now - started_) * (1 - share) / share));
+  } else {
+    line += fmt::format("{}", done);
+  }
+  if (!note.empty()) line += ", " + note;
+  fmt::print(stderr, "{}", line);
+  std::fflush(stderr);
+}
+
+void set_progress_enabled(bool on) { enabled = on; }
+
+void install_stop_signals() {
+  struct sigaction action = {};
+  action.sa_handler = on_signal;
+  sigemptyset(&action.sa_mask);
+  sigaction(SIGINT, &action, nullptr);
+  sigaction(SIGTERM, &action, nullptr);
+}
+
+int stop_signal() { return arrived_signal.load(std::memory_order_relaxed); }
+void request_stop(int number) { arrived_signal = number; }
+void throw_if_stopped() {
+  if (const int number = stop_signal()) throw Interrupted(number);
+}
+
+double cpu_seconds() {
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  const auto seconds = [](const timeval& t) { return double(t.tv_sec) + 1e-6 * double(t.tv_usec); };
+  return seconds(usage.ru_utime) + seconds(usage.ru_stime);
+}
+
+double peak_memory_mb() {
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  return double(usage.ru_maxrss) / 1024;
+}
+
+}  // namespace limber

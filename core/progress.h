@@ -1,0 +1,34 @@
+// A bar on stderr when that is a terminal and logging is not quiet; else nothing. And the wish to stop.
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+namespace limber {
+
+class Progress {
+ public:
+  Progress(std::string label, std::int64_t total);  // total 0: unknown
+  ~Progress();                                      // clears the line
+  Progress(const Progress&) = delete;
+  Progress& operator=(const Progress&) = delete;
+  void update(std::int64_t done, const std::string& note = {});  // cheap: redraws at most ten times a second
+
+ private:
+  std::string label_;
+  std::int64_t total_;
+  double started_, drawn_at_ = -1;
+};
+void set_progress_enabled(bool);  // false: never draw
+
+// SIGINT and SIGTERM set a flag; a second one ends the process.
+void install_stop_signals();
+int stop_signal();        // 0, or the number of the signal that arrived
+void request_stop(int);   // for tests
+void throw_if_stopped();  // throws Interrupted
+
+// Seconds of CPU time used by this process so far, and peak memory.
+double cpu_seconds();
+double peak_memory_mb();
+
+}  // namespace limber

@@ -1,0 +1,15 @@
+// How many threads limber may use (--threads), and a loop over them. Results never depend on the number.
+#pragma once
+
+#include <functional>
+
+namespace limber {
+
+void set_thread_count(int);  // 0: as many as the machine has
+int thread_count();
+
+// Calls body(i) for i in [0, n), each once, on up to thread_count() threads, in no order. The first exception
+// is passed on.
+void parallel_for(int n, const std::function<void(int)>& body);
+
+}  // namespace limber
