@@ -67,7 +67,8 @@ NpyArray npy_array(std::string_view text, const std::string& what) {
     std::uint64_t n = 0;
     while (!shape.empty() && shape[0] >= '0' && shape[0] <= '9' && n < (1ull << 40))
       n = 10 * n + std::uint64_t(shape[0] - '0'), shape.remove_prefix(1);
-    total = total > data.size() ? total : total * n;
+    if (n > 0 && total > (1ull << 50) / n) refuse("has a shape beyond any memory");
+    total *= n;
     array.shape.push_back(std::int64_t(n));
   }
   if (total * item_size(array.dtype) != data.size())
@@ -170,6 +171,8 @@ void write_npz(const fs::path& path, const Npz& npz) {
 
 Npz read_npz(const fs::path& path) {
   const std::string bytes = read_file(path);
+  if (bytes.empty())
+    throw InputError(fmt::format("{}: is empty", path.string()));  // libzip takes it for an archive
   zip_error_t error;
   zip_error_init(&error);
   zip_source_t* memory = zip_source_buffer_create(bytes.data(), bytes.size(), 0, &error);

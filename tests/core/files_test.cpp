@@ -1,0 +1,185 @@
+#include <gtest/gtest.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <fstream>
+
+#include "core/error.h"
+#include "core/file.h"
+#include "core/json.h"
+#include "core/mesh_files.h"
+#include "core/npz.h"
+#include "core/random.h"
+#include "tests/core/temporary_folder.h"
+
+namespace limber {
+namespace {
+
+TetMesh two_tets() {
+  TetMesh mesh;
+  mesh.positions.resize(5, 3);
+  mesh.positions << 0, 0, 0, 1.0 / 3, 0, 0, 0, M_PI, 0, 0, 0, 1e-7, 0.1, 0.2, -1e5;
+  mesh.tets.resize(2, 4);
+  mesh.tets << 0, 1, 2, 3, 0, 2, 1, 4;
+  return mesh;
+}
+
+SurfaceMesh surface() { return {two_tets().positions, boundary_triangles(two_tets().tets)}; }
+
+std::vector<ConvexShell> shells() {
+  const TetMesh mesh = two_tets();
+  std::vector<ConvexShell> result(2);
+  for (int s = 0; s < 2; ++s) {
+    TetMesh one{Points(4, 3), Tets(1, 4)};
+    for (int i = 0; i < 4; ++i) one.positions.row(i) = mesh.positions.row(mesh.tets(s, i));
+    one.tets << 0, 1, 2, 3;
+    result[std::size_t(s)] = {one.positions, boundary_triangles(one.tets)};
+  }
+  return result;
+}
+
+Npz arrays() {
+  Npz npz;
+  const std::vector<float> f{1.5f, -0.0f, 3e-40f, 7, 8, 9};
+  const std::vector<std::int64_t> i{1, -2, std::int64_t(1) << 60};
+  npz.arrays["states"] = NpyArray::of(std::span<const float>(f), {2, 3});
+  npz.arrays["steps"] = NpyArray::of(std::span<const std::int64_t>(i), {3});
+  npz.arrays["none"] = NpyArray::of(std::span<const double>(), {0, 4});
+  npz.texts["meta.json"] = R"({"seed": 7})";
+  return npz;
+}
+
+TEST(Files, EachFormatReadsBackWhatItWrote) {
+  const TemporaryFolder folder;
+  write_ply(folder / "a.ply", surface());
+  EXPECT_EQ(read_ply(folder / "a.ply").positions, surface().positions);
+  EXPECT_EQ(read_ply(folder / "a.ply").triangles, surface().triangles);
+
+  write_msh(folder / "a.msh", two_tets(), {3, 9});
+  std::vector<int> label;
+  EXPECT_EQ(read_msh(folder / "a.msh", &label).positions, two_tets().positions);
+  EXPECT_EQ(read_msh(folder / "a.msh").tets, two_tets().tets);
+  EXPECT_EQ(label, (std::vector<int>{3, 9}));
+
+  write_obj(folder / "a.obj", shells());
+  const auto read = read_obj_shells(folder / "a.obj");
+  ASSERT_EQ(read.size(), 2u);
+  for (std::size_t s = 0; s < 2; ++s) {
+    EXPECT_EQ(read[s].vertices, shells()[s].vertices);
+    EXPECT_EQ(read[s].triangles, shells()[s].triangles);
+  }
+
+  write_npz(folder / "a.npz", arrays());
+  const Npz npz = read_npz(folder / "a.npz");
+  EXPECT_EQ(npz.text("meta.json"), arrays().text("meta.json"));
+  for (const auto& [name, array] : arrays().arrays) {
+    EXPECT_EQ(npz.array(name).dtype, array.dtype);
+    EXPECT_EQ(npz.array(name).shape, array.shape);
+    EXPECT_EQ(npz.array(name).bytes, array.bytes);
+  }
+  EXPECT_EQ(npz.array("steps").as<std::int64_t>("steps")[2], std::int64_t(1) << 60);
+  EXPECT_THROW(npz.array("steps").as<float>("steps"), InputError);
+  EXPECT_THROW(npz.array("absent"), InputError);
+}
+
+TEST(Files, SameArraysGiveTheSameBytes) {
+  const TemporaryFolder folder;
+  write_npz(folder / "a.npz", arrays());
+  write_npz(folder / "b.npz", arrays());
+  EXPECT_EQ(read_file(folder / "a.npz"), read_file(folder / "b.npz"));
+}
+
+// A file that lost its end is never taken for a smaller file.
+TEST(Files, EveryTruncatedPrefixIsAnInputError) {
+  const TemporaryFolder folder;
+  write_ply(folder / "a.ply", surface());
+  write_msh(folder / "a.msh", two_tets());
+  write_obj(folder / "a.obj", shells());
+  write_npz(folder / "a.npz", arrays());
+  write_json(folder / "a.json", Json{{"a", {1, 2, 3}}});
+  const std::vector<std::pair<std::string, std::function<void(const fs::path&)>>> readers{
+      {"a.ply", [](const fs::path& p) { read_ply(p); }},
+      {"a.msh", [](const fs::path& p) { read_msh(p); }},
+      {"a.obj", [](const fs::path& p) { read_obj_shells(p); }},
+      {"a.npz", [](const fs::path& p) { read_npz(p); }},
+      {"a.json", [](const fs::path& p) { read_json(p); }}};
+  for (const auto& [name, read] : readers) {
+    SCOPED_TRACE(name);
+    const std::string whole = read_file(folder / name);
+    EXPECT_NO_THROW(read(folder / name));
+    const std::size_t last =
+        whole.size() -
+        (whole.ends_with('\n') && name != "a.ply" ? 1 : 0);  // a lost final line end harms nobody
+    for (std::size_t size = 0; size < last; ++size) {
+      std::ofstream(folder / "cut", std::ios::binary) << whole.substr(0, size);
+      EXPECT_THROW(read(folder / "cut"), InputError) << size << " of " << whole.size() << " bytes";
+    }
+  }
+}
+
+// Any single changed byte: an InputError or another valid value, never anything else.
+TEST(Files, ChangedBytesNeverEscapeAsAnythingButInputError) {
+  const TemporaryFolder folder;
+  write_ply(folder / "a.ply", surface());
+  write_msh(folder / "a.msh", two_tets());
+  write_obj(folder / "a.obj", shells());
+  write_npz(folder / "a.npz", arrays());
+  const std::vector<std::pair<std::string, std::function<void(const fs::path&)>>> readers{
+      {"a.ply", [](const fs::path& p) { read_ply(p); }},
+      {"a.msh", [](const fs::path& p) { read_msh(p); }},
+      {"a.obj", [](const fs::path& p) { read_obj_shells(p); }},
+      {"a.npz", [](const fs::path& p) { read_npz(p); }}};
+  Rng rng(20060515, 1);
+  for (const auto& [name, read] : readers) {
+    const std::string whole = read_file(folder / name);
+    for (int trial = 0; trial < 1000; ++trial) {
+      std::string changed = whole;
+      changed[std::size_t(rng.below(int(whole.size())))] = char(rng.below(256));
+      std::ofstream(folder / "changed", std::ios::binary) << changed;
+      try {
+        read(folder / "changed");
+      } catch (const InputError&) {
+      }
+    }
+  }
+}
+
+TEST(Files, MissingFileAndFolderAreInputErrors) {
+  const TemporaryFolder folder;
+  EXPECT_THROW(read_file(folder / "absent"), InputError);
+  EXPECT_THROW(read_file(folder.path()), InputError);
+}
+
+TEST(Files, AFailedWriteIsADiskErrorAndLeavesTheOldFile) {
+  const TemporaryFolder folder;
+  EXPECT_THROW(write_file(folder / "absent" / "file", "x"), DiskError);
+  EXPECT_THROW(make_folder("/dev/null/x"), DiskError);
+  write_file(folder / "kept", "old");
+  {
+    PendingFile pending(folder / "kept");
+    std::ofstream(pending.temporary()) << "half";
+  }  // never committed, as when the writer throws
+  EXPECT_EQ(read_file(folder / "kept"), "old");
+  EXPECT_EQ(std::distance(fs::directory_iterator(folder.path()), fs::directory_iterator()), 1);
+}
+
+// The file is finished, but cannot get its name: nothing may stay behind.
+TEST(Files, ANameThatIsTakenByAFolderIsADiskError) {
+  const TemporaryFolder folder;
+  fs::create_directory(folder / "taken");
+  EXPECT_THROW(write_file(folder / "taken", "x"), DiskError);
+  EXPECT_EQ(std::distance(fs::directory_iterator(folder.path()), fs::directory_iterator()), 1);
+}
+
+TEST(Json, ComplaintNamesTheLine) {
+  try {
+    parse_json("{\n\"a\": 1,\n}", "report.json");
+    FAIL();
+  } catch (const InputError& error) {
+    EXPECT_NE(std::string(error.what()).find("report.json:3: is not valid JSON"), std::string::npos)
+        << error.what();
+  }
+}
+
+}  // namespace
+}  // namespace limber
