@@ -1,0 +1,5 @@
+#pragma once
+
+namespace limber {
+extern const char* const version;  // "0.1.0", from CMake
+}
