@@ -1,0 +1,17 @@
+#pragma once
+
+#include "core/hash.h"
+#include "core/state.h"
+
+namespace limber::plan::detail {
+
+inline void hash_control(Hasher& hasher, const Control& c) {
+  hasher.value(std::int32_t(c.manipulation))
+      .value(c.node)
+      .value(c.radius_m)
+      .value(c.max_force_n)
+      .value(c.steps);
+  hasher.matrix(c.force_n).matrix(c.target_m);
+}
+
+}  // namespace limber::plan::detail

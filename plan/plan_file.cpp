@@ -1,0 +1,267 @@
+#include "plan/plan_file.h"
+
+#include "core/error.h"
+#include "core/hash.h"
+#include "core/npz.h"
+
+namespace limber::plan {
+
+namespace {
+
+constexpr const char* format_name = "limber plan 1";
+
+// A list of states is three arrays: NAME_step (n), NAME_positions and NAME_velocities (n × 3N).
+template <class States>
+void put_states(Npz& file, const std::string& name, const States& states) {
+  std::vector<std::int64_t> steps;
+  std::vector<float> positions, velocities;
+  for (const State& s : states) {
+    steps.push_back(s.step);
+    positions.insert(positions.end(), s.positions.begin(), s.positions.end());
+    velocities.insert(velocities.end(), s.velocities.begin(), s.velocities.end());
+  }
+  const std::int64_t n = std::int64_t(states.size());
+  const std::int64_t width = states.empty() ? 0 : std::int64_t(states.begin()->positions.size());
+  file.arrays[name + "_step"] = NpyArray::of<std::int64_t>(steps, {n});
+  file.arrays[name + "_positions"] = NpyArray::of<float>(positions, {n, width});
+  file.arrays[name + "_velocities"] = NpyArray::of<float>(velocities, {n, width});
+}
+
+void put_controls(Npz& file, const std::string& name, const std::vector<Control>& controls) {
+  std::vector<std::int32_t> manipulation, node, steps;
+  std::vector<float> force, radius, target, max_force;
+  for (const Control& c : controls) {
+    manipulation.push_back(std::int32_t(c.manipulation));
+    node.push_back(c.node);
+    steps.push_back(c.steps);
+    force.insert(force.end(), c.force_n.begin(), c.force_n.end());
+    radius.push_back(c.radius_m);
+    target.insert(target.end(), c.target_m.begin(), c.target_m.end());
+    max_force.push_back(c.max_force_n);
+  }
+  const std::int64_t n = std::int64_t(controls.size());
+  file.arrays[name + "_manipulation"] = NpyArray::of<std::int32_t>(manipulation, {n});
+  file.arrays[name + "_force_n"] = NpyArray::of<float>(force, {n, 3});
+  file.arrays[name + "_node"] = NpyArray::of<std::int32_t>(node, {n});
+  file.arrays[name + "_radius_m"] = NpyArray::of<float>(radius, {n});
+  file.arrays[name + "_target_m"] = NpyArray::of<float>(target, {n, 3});
+  file.arrays[name + "_max_force_n"] = NpyArray::of<float>(max_force, {n});
+  file.arrays[name + "_steps"] = NpyArray::of<std::int32_t>(steps, {n});
+}
+
+const char* name_of(Ending ending) {
+  switch (ending) {
+    case Ending::goal:
+      return "goal";
+    case Ending::iterations:
+      return "iterations";
+    case Ending::time:
+      return "time";
+    case Ending::stopped:
+      return "stopped";
+  }
+  return "";
+}
+
+// Reads one plan.npz; every complaint names the file.
+class Reader {
+ public:
+  explicit Reader(const fs::path& path) : path_(path), file_(read_npz(path)) {}
+
+  [[noreturn]] void refuse(const std::string& why) const {
+    throw InputError(fmt::format("{}: {}; run `limber plan` again", path_.string(), why));
+  }
+  void require(bool good, const std::string& why) const {
+    if (!good) refuse(why);
+  }
+
+  // rows −1: any number.
+  template <class T>
+  std::span<const T> array(const std::string& name, std::int64_t rows, std::int64_t columns) const {
+    const NpyArray& a = file_.array(name);
+    const bool shaped = columns == 1 ? a.shape.size() == 1 : a.shape.size() == 2 && a.shape[1] == columns;
+    require(shaped && (rows < 0 || a.shape[0] == rows),
+            name + " has another shape than the rest of the file");
+    return a.as<T>(path_.string() + ": " + name);
+  }
+
+  std::int64_t width_of(const std::string& name) const {
+    const NpyArray& a = file_.array(name);
+    require(a.shape.size() == 2 && a.shape[1] % 3 == 0, name + " is not a list of states");
+    return a.shape[1];
+  }
+
+  template <class States>
+  States states(const std::string& name, std::int64_t width) const {
+    const auto steps = array<std::int64_t>(name + "_step", -1, 1);
+    const std::int64_t n = std::int64_t(steps.size());
+    const auto positions = array<float>(name + "_positions", n, width);
+    const auto velocities = array<float>(name + "_velocities", n, width);
+    States states;
+    for (std::int64_t i = 0; i < n; ++i) {
+      const auto x = positions.subspan(std::size_t(i * width), std::size_t(width));
+      const auto v = velocities.subspan(std::size_t(i * width), std::size_t(width));
+      states.push_back({steps[std::size_t(i)], {x.begin(), x.end()}, {v.begin(), v.end()}});
+    }
+    return states;
+  }
+
+  std::vector<Control> controls(const std::string& name, std::int64_t rows) const {
+    const auto manipulation = array<std::int32_t>(name + "_manipulation", rows, 1);
+    const std::int64_t n = std::int64_t(manipulation.size());
+    const auto force = array<float>(name + "_force_n", n, 3), target = array<float>(name + "_target_m", n, 3);
+    const auto node = array<std::int32_t>(name + "_node", n, 1),
+               steps = array<std::int32_t>(name + "_steps", n, 1);
+    const auto radius = array<float>(name + "_radius_m", n, 1),
+               max_force = array<float>(name + "_max_force_n", n, 1);
+    std::vector<Control> controls(manipulation.size());
+    for (std::size_t i = 0; i < controls.size(); ++i) {
+      require(manipulation[i] >= 0 && manipulation[i] <= std::int32_t(Manipulation::interpolation),
+              fmt::format("{}_manipulation[{}] is {}, which is none", name, i, manipulation[i]));
+      require(steps[i] >= 0, fmt::format("{}_steps[{}] is {}", name, i, steps[i]));
+      controls[i] = {Manipulation(manipulation[i]),
+                     Vec3f(force.data() + 3 * i),
+                     node[i],
+                     radius[i],
+                     Vec3f(target.data() + 3 * i),
+                     max_force[i],
+                     steps[i]};
+    }
+    return controls;
+  }
+
+  Tree tree() const {
+    Tree t;
+    t.states = states<std::deque<State>>("tree", width_of("tree_positions"));
+    const std::int64_t n = t.size();
+    require(n > 0, "the tree is empty");
+    const auto parents = array<std::int32_t>("tree_parent", n, 1);
+    const auto iterations = array<std::int64_t>("tree_iteration", n, 1);
+    const auto centers = array<float>("tree_center_m", n, 3);
+    t.parents.assign(parents.begin(), parents.end());
+    t.iterations.assign(iterations.begin(), iterations.end());
+    t.controls = controls("tree", n);
+    for (std::int64_t i = 0; i < n; ++i) {
+      t.centers.push_back(Vec3f(centers.data() + 3 * i));
+      const std::int32_t parent = parents[std::size_t(i)];
+      require(i == 0 ? parent == -1 : parent >= 0 && parent < i,
+              fmt::format("node {} has parent {}", i, parent));
+    }
+    return t;
+  }
+
+  Ending ending(const Json& name) const {
+    for (const Ending ending : {Ending::goal, Ending::iterations, Ending::time, Ending::stopped})
+      if (name == name_of(ending)) return ending;
+    refuse("its ending is " + name.dump() + ", which is none");
+  }
+
+  Json meta() const { return parse_json(file_.text("meta.json"), path_.string() + ": meta.json"); }
+
+ private:
+  fs::path path_;
+  Npz file_;
+};
+
+Statistics statistics_from_json(const Json& json) {
+  Statistics s;
+  json.at("iterations").get_to(s.iterations);
+  json.at("diverged").get_to(s.diverged);
+  json.at("rejected").get_to(s.rejected);
+  json.at("rollout_steps").get_to(s.rollout_steps);
+  json.at("rollouts").get_to(s.rollouts);
+  json.at("rollouts_wrong").get_to(s.rollouts_wrong);
+  json.at("cpu_s").get_to(s.cpu_s);
+  json.at("wall_s").get_to(s.wall_s);
+  return s;
+}
+
+}  // namespace
+
+Json json_of(const Statistics& s) {
+  return {{"iterations", s.iterations}, {"diverged", s.diverged},
+          {"rejected", s.rejected},     {"rollout_steps", s.rollout_steps},
+          {"rollouts", s.rollouts},     {"rollouts_wrong", s.rollouts_wrong},
+          {"cpu_s", s.cpu_s},           {"wall_s", s.wall_s}};
+}
+
+void write_plan(const fs::path& path, const Plan& plan, const Json& given) {
+  Npz file;
+  put_states(file, "tree", plan.tree.states);
+  put_controls(file, "tree", plan.tree.controls);
+  const std::int64_t nodes = plan.tree.size();
+  std::vector<float> centers;
+  for (int i = 0; i < nodes; ++i) {
+    const Vec3f center = plan.tree.centers[i];
+    centers.insert(centers.end(), center.begin(), center.end());
+  }
+  file.arrays["tree_center_m"] = NpyArray::of<float>(centers, {nodes, 3});
+  file.arrays["tree_parent"] = NpyArray::of<std::int32_t>(plan.tree.parents, {nodes});
+  file.arrays["tree_iteration"] = NpyArray::of<std::int64_t>(plan.tree.iterations, {nodes});
+  const std::vector<std::int32_t> path_nodes = path_to(plan.tree, plan.best_node);
+  file.arrays["path_node_of_tree"] =
+      NpyArray::of<std::int32_t>(path_nodes, {std::int64_t(path_nodes.size())});
+  put_controls(file, "path", plan.trajectory.controls);
+  put_states(file, "frame", plan.trajectory.frames);
+  put_states(file, "end", std::vector<State>{plan.trajectory.end});
+
+  Json meta;
+  meta["format"] = format_name;
+  meta["solved"] = plan.solved();
+  meta["ending"] = name_of(plan.ending);
+  meta["goal_node"] = plan.goal_node;
+  meta["best_node"] = plan.best_node;
+  meta["best_distance_m"] = plan.best_distance_m;
+  meta["settings"] = json_of(plan.settings);
+  meta["statistics"] = json_of(plan.statistics);
+  meta["settle_steps"] = plan.trajectory.settle_steps;
+  meta["frames_per_second"] = plan.trajectory.frames_per_second;
+  meta["system_hash"] = hex(plan.system_hash);
+  meta["tree_hash"] = hex(hash_of(plan.tree));
+  meta["trajectory_hash"] = hex(hash_of(plan.trajectory));
+  meta["given"] = given;
+  file.texts["meta.json"] = meta.dump(2) + "\n";
+  write_npz(path, file);
+}
+
+PlanFile read_plan(const fs::path& path) {
+  const Reader reader(path);
+  const Json meta = reader.meta();
+  try {
+    reader.require(meta.at("format") == format_name, "it is not of this version's format");
+    PlanFile file;
+    Plan& plan = file.plan;
+    plan.tree = reader.tree();
+    plan.settings = settings_from_json(meta.at("settings"), path.string());
+    plan.statistics = statistics_from_json(meta.at("statistics"));
+    meta.at("goal_node").get_to(plan.goal_node);
+    meta.at("best_node").get_to(plan.best_node);
+    meta.at("best_distance_m").get_to(plan.best_distance_m);
+    plan.ending = reader.ending(meta.at("ending"));
+    const int nodes = plan.tree.size();
+    reader.require(plan.best_node >= 0 && plan.best_node < nodes, "best_node is not a node of the tree");
+    reader.require(plan.goal_node == -1 || plan.goal_node == plan.best_node, "goal_node is not best_node");
+
+    Trajectory& t = plan.trajectory;
+    t.controls = reader.controls("path", -1);
+    const std::int64_t width = std::int64_t(plan.tree.states.front().positions.size());
+    t.frames = reader.states<std::vector<State>>("frame", width);
+    const auto end = reader.states<std::vector<State>>("end", width);
+    reader.require(end.size() == 1, "end is not one state");
+    t.end = end.front();
+    meta.at("settle_steps").get_to(t.settle_steps);
+    meta.at("frames_per_second").get_to(t.frames_per_second);
+
+    plan.system_hash = hash_from_hex(meta.at("system_hash").get<std::string>());
+    reader.require(meta.at("tree_hash") == hex(hash_of(plan.tree)),
+                   "the tree was changed since it was written");
+    reader.require(meta.at("trajectory_hash") == hex(hash_of(t)),
+                   "the path was changed since it was written");
+    file.given = meta.at("given");
+    return file;
+  } catch (const Json::exception& trouble) {
+    reader.refuse(std::string("meta.json: ") + trouble.what());
+  }
+}
+
+}  // namespace limber::plan

@@ -1,0 +1,296 @@
+#include "plan/search.h"
+
+#include <chrono>
+#include <condition_variable>
+#include <mutex>
+
+#include "core/error.h"
+#include "core/hash.h"
+#include "core/progress.h"
+#include "core/threads.h"
+
+namespace limber::plan {
+
+namespace {
+
+using Clock = std::chrono::steady_clock;
+double seconds_since(Clock::time_point t) { return std::chrono::duration<double>(Clock::now() - t).count(); }
+
+// What became of a rollout.
+struct Outcome {
+  enum Kind { node, diverged, rejected } kind = diverged;
+  State state;
+  Vec3 center = Vec3::Zero();
+};
+
+Outcome outcome_of(const System& system, Rollout& rollout) {
+  Outcome o;
+  if (!rollout.ok) return o;
+  const std::int64_t expected_step = rollout.from->step + rollout.control.steps;
+  LIMBER_CHECK(rollout.to.step == expected_step, rollout.to.step, expected_step);
+  o.center = system.robot_center(rollout.to);
+  LIMBER_CHECK(o.center.allFinite(), o.center.x(), o.center.y(), o.center.z());
+  o.kind = system.acceptable(rollout.to) ? Outcome::node : Outcome::rejected;
+  o.state = std::move(rollout.to);
+  return o;
+}
+
+// One iteration of Algorithm 1, on its way: computed from the node that is nearest as far as is known.
+struct Expansion {
+  std::int64_t iteration;
+  Draw draw;
+  Vec3f point;
+  int near;
+  float near_distance2;  // squared
+  Control control;
+  enum { waiting, running, finished } status = waiting;
+  bool overtaken = false;  // while it ran, a nearer node was added
+  Outcome outcome;
+};
+
+// Threads take expansions from one queue and commit them in its order. When a commit adds a node that is
+// nearer to the point of a later expansion than the node that one started from, the later one is aimed anew.
+// So whatever is committed started where the sequential algorithm would have started it.
+class Search {
+ public:
+  Search(const System& system, const Settings& settings, Plan& plan)
+      : system_(system), settings_(settings), plan_(plan), progress_("plan", settings.max_iterations) {
+    const int lanes = std::max(1, system.lanes()), threads = std::max(1, thread_count());
+    // Two batches a thread: one runs while the other waits for its turn to be committed.
+    window_ = settings.in_flight > 0 ? settings.in_flight : lanes * (threads > 1 ? 2 * threads : 1);
+    threads_ = std::min(threads, window_);
+    share_ = std::min(lanes, (window_ + threads_ - 1) / threads_);
+    next_iteration_ = plan.statistics.iterations;
+  }
+
+  void run() {
+    const double cpu_before = cpu_seconds();
+    if (plan_.solved()) end(Ending::goal);
+    parallel_for(threads_, [&](int) { work(); });
+    const std::lock_guard lock(mutex_);
+    plan_.statistics.cpu_s += cpu_seconds() - cpu_before;
+    plan_.statistics.wall_s += seconds_since(started_);
+  }
+
+ private:
+  void work() try {
+    const std::unique_ptr<Propagator> propagator = system_.make_propagator();
+    std::vector<Expansion*> mine;
+    std::vector<Rollout> rollouts;
+    std::vector<Outcome> outcomes;
+    std::unique_lock lock(mutex_);
+    while (true) {
+      commit_finished();
+      look_at_limits();
+      if (ended_) break;
+      draw_ahead();
+      take(mine, rollouts);
+      if (mine.empty()) {
+        changed_.wait(lock);
+        continue;
+      }
+      lock.unlock();
+      propagator->propagate(rollouts);
+      outcomes.clear();
+      for (Rollout& rollout : rollouts) outcomes.push_back(outcome_of(system_, rollout));
+      lock.lock();
+      give_back(mine, outcomes);
+      changed_.notify_all();
+    }
+    changed_.notify_all();
+  } catch (...) {
+    const std::lock_guard lock(mutex_);
+    ended_ = true;
+    changed_.notify_all();
+    throw;
+  }
+
+  void draw_ahead() {
+    while (int(queue_.size()) < window_ && next_iteration_ < settings_.max_iterations) {
+      Expansion e;
+      e.iteration = next_iteration_++;
+      e.draw = draw(settings_, system_, e.iteration);
+      e.point = e.draw.point.cast<float>();
+      aim(e, nearest(plan_.tree.centers, e.point));
+      queue_.push_back(std::move(e));
+    }
+  }
+
+  void aim(Expansion& e, int node) const {
+    const Vec3f center = plan_.tree.centers[node];
+    e.near = node;
+    e.near_distance2 = squared_distance(center, e.point);
+    e.control = control_of(e.draw, settings_, center.cast<double>());
+  }
+
+  void take(std::vector<Expansion*>& mine, std::vector<Rollout>& rollouts) {
+    mine.clear();
+    for (Expansion& e : queue_) {
+      if (int(mine.size()) == share_) break;
+      if (e.status == Expansion::waiting) mine.push_back(&e);
+    }
+    rollouts.resize(mine.size());
+    for (std::size_t i = 0; i < mine.size(); ++i) {
+      mine[i]->status = Expansion::running;
+      rollouts[i].from = &plan_.tree.states[std::size_t(mine[i]->near)];
+      rollouts[i].control = mine[i]->control;
+    }
+  }
+
+  void give_back(const std::vector<Expansion*>& mine, std::vector<Outcome>& outcomes) {
+    plan_.statistics.rollouts += std::int64_t(mine.size());
+    for (std::size_t i = 0; i < mine.size(); ++i) {
+      Expansion& e = *mine[i];
+      e.outcome = std::move(outcomes[i]);
+      e.status = Expansion::finished;
+      if (e.overtaken) compute_again(e);
+    }
+  }
+
+  void compute_again(Expansion& e) {
+    ++plan_.statistics.rollouts_wrong;
+    e.overtaken = false;
+    e.status = Expansion::waiting;
+  }
+
+  void commit_finished() {
+    while (!ended_ && !queue_.empty() && queue_.front().status == Expansion::finished) {
+      Expansion e = std::move(queue_.front());
+      queue_.pop_front();
+      commit(e);
+    }
+  }
+
+  void commit(Expansion& e) {
+    Statistics& statistics = plan_.statistics;
+    ++statistics.iterations;
+    statistics.rollout_steps += e.control.steps;
+    statistics.diverged += e.outcome.kind == Outcome::diverged;
+    statistics.rejected += e.outcome.kind == Outcome::rejected;
+    if (e.outcome.kind == Outcome::node) {
+      const int node = plan_.tree.add(std::move(e.outcome.state), e.near, e.control, e.iteration,
+                                      e.outcome.center.cast<float>());
+      consider_for_goal(node, e.outcome.center);
+      aim_overtaken(node);
+    }
+    progress_.update(statistics.iterations, fmt::format("{} nodes, {:.3g} m from the goal", plan_.tree.size(),
+                                                        plan_.best_distance_m));
+  }
+
+  void consider_for_goal(int node, const Vec3& center) {
+    const double distance = (center - settings_.goal.center_of_mass_m).norm();
+    if (distance >= plan_.best_distance_m) return;
+    plan_.best_distance_m = distance;
+    plan_.best_node = node;
+    if (distance > settings_.goal.radius_m) return;
+    plan_.goal_node = node;
+    end(Ending::goal);
+  }
+
+  void aim_overtaken(int node) {
+    const Vec3f center = plan_.tree.centers[node];
+    for (Expansion& e : queue_) {
+      if (!(squared_distance(center, e.point) < e.near_distance2)) continue;  // the first of equals stays
+      aim(e, node);
+      if (e.status == Expansion::running) e.overtaken = true;
+      if (e.status == Expansion::finished) compute_again(e);
+    }
+  }
+
+  void look_at_limits() {
+    if (ended_) return;
+    if (plan_.statistics.iterations >= settings_.max_iterations) return end(Ending::iterations);
+    if (stop_signal() != 0) return end(Ending::stopped);
+    if (seconds_since(started_) >= settings_.time_limit_s) end(Ending::time);
+  }
+
+  void end(Ending ending) {
+    plan_.ending = ending;
+    ended_ = true;
+  }
+
+  const System& system_;
+  const Settings& settings_;
+  Plan& plan_;
+  Progress progress_;
+  int window_, threads_, share_;  // expansions in flight, threads, expansions a thread takes at once
+  const Clock::time_point started_ = Clock::now();
+
+  std::mutex mutex_;  // guards all below, and plan_ (states already in the tree are read without it)
+  std::condition_variable changed_;
+  std::deque<Expansion>
+      queue_;  // in order of iteration; a deque, so that pointers to the taken ones stay good
+  std::int64_t next_iteration_ = 0;
+  bool ended_ = false;
+};
+
+Plan begin(const System& system, const Settings& settings) {
+  Plan plan;
+  plan.system_hash = system.hash();
+  const State start = system.start();
+  const Vec3 center = system.robot_center(start);
+  LIMBER_CHECK(center.allFinite(), center.x(), center.y(), center.z());
+  plan.tree.add(start, -1, Control{}, -1, center.cast<float>());
+  plan.best_distance_m = (center - settings.goal.center_of_mass_m).norm();
+  if (plan.best_distance_m <= settings.goal.radius_m) plan.goal_node = 0;
+  return plan;
+}
+
+void require_same_search(const System& system, const Settings& settings, const Plan& earlier) {
+  if (earlier.system_hash != system.hash())
+    throw InputError(
+        fmt::format("the earlier plan is of another world (hash {}, now {}); plan anew, without resuming it",
+                    hex(earlier.system_hash), hex(system.hash())));
+  if (const std::string name = first_difference(earlier.settings, settings); !name.empty())
+    throw InputError(fmt::format(
+        "the earlier plan was made with another {}; plan anew, without resuming it, or set {} back", name,
+        name));
+}
+
+}  // namespace
+
+Plan plan(const System& system, const Settings& settings, std::optional<Plan> earlier) {
+  validate(settings, system);
+  if (earlier) require_same_search(system, settings, *earlier);
+  Plan plan = earlier ? std::move(*earlier) : begin(system, settings);
+  plan.settings = settings;
+  Search(system, plan.settings, plan).run();
+  plan.trajectory = trajectory_to(system, settings, plan.tree, plan.best_node, plan.solved());
+  return plan;
+}
+
+std::string explain(const Plan& plan) {
+  const Settings& s = plan.settings;
+  const Statistics& statistics = plan.statistics;
+  const std::string where =
+      fmt::format("node {} of {}, {:.3g} m from the goal (radius {:.3g} m)", plan.best_node, plan.tree.size(),
+                  plan.best_distance_m, s.goal.radius_m);
+  if (plan.solved())
+    return fmt::format("reached the goal after {} iterations: {}", statistics.iterations, where);
+  std::string text = "no node reached the goal; the nearest is " + where + ". ";
+  switch (plan.ending) {
+    case Ending::goal:
+      break;
+    case Ending::iterations:
+      text += fmt::format(
+          "The limit of {} iterations ended the search; try a larger max_iterations, max_force_n or "
+          "goal_bias.",
+          s.max_iterations);
+      break;
+    case Ending::time:
+      text += fmt::format(
+          "The time limit of {:g} s ended the search after {} of {} iterations; resume it with a larger one.",
+          s.time_limit_s, statistics.iterations, s.max_iterations);
+      break;
+    case Ending::stopped:
+      text += fmt::format("A signal ended the search after {} of {} iterations; resume it to go on.",
+                          statistics.iterations, s.max_iterations);
+      break;
+  }
+  if (statistics.diverged + statistics.rejected > 0)
+    text += fmt::format(" {} rollouts diverged and {} ended in states that are not acceptable.",
+                        statistics.diverged, statistics.rejected);
+  return text;
+}
+
+}  // namespace limber::plan

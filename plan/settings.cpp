@@ -1,0 +1,123 @@
+#include "plan/settings.h"
+
+#include <cmath>
+
+#include "core/error.h"
+
+namespace limber::plan {
+
+namespace {
+
+void require(bool good, const char* name, double value, const char* range) {
+  if (!good) throw InputError(fmt::format("planner: {} is {}; it must be {}", name, value, range));
+}
+
+void require_within(double value, double lower, double upper, const char* name) {
+  if (!(value >= lower && value <= upper))
+    throw InputError(fmt::format("planner: {} is {}; it must be in [{}, {}]", name, value, lower, upper));
+}
+
+bool is_weight(double w) { return std::isfinite(w) && w >= 0; }
+
+void validate_weights(const Settings& s) {
+  const ManipulationWeights& w = s.weights;
+  require(is_weight(w.body), "weight of body", w.body, "at least 0");
+  require(is_weight(w.control_point), "weight of control_point", w.control_point, "at least 0");
+  require(is_weight(w.interpolation), "weight of interpolation", w.interpolation, "at least 0");
+  const double elsewhere = w.body + w.control_point;
+  if (s.goal_bias < 1 && elsewhere == 0)
+    throw InputError(
+        "planner: body and control_point both have weight 0, and interpolation is only possible towards the "
+        "goal; give "
+        "one of them a weight, or set goal_bias to 1");
+  if (elsewhere + w.interpolation == 0)
+    throw InputError("planner: all manipulations have weight 0; give one of them a weight");
+}
+
+}  // namespace
+
+void validate(const Settings& s, const System& system) {
+  require(s.max_iterations >= 0, "max_iterations", double(s.max_iterations), "at least 0");
+  if (!s.goal.center_of_mass_m.allFinite())
+    throw InputError("planner: the goal's center_of_mass_m is not finite");
+  require(std::isfinite(s.goal.radius_m) && s.goal.radius_m > 0, "the goal's radius_m", s.goal.radius_m,
+          "above 0");
+  require_within(s.goal_bias, 0, 1, "goal_bias");
+  validate_weights(s);
+  require(std::isfinite(s.max_force_n) && s.max_force_n >= 0, "max_force_n", s.max_force_n, "at least 0");
+  require_within(s.max_force_share, 0, 1, "max_force_share");
+  require_within(s.min_force_share, 0, s.max_force_share, "min_force_share");
+  require_within(s.max_duration_s, 0, 1e8 * system.dt_s(), "max_duration_s");
+  require_within(s.min_duration_s, 0, s.max_duration_s, "min_duration_s");
+  require(s.control_point_radius_m > 0, "control_point_radius_m", s.control_point_radius_m, "above 0");
+  require_within(s.settle.max_duration_s, 0, 1e8 * system.dt_s(), "settle max_duration_s");
+  require(s.settle.mean_speed_m_s > 0, "settle mean_speed_m_s", s.settle.mean_speed_m_s, "above 0");
+  require_within(s.settle.max_force_share, 0, 1, "settle max_force_share");
+  require(s.frames_per_second > 0 && s.frames_per_second <= 10000, "frames_per_second", s.frames_per_second,
+          "in (0, 10000]");
+  require_within(s.in_flight, 0, 65536, "in_flight");
+  require(s.time_limit_s >= 0, "time_limit_s", s.time_limit_s, "at least 0");
+}
+
+Json json_of(const Settings& s) {
+  const Vec3& goal = s.goal.center_of_mass_m;
+  Json json;
+  json["seed"] = s.seed;
+  json["max_iterations"] = s.max_iterations;
+  json["goal"] = {{"center_of_mass_m", {goal.x(), goal.y(), goal.z()}}, {"radius_m", s.goal.radius_m}};
+  json["goal_bias"] = s.goal_bias;
+  json["weights"] = {{"body", s.weights.body},
+                     {"control_point", s.weights.control_point},
+                     {"interpolation", s.weights.interpolation}};
+  json["max_force_n"] = s.max_force_n;
+  json["min_force_share"] = s.min_force_share;
+  json["max_force_share"] = s.max_force_share;
+  json["min_duration_s"] = s.min_duration_s;
+  json["max_duration_s"] = s.max_duration_s;
+  json["control_point_radius_m"] = s.control_point_radius_m;
+  json["settle"] = {{"max_duration_s", s.settle.max_duration_s},
+                    {"mean_speed_m_s", s.settle.mean_speed_m_s},
+                    {"max_force_share", s.settle.max_force_share}};
+  json["frames_per_second"] = s.frames_per_second;
+  json["in_flight"] = s.in_flight;
+  json["time_limit_s"] = std::isfinite(s.time_limit_s) ? Json(s.time_limit_s) : Json();
+  return json;
+}
+
+Settings settings_from_json(const Json& json, const std::string& what) try {
+  Settings s;
+  json.at("seed").get_to(s.seed);
+  json.at("max_iterations").get_to(s.max_iterations);
+  for (int axis = 0; axis < 3; ++axis)
+    json.at("goal").at("center_of_mass_m").at(std::size_t(axis)).get_to(s.goal.center_of_mass_m[axis]);
+  json.at("goal").at("radius_m").get_to(s.goal.radius_m);
+  json.at("goal_bias").get_to(s.goal_bias);
+  json.at("weights").at("body").get_to(s.weights.body);
+  json.at("weights").at("control_point").get_to(s.weights.control_point);
+  json.at("weights").at("interpolation").get_to(s.weights.interpolation);
+  json.at("max_force_n").get_to(s.max_force_n);
+  json.at("min_force_share").get_to(s.min_force_share);
+  json.at("max_force_share").get_to(s.max_force_share);
+  json.at("min_duration_s").get_to(s.min_duration_s);
+  json.at("max_duration_s").get_to(s.max_duration_s);
+  json.at("control_point_radius_m").get_to(s.control_point_radius_m);
+  json.at("settle").at("max_duration_s").get_to(s.settle.max_duration_s);
+  json.at("settle").at("mean_speed_m_s").get_to(s.settle.mean_speed_m_s);
+  json.at("settle").at("max_force_share").get_to(s.settle.max_force_share);
+  json.at("frames_per_second").get_to(s.frames_per_second);
+  json.at("in_flight").get_to(s.in_flight);
+  if (const Json& limit = json.at("time_limit_s"); !limit.is_null()) limit.get_to(s.time_limit_s);
+  return s;
+} catch (const Json::exception& trouble) {
+  throw InputError(fmt::format("{}: planner settings: {}", what, trouble.what()));
+}
+
+std::string first_difference(const Settings& a, const Settings& b) {
+  const Json in_a = json_of(a), in_b = json_of(b);
+  for (const char* key : {"seed", "goal", "goal_bias", "weights", "max_force_n", "min_force_share",
+                          "max_force_share", "min_duration_s", "max_duration_s", "control_point_radius_m"})
+    if (in_a.at(key) != in_b.at(key)) return key;
+  return "";
+}
+
+}  // namespace limber::plan

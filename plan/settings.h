@@ -1,0 +1,64 @@
+// What the user may choose about the search. The defaults are the preset `paper`: Algorithm 1 of Rodriguez,
+// Lien and Amato, "Planning Motion in Completely Deformable Environments" (ICRA 2006).
+#pragma once
+
+#include <cstdint>
+#include <limits>
+
+#include "core/json.h"
+#include "plan/system.h"
+
+namespace limber::plan {
+
+// How often each manipulation is chosen, relative to the others; each ≥ 0. Interpolation is only possible
+// towards the goal, so elsewhere the other two share.
+struct ManipulationWeights {
+  double body = 1;
+  double control_point = 1;
+  double interpolation = 1;
+};
+
+struct Goal {
+  Vec3 center_of_mass_m = Vec3::Zero();
+  double radius_m = 0;  // > 0: a node whose centre of mass is within it solves the query
+};
+
+// At the end of a path that reached the goal, interpolation holds the robot there until it rests.
+struct Settle {
+  double max_duration_s = 3;     // 0: none
+  double mean_speed_m_s = 0.02;  // slower is at rest
+  double max_force_share = 1;    // of max_force_n, in [0, 1]
+};
+
+struct Settings {
+  std::uint64_t seed = 1;
+  std::int64_t max_iterations = 1000;  // in total, those of an earlier plan included
+  Goal goal;
+  double goal_bias = 0.1;  // share of expansions drawn towards the goal, in [0, 1]
+  ManipulationWeights weights;
+  double max_force_n = 0;      // on the whole robot, ≥ 0
+  double min_force_share = 0;  // the magnitude is drawn from [min, max] × max_force_n, 0 ≤ min ≤ max ≤ 1
+  double max_force_share = 1;
+  double min_duration_s = 0.2;  // of an expansion, rounded to whole steps and at least one
+  double max_duration_s = 1;
+  double control_point_radius_m = 0.25;  // > 0, in the rest shape
+  Settle settle;
+  double frames_per_second = 30;  // of the trajectory's stored states, in (0, 10000]
+  // None of these changes the tree, save for how far it gets.
+  int in_flight = 0;  // expansions computed ahead; 0: chosen from the threads and the lanes
+  double time_limit_s = std::numeric_limits<double>::infinity();  // wall
+};
+
+// Throws InputError naming the setting, its value and its range.
+void validate(const Settings&, const System&);
+
+// Every number exactly; no time limit is null. Throws InputError, beginning with `what`, when a key is
+// missing or of another type.
+Json json_of(const Settings&);
+Settings settings_from_json(const Json&, const std::string& what);
+
+// The name of the first setting that shapes the tree and differs, or "" when one tree can go on from the
+// other.
+std::string first_difference(const Settings&, const Settings&);
+
+}  // namespace limber::plan

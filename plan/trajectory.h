@@ -1,0 +1,28 @@
+// A way through the tree as it is simulated: controls from the start, and the states they lead to.
+#pragma once
+
+#include <vector>
+
+#include "plan/expansion.h"
+#include "plan/tree.h"
+
+namespace limber::plan {
+
+struct Trajectory {
+  std::vector<Control> controls;  // from the start; with settle_steps > 0 the last one is the settle
+  std::int32_t settle_steps = 0;
+  double frames_per_second = 30;
+  std::vector<State>
+      frames;  // [f]: the state at the whole step nearest to f / frames_per_second, up to the end
+  State end;   // after the last control
+};
+std::uint64_t hash_of(const Trajectory&);  // of its controls, frames and end
+
+// Applies the controls to the system's start. Where the dynamics diverge it stops, and the frames end there.
+Trajectory simulate(const System&, const std::vector<Control>&, double frames_per_second);
+
+// The simulated path to a node; `settle` adds interpolation towards the goal until the robot rests or the
+// settle's time is up. An InternalError when the simulation does not end in the node's very state.
+Trajectory trajectory_to(const System&, const Settings&, const Tree&, int node, bool settle);
+
+}  // namespace limber::plan

@@ -1,0 +1,143 @@
+#include "plan/plan_file.h"
+
+#include <gtest/gtest.h>
+
+#include <fstream>
+
+#include "core/error.h"
+#include "core/npz.h"
+#include "tests/core/temporary_folder.h"
+#include "tests/plan/toy.h"
+
+namespace limber::plan {
+namespace {
+
+using testing::Toy;
+using testing::toy_settings;
+
+struct PlanFileTest : ::testing::Test {
+  TemporaryFolder folder;
+  fs::path file(const char* name = "plan.npz") const { return folder / name; }
+};
+
+void expect_same(const Plan& a, const Plan& b) {
+  EXPECT_EQ(hash_of(a.tree), hash_of(b.tree));
+  EXPECT_EQ(hash_of(a.trajectory), hash_of(b.trajectory));
+  EXPECT_EQ(a.trajectory.frames, b.trajectory.frames);
+  EXPECT_EQ(a.trajectory.end, b.trajectory.end);
+  EXPECT_EQ(a.trajectory.controls, b.trajectory.controls);
+  EXPECT_EQ(a.goal_node, b.goal_node);
+  EXPECT_EQ(a.best_node, b.best_node);
+  EXPECT_EQ(a.best_distance_m, b.best_distance_m);
+  EXPECT_EQ(a.system_hash, b.system_hash);
+  EXPECT_EQ(a.ending, b.ending);
+  EXPECT_EQ(json_of(a.settings), json_of(b.settings));
+  EXPECT_EQ(json_of(a.statistics), json_of(b.statistics));
+}
+
+TEST_F(PlanFileTest, RoundTrip) {
+  const Json given = {{"scene", "name = \"toy\"\n"}, {"version", "0.1"}};
+  Settings settings = toy_settings();
+  for (const std::int64_t iterations : {0, 10, 2000}) {
+    settings.max_iterations = iterations;
+    const Plan p = plan(Toy(5, true, true, 1.6f), settings);
+    write_plan(file(), p, given);
+    const PlanFile back = read_plan(file());
+    expect_same(back.plan, p);
+    EXPECT_EQ(back.given, given);
+  }
+}
+
+TEST_F(PlanFileTest, SameRunSameArrays) {
+  const Toy toy;
+  write_plan(file("a.npz"), plan(toy, toy_settings()), {});
+  write_plan(file("b.npz"), plan(toy, toy_settings()), {});
+  const Npz a = read_npz(file("a.npz")), b = read_npz(file("b.npz"));
+  ASSERT_EQ(a.arrays.size(), b.arrays.size());
+  for (const auto& [name, array] : a.arrays) EXPECT_EQ(array.bytes, b.array(name).bytes) << name;
+}
+
+TEST_F(PlanFileTest, ASavedTreeGoesOnToTheSameBytes) {
+  const Toy toy(5, true, true, 1.6f);
+  Settings s = toy_settings();
+  const Plan whole = plan(toy, s);
+  for (const std::int64_t cut :
+       {std::int64_t(1), whole.statistics.iterations / 2, whole.statistics.iterations - 1}) {
+    s.max_iterations = cut;
+    write_plan(file(), plan(toy, s), {});
+    s.max_iterations = toy_settings().max_iterations;
+    const Plan resumed = plan(toy, s, read_plan(file()).plan);
+    EXPECT_EQ(hash_of(resumed.tree), hash_of(whole.tree)) << cut;
+    EXPECT_EQ(hash_of(resumed.trajectory), hash_of(whole.trajectory)) << cut;
+    EXPECT_EQ(resumed.statistics.iterations, whole.statistics.iterations) << cut;
+  }
+}
+
+TEST_F(PlanFileTest, EveryTruncatedPrefixIsAnInputError) {
+  Settings s = toy_settings();
+  s.max_iterations = 3;
+  s.frames_per_second = 1;
+  write_plan(file(), plan(Toy(), s), {});
+  const std::string whole = read_file(file());
+  for (std::size_t size = 0; size < whole.size(); ++size) {
+    fs::remove(file("cut.npz"));  // to overwrite it in place makes the file system wait for the disk
+    std::ofstream(file("cut.npz"), std::ios::binary) << whole.substr(0, size);
+    ASSERT_THROW(read_plan(file("cut.npz")), InputError) << size << " of " << whole.size() << " bytes";
+  }
+}
+
+TEST_F(PlanFileTest, AMissingOrReshapedEntryIsAnInputError) {
+  write_plan(file(), plan(Toy(), toy_settings()), {});
+  const Npz good = read_npz(file());
+  const auto expect_refused = [&](const Npz& bad, const std::string& why) {
+    write_npz(file("bad.npz"), bad);
+    EXPECT_THROW(read_plan(file("bad.npz")), InputError) << why;
+  };
+  for (const auto& [name, array] : good.arrays) {
+    if (name == "path_node_of_tree") continue;  // for people with numpy; it follows from the tree
+    Npz bad = good;
+    bad.arrays.erase(name);
+    expect_refused(bad, name + " missing");
+
+    bad = good;
+    NpyArray& cut = bad.arrays[name];
+    const std::size_t row = cut.bytes.size() / std::size_t(cut.shape[0]);
+    --cut.shape[0];
+    cut.bytes.resize(cut.bytes.size() - row);
+    expect_refused(bad, name + " one row short");
+
+    bad = good;
+    bad.arrays[name].bytes.back() ^= std::byte(1);
+    expect_refused(bad, name + " changed");
+
+    bad = good;
+    bad.arrays[name].shape = {bad.arrays[name].size(), 1, 1};
+    expect_refused(bad, name + " reshaped");
+  }
+  Npz bad = good;
+  bad.texts.erase("meta.json");
+  expect_refused(bad, "no meta.json");
+  const Json meta = parse_json(good.text("meta.json"), "meta.json");
+  for (const auto& [key, value] : meta.items()) {
+    if (key == "solved") continue;  // for people; it follows from goal_node
+    Json changed = meta;
+    changed.erase(key);
+    bad = good;
+    bad.texts["meta.json"] = changed.dump();
+    expect_refused(bad, key + " missing");
+    changed = meta;
+    changed[key] = Json::array({1, 2});
+    if (key == "given") continue;
+    bad.texts["meta.json"] = changed.dump();
+    expect_refused(bad, key + " of another kind");
+  }
+}
+
+TEST_F(PlanFileTest, AnotherFileIsAnInputError) {
+  EXPECT_THROW(read_plan(file("absent.npz")), InputError);
+  std::ofstream(file()) << "no zip";
+  EXPECT_THROW(read_plan(file()), InputError);
+}
+
+}  // namespace
+}  // namespace limber::plan

@@ -1,0 +1,136 @@
+#include "tests/plan/toy.h"
+
+#include <chrono>
+#include <thread>
+
+#include "core/hash.h"
+
+namespace limber::plan::testing {
+
+namespace {
+
+Vec3f at(const std::vector<float>& v, int node) { return Vec3f(v.data() + 3 * node); }
+void put(std::vector<float>& v, int node, const Vec3f& p) {
+  std::copy(p.begin(), p.end(), v.begin() + 3 * node);
+}
+
+class ToyPropagator final : public Propagator {
+ public:
+  explicit ToyPropagator(const Toy& toy) : toy_(toy) {}
+  void propagate(std::span<Rollout> rollouts) override {
+    for (Rollout& r : rollouts) {
+      if (toy_.before_each_rollout) toy_.before_each_rollout();
+      const std::int64_t number = toy_.rollouts++;
+      if (toy_.jitter) std::this_thread::sleep_for(std::chrono::microseconds(number * 7919 % 200));
+      r.to = *r.from;
+      r.ok = true;
+      for (int i = 0; i < r.control.steps && r.ok; ++i) r.ok = toy_.step(r.control, r.to);
+    }
+  }
+
+ private:
+  const Toy& toy_;
+};
+
+}  // namespace
+
+State Toy::start() const {
+  State s{0, std::vector<float>(std::size_t(3 * nodes)), std::vector<float>(std::size_t(3 * nodes))};
+  for (int i = 0; i < nodes; ++i) put(s.positions, i, Vec3f(1, 1.5f, 1) + rest_place(i));
+  return s;
+}
+
+Vec3 Toy::robot_center(const State& s) const {
+  Vec3 sum = Vec3::Zero();
+  for (int i = 0; i < nodes; ++i) sum += at(s.positions, i).cast<double>();
+  return sum / nodes;
+}
+
+double Toy::mean_speed(const State& s) const {
+  double sum = 0;
+  for (int i = 0; i < nodes; ++i) sum += double(at(s.velocities, i).norm());
+  return sum / nodes;
+}
+
+std::uint64_t Toy::hash() const {
+  return Hasher()
+      .value(nodes)
+      .value(mass_kg)
+      .value(damping_per_s)
+      .value(int(wall))
+      .value(int(lava))
+      .value(unacceptable_above_z)
+      .digest();
+}
+
+bool Toy::acceptable(const State& s) const { return robot_center(s).z() <= double(unacceptable_above_z); }
+
+std::unique_ptr<Propagator> Toy::make_propagator() const { return std::make_unique<ToyPropagator>(*this); }
+
+bool Toy::step(const Control& c, State& s) const {
+  constexpr float h = 0.01f, spring_per_s2 = 40, pull_per_s2 = 9;  // divided by the mass
+  const State before = s;
+  for (int i = 0; i < nodes; ++i) {
+    const Vec3f x = at(before.positions, i), v = at(before.velocities, i);
+    Vec3f a = -damping_per_s * v;
+    for (const int j : {i - 1, i + 1}) {
+      if (j < 0 || j >= nodes) continue;
+      a += spring_per_s2 * ((at(before.positions, j) - x) - (rest_place(j) - rest_place(i)));
+    }
+    const bool near_node = c.node >= 0 && (rest_place(i) - rest_place(c.node)).norm() <= c.radius_m;
+    if (c.manipulation == Manipulation::body || (c.manipulation == Manipulation::control_point && near_node))
+      a += c.force_n / mass_kg;
+    if (c.manipulation == Manipulation::interpolation) {
+      const Vec3f pull = pull_per_s2 * (c.target_m + rest_place(i) - x) - 6.0f * v;
+      const float cap = c.max_force_n / mass_kg, length = pull.norm();
+      a += length > cap ? Vec3f(pull * (cap / length)) : pull;
+    }
+    Vec3f v_next = v + h * a, x_next = x + h * v_next;
+    const bool in_gap = x_next.y() > 2 && x_next.y() < 4;
+    if (wall && !in_gap && std::abs(x_next.x() - 5) < 0.2f) {
+      x_next.x() = x.x() < 5 ? 4.8f : 5.2f;
+      v_next.x() = 0;
+    }
+    if (lava && x_next.y() < 0.5f) return false;
+    put(s.positions, i, x_next);
+    put(s.velocities, i, v_next);
+  }
+  ++s.step;
+  return true;
+}
+
+Settings toy_settings() {
+  Settings s;
+  s.seed = 7;
+  s.max_iterations = 2000;
+  s.goal = {Vec3(9, 1.5, 1), 0.4};
+  s.max_force_n = 8;
+  s.control_point_radius_m = 0.25;
+  return s;
+}
+
+Tree sequential_tree(const System& system, const Settings& settings) {
+  const auto propagator = system.make_propagator();
+  Tree tree;
+  const State start = system.start();
+  tree.add(start, -1, Control{}, -1, system.robot_center(start).cast<float>());
+  for (std::int64_t i = 0; i < settings.max_iterations; ++i) {
+    const Draw d = draw(settings, system, i);
+    int near = 0;
+    for (int node = 1; node < tree.size(); ++node)
+      if (squared_distance(tree.centers[node], d.point.cast<float>()) <
+          squared_distance(tree.centers[near], d.point.cast<float>()))
+        near = node;
+    Rollout r;
+    r.from = &tree.states[std::size_t(near)];
+    r.control = control_of(d, settings, tree.centers[near].cast<double>());
+    propagator->propagate({&r, 1});
+    if (!r.ok || !system.acceptable(r.to)) continue;
+    const Vec3 center = system.robot_center(r.to);
+    tree.add(r.to, near, r.control, i, center.cast<float>());
+    if ((center - settings.goal.center_of_mass_m).norm() <= settings.goal.radius_m) break;
+  }
+  return tree;
+}
+
+}  // namespace limber::plan::testing

@@ -1,0 +1,51 @@
+// Small worlds for the planner: a chain of equal masses in a box with a wall that has a gap. A chain of one
+// is a damped double integrator.
+#pragma once
+
+#include <atomic>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "plan/search.h"
+
+namespace limber::plan::testing {
+
+struct Toy final : System {
+  int nodes = 1;
+  float mass_kg = 2;
+  float damping_per_s = 0.5f;
+  bool wall = false;                // across x = 5, 0.4 thick, open for 2 < y < 4
+  bool lava = false;                // a rollout through y < 0.5 diverges
+  float unacceptable_above_z = 99;  // no node may be there
+  int lanes_wanted = 1;
+  bool jitter = false;                        // threads finish in a scrambled order
+  std::function<void()> before_each_rollout;  // called by the propagators
+  mutable std::atomic<std::int64_t> rollouts{0};
+
+  Toy() = default;
+  Toy(int nodes_, bool wall_, bool lava_, float unacceptable)
+      : nodes(nodes_), wall(wall_), lava(lava_), unacceptable_above_z(unacceptable) {}
+
+  State start() const override;
+  Vec3 robot_center(const State&) const override;
+  double mean_speed(const State&) const override;
+  int robot_nodes() const override { return nodes; }
+  Box sample_bounds() const override { return {Vec3(0, 0, 0), Vec3(10, 6, 2)}; }
+  double dt_s() const override { return 0.01; }
+  std::uint64_t hash() const override;
+  bool acceptable(const State&) const override;
+  int lanes() const override { return lanes_wanted; }
+  std::unique_ptr<Propagator> make_propagator() const override;
+
+  Vec3f rest_place(int node) const { return Vec3f(0, 0, 0.2f * (float(node) - 0.5f * float(nodes - 1))); }
+  bool step(const Control&, State&) const;  // false: diverged
+};
+
+// Settings under which the toys are solved in some hundred iterations.
+Settings toy_settings();
+
+// The planner as the paper prints it: one expansion after the other, no speculation. The tree it grows.
+Tree sequential_tree(const System&, const Settings&);
+
+}  // namespace limber::plan::testing
