@@ -1,0 +1,146 @@
+#include "fem/batch.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/error.h"
+#include "fem/detail/stepper.h"
+
+namespace limber::fem {
+namespace {
+
+detail::Isa isa_of(InstructionSet wanted) {
+  const auto isa = wanted == InstructionSet::automatic ? detail::best_isa()
+                   : wanted == InstructionSet::avx512  ? detail::Isa::avx512
+                   : wanted == InstructionSet::avx2    ? detail::Isa::avx2
+                                                       : detail::Isa::sse2;
+  if (!detail::machine_has(isa))
+    throw InputError("this machine lacks the instruction set asked for; use automatic");
+  return isa;
+}
+
+// A state that left the world by more than its size, or is not finite, is no state.
+Outcome judge(const World& world, const State& state) {
+  const Vec3 center = world.bounds_m.center();
+  const double far = 2 * world.bounds_m.diagonal() + 1e6 * !world.walls;
+  for (const Body& body : world.bodies) {
+    for (int n = 0; n < body.node_count() && body.moving; ++n)
+      for (int c = 0; c < 3; ++c) {
+        const std::size_t k = std::size_t(3 * (body.first_node + n) + c);
+        const float x = state.positions[k], v = state.velocities[k];
+        if (!std::isfinite(x) || !std::isfinite(v))
+          return {RunStatus::diverged, fmt::format("body {}: node {} is not finite", body.name, n)};
+        if (std::abs(x - center[c]) > far)
+          return {RunStatus::diverged,
+                  fmt::format("body {}: node {} flew off to {} = {:.3g} m", body.name, n, "xyz"[c], x)};
+      }
+  }
+  return {};
+}
+
+}  // namespace
+
+struct Batch::Impl {
+  struct Lane {
+    Control control;
+    int steps_left = 0;
+    State state;  // as loaded; when done, as it ended
+    Outcome outcome;
+  };
+  const World& world;
+  detail::Stepper<float> stepper;
+  std::vector<Lane> lanes;
+  State rest;
+
+  Impl(const World& w, int count, InstructionSet set)
+      : world(w), stepper(w, count, isa_of(set)), lanes(std::size_t(count)), rest(rest_state(w)) {
+    for (Lane& lane : lanes) lane.state = rest;
+  }
+
+  void finish(int index) {
+    Lane& lane = lanes[index];
+    State end{lane.state.step + lane.control.steps, std::vector<float>(rest.positions.size()),
+              std::vector<float>(rest.velocities.size())};
+    stepper.store(index, end.positions.data(), end.velocities.data());
+    lane.outcome = judge(world, end);
+    if (lane.outcome.status == RunStatus::ok) lane.state = std::move(end);
+    stepper.load(index, rest.positions.data(), rest.velocities.data(), {}, false);
+  }
+};
+
+Batch::Batch(const World& world, int lanes, InstructionSet set)
+    : impl_(std::make_unique<Impl>(world, lanes, set)) {}
+Batch::~Batch() = default;
+Batch::Batch(Batch&&) noexcept = default;
+
+int Batch::lanes() const { return int(impl_->lanes.size()); }
+const World& Batch::world() const { return impl_->world; }
+
+void Batch::load(int lane, const State& state, const Control& control) {
+  LIMBER_CHECK(state.positions.size() == impl_->rest.positions.size(), state.positions.size(),
+               impl_->rest.positions.size());
+  LIMBER_CHECK(state.velocities.size() == impl_->rest.velocities.size(), state.velocities.size(),
+               impl_->rest.velocities.size());
+  LIMBER_CHECK(control.steps >= 0, control.steps);
+  impl_->lanes.at(std::size_t(lane)) = {control, control.steps, state, {}};
+  impl_->stepper.load(lane, state.positions.data(), state.velocities.data(), control, control.steps > 0);
+  if (control.steps == 0) impl_->finish(lane);
+}
+
+int Batch::advance(int most_steps) {
+  int steps = most_steps, busy = 0;
+  for (const auto& lane : impl_->lanes)
+    if (lane.steps_left > 0) steps = std::min(steps, lane.steps_left), ++busy;
+  if (busy == 0 || steps <= 0) return 0;
+  for (int s = 0; s < steps; ++s) impl_->stepper.step();
+  for (int l = 0; l < lanes(); ++l) {
+    auto& lane = impl_->lanes[l];
+    if (lane.steps_left == 0) continue;
+    lane.steps_left -= steps;
+    if (lane.steps_left == 0) impl_->finish(l);
+  }
+  return steps;
+}
+
+int Batch::steps_left(int lane) const { return impl_->lanes.at(std::size_t(lane)).steps_left; }
+
+const Outcome& Batch::outcome(int lane) const {
+  LIMBER_CHECK(steps_left(lane) == 0, lane, steps_left(lane));
+  return impl_->lanes[lane].outcome;
+}
+
+void Batch::store(int lane, State& state) const {
+  LIMBER_CHECK(steps_left(lane) == 0, lane, steps_left(lane));
+  state = impl_->lanes[lane].state;
+}
+
+void propagate(Batch& batch, std::span<Rollout> rollouts) {
+  constexpr std::size_t none = ~std::size_t(0);
+  std::vector<std::size_t> rollout_of_lane(std::size_t(batch.lanes()), none);
+  std::size_t next = 0, running = 0;
+  do {
+    for (int lane = 0; lane < batch.lanes(); ++lane) {
+      std::size_t& mine = rollout_of_lane[lane];
+      while (true) {
+        if (mine != none && batch.steps_left(lane) == 0) {
+          batch.store(lane, rollouts[mine].end);
+          rollouts[mine].outcome = batch.outcome(lane);
+          mine = none, --running;
+        }
+        if (mine != none || next == rollouts.size()) break;
+        mine = next++, ++running;
+        batch.load(lane, *rollouts[mine].start, rollouts[mine].control);
+      }
+    }
+    batch.advance();
+  } while (running > 0);
+}
+
+Rollout propagate(const World& world, const State& start, const Control& control) {
+  Batch batch(world, 1);
+  Rollout rollout{&start, control, {}, {}};
+  propagate(batch, {&rollout, 1});
+  return rollout;
+}
+
+}  // namespace limber::fem

@@ -1,0 +1,62 @@
+// Rollouts of one World, W side by side. What a rollout gives is a function of (World, State, Control) alone:
+// bit for bit the same whatever W, the lane, the neighbours and the instruction set, and 100 steps are 40 and
+// then 60.
+#pragma once
+
+#include <memory>
+#include <span>
+#include <string>
+
+#include "core/state.h"
+#include "fem/world.h"
+
+namespace limber::fem {
+
+enum class RunStatus { ok, diverged };
+
+struct Outcome {
+  RunStatus status = RunStatus::ok;
+  std::string reason;  // of a divergence: which body, which node, what it did
+};
+
+enum class InstructionSet { automatic, sse2, avx2, avx512 };
+
+// Scratch memory of one thread; `world` must outlive it.
+class Batch {
+ public:
+  // lanes: 1, 8 or 16. Throws InputError when the machine lacks the instruction set.
+  explicit Batch(const World& world, int lanes = 16, InstructionSet = InstructionSet::automatic);
+  ~Batch();
+  Batch(Batch&&) noexcept;
+  int lanes() const;
+  const World& world() const;
+
+  // The lane will take control.steps steps from here. What it held is gone.
+  void load(int lane, const State&, const Control&);
+  // Steps all loaded lanes together until the first of them is done, at most `most_steps`; returns the steps
+  // taken, 0 when no lane has any left.
+  int advance(int most_steps = 1 << 30);
+  int steps_left(int lane) const;
+  // Once steps_left is 0. A diverged lane holds no state to go on from: store() gives the one it was loaded
+  // with.
+  const Outcome& outcome(int lane) const;
+  void store(int lane, State&) const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+struct Rollout {
+  const State* start;  // not owned
+  Control control;
+  State end;        // out; equals *start when diverged
+  Outcome outcome;  // out
+};
+
+// Runs all of them, refilling a lane as soon as its rollout ends.
+void propagate(Batch&, std::span<Rollout>);
+// One rollout in a Batch of one lane, made for the purpose.
+Rollout propagate(const World&, const State& start, const Control&);
+
+}  // namespace limber::fem

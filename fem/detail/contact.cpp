@@ -1,0 +1,453 @@
+#include "fem/detail/contact.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "fem/world.h"
+
+namespace limber::fem::detail {
+namespace {
+
+template <class Real>
+Real dot(const Real a[3], const Real b[3]) {
+  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+// det(a−p, b−p, c−p), computed from the same numbers in the same order whichever tet asks.
+template <class Real>
+Real det_from(const Real* p, const Real* a, const Real* b, const Real* c) {
+  const Real ax = a[0] - p[0], ay = a[1] - p[1], az = a[2] - p[2];
+  const Real bx = b[0] - p[0], by = b[1] - p[1], bz = b[2] - p[2];
+  const Real cx = c[0] - p[0], cy = c[1] - p[1], cz = c[2] - p[2];
+  return ax * (by * cz - bz * cy) + ay * (bz * cx - bx * cz) + az * (bx * cy - by * cx);
+}
+
+template <class Real>
+void fetch(const LaneView<Real>& view, int node, Real out[3]) {
+  for (int c = 0; c < 3; ++c) out[c] = view.x[(3 * node + c) * view.stride];
+}
+
+// Normal force k d − c ṙ·n, never pulling; friction against the slip, at most μ times that, and at most what
+// takes a share of the slip away in one step. False: no force.
+template <class Real>
+bool penalty_force(Real depth, const Real normal[3], const Real relative_velocity[3], Real mass, Real step,
+                   Real friction, Real force[3]) {
+  constexpr Real damping = Real(2 * contact_damping_ratio * __builtin_sqrt(contact_beta));
+  const Real speed = dot(relative_velocity, normal);
+  const Real push = mass / step * (Real(contact_beta) * depth / step - damping * speed);
+  if (!(push > 0)) return false;
+  Real slip[3];
+  for (int c = 0; c < 3; ++c) slip[c] = relative_velocity[c] - speed * normal[c];
+  const Real slip_speed = std::sqrt(dot(slip, slip));
+  const Real most = friction * push, stop = Real(contact_slip_stop) * mass / step * slip_speed;
+  const Real drag = stop > most ? most / slip_speed : Real(contact_slip_stop) * mass / step;
+  for (int c = 0; c < 3; ++c) force[c] = push * normal[c] - drag * slip[c];
+  return true;
+}
+
+}  // namespace
+
+// A tet where it is now. Inward normals, each twice its face's area: 6V of (face, p) gains normal·δ when p
+// moves by δ.
+template <class Real>
+struct Contacts<Real>::Cell {
+  Real place[4][3], normal[4][3];
+
+  Cell(const LaneView<Real>& view, const Topology::Tet& tet) {
+    for (int i = 0; i < 4; ++i) fetch(view, tet.node[i], place[i]);
+    Real edge[3][3];
+    for (int i = 0; i < 3; ++i)
+      for (int c = 0; c < 3; ++c) edge[i][c] = place[i + 1][c] - place[0][c];
+    for (int i = 0; i < 3; ++i) {
+      const Real *s = edge[(i + 1) % 3], *t = edge[(i + 2) % 3];
+      normal[i + 1][0] = s[1] * t[2] - s[2] * t[1];
+      normal[i + 1][1] = s[2] * t[0] - s[0] * t[2];
+      normal[i + 1][2] = s[0] * t[1] - s[1] * t[0];
+    }
+    for (int c = 0; c < 3; ++c) normal[0][c] = -(normal[1][c] + normal[2][c] + normal[3][c]);
+  }
+};
+
+template <>
+const Tables<float>& tables_of(const World& world) {
+  return world.tables;
+}
+template <>
+const Tables<double>& tables_of(const World& world) {
+  return world.tables64;
+}
+
+template <class Real>
+Contacts<Real>::Contacts(const World& world, int lanes)
+    : world_(world),
+      topology_(world.topology),
+      tables_(tables_of<Real>(world)),
+      bodies_(int(world.bodies.size())),
+      step_(Real(world.contact_dt_s)) {
+  for (int a = 0; a < bodies_; ++a)
+    for (int b = a + 1; b < bodies_; ++b)
+      if (world.bodies[a].moving || world.bodies[b].moving) pairs_.emplace_back(a, b);
+  lists_.resize(std::size_t(lanes) * pairs_.size());
+  packed_.resize(std::size_t(world.nodes));
+  touch_of_node_.assign(std::size_t(world.nodes), -1);
+}
+
+template <class Real>
+void Contacts<Real>::forget(int lane) {
+  for (std::size_t p = 0; p < pairs_.size(); ++p) lists_[lane * pairs_.size() + p].built = false;
+}
+
+template <class Real>
+void Contacts<Real>::add_forces(int lane, const LaneView<Real>& view) {
+  for (const auto& [a, b] : pairs_)
+    for (const Touch<Real>& touch : find(lane, view, a, b))
+      respond(view, tables_.pair_friction[a * bodies_ + b], touch);
+  if (!world_.walls) return;
+  for (int body = 0; body < bodies_; ++body)
+    if (topology_.bodies[body].moving) add_wall_forces(view, body);
+}
+
+template <class Real>
+const std::vector<Touch<Real>>& Contacts<Real>::find(int lane, const LaneView<Real>& view, int a, int b) {
+  touches_.clear();
+  for (int c = 0; c < 3; ++c) {
+    const int ka = (3 * a + c) * view.stride, kb = (3 * b + c) * view.stride;
+    if (view.lower[ka] > view.upper[kb] || view.lower[kb] > view.upper[ka]) return touches_;
+  }
+  const auto pair = std::find(pairs_.begin(), pairs_.end(), std::pair(a, b));
+  List& list = lists_[lane * pairs_.size() + std::size_t(pair - pairs_.begin())];
+  refresh(view, a, b, list);
+  for (int node : list.nodes) fetch(view, node, packed_[node].at);
+  find_touches(view, b, list, 0);
+  const std::size_t second = touches_.size();
+  find_touches(view, a, list, 1);
+  measure_depths(view, a, b, 0, second);
+  measure_depths(view, b, a, second, touches_.size());
+  return touches_;
+}
+
+// A list holds while the two bodies' nodes together have moved less than the reach it was built with; the
+// tenth kept back is for rounding.
+template <class Real>
+void Contacts<Real>::refresh(const LaneView<Real>& view, int a, int b, List& list) {
+  const Real reach = (tables_.skin[a] + tables_.skin[b]) / 2;
+  const Real travel = view.travel[a * view.stride] + view.travel[b * view.stride];
+  if (list.built && travel - list.travel_at_build <= Real(0.9) * reach) return;
+  list.built = true;
+  list.travel_at_build = travel;
+  list.nodes.clear();
+  build_direction(view, a, b, reach, list, 0);
+  build_direction(view, b, a, reach, list, 1);
+  std::sort(list.nodes.begin(), list.nodes.end());
+  list.nodes.erase(std::unique(list.nodes.begin(), list.nodes.end()), list.nodes.end());
+}
+
+template <class Real>
+void Contacts<Real>::build_direction(const LaneView<Real>& view, int from, int into, Real reach, List& list,
+                                     int direction) {
+  auto& records = list.records[direction];
+  auto& candidates = list.candidates[direction];
+  records.clear(), candidates.clear();
+
+  // The vertices near the other body's box, and their own box.
+  Real lower[3], upper[3], box_lower[3], box_upper[3];
+  for (int c = 0; c < 3; ++c) {
+    lower[c] = std::numeric_limits<Real>::max(), upper[c] = -lower[c];
+    box_lower[c] = view.lower[(3 * into + c) * view.stride] - reach;
+    box_upper[c] = view.upper[(3 * into + c) * view.stride] + reach;
+  }
+  for (int node : topology_.bodies[from].surface_nodes) {
+    Real p[3];
+    fetch(view, node, p);
+    bool near = true;
+    for (int c = 0; c < 3; ++c) near = near && p[c] >= box_lower[c] && p[c] <= box_upper[c];
+    if (!near) continue;
+    for (int c = 0; c < 3; ++c) lower[c] = std::min(lower[c], p[c]), upper[c] = std::max(upper[c], p[c]);
+    records.push_back({node, 0, 0});
+    std::copy_n(p, 3, packed_[node].at);
+  }
+  if (records.empty()) return;
+
+  // The tets near that box. A point now in a tet was within `reach` of it at build, so it was on the inner
+  // side of each of its planes moved out by `reach`.
+  for (int n = topology_.bodies[into].first_node; n < topology_.bodies[into].last_node; ++n)
+    fetch(view, n, packed_[n].at);
+  near_.clear();
+  for (int t = topology_.bodies[into].first_tet; t < topology_.bodies[into].last_tet; ++t) {
+    const Topology::Tet& tet = topology_.tets[t];
+    NearTet q;
+    bool meets = true;
+    for (int c = 0; c < 3; ++c) {
+      const Real i = packed_[tet.node[0]].at[c], j = packed_[tet.node[1]].at[c],
+                 k = packed_[tet.node[2]].at[c], l = packed_[tet.node[3]].at[c];
+      q.lower[c] = std::min(std::min(i, j), std::min(k, l)) - reach;
+      q.upper[c] = std::max(std::max(i, j), std::max(k, l)) + reach;
+      meets = meets && q.lower[c] <= upper[c] && q.upper[c] >= lower[c];
+    }
+    if (!meets) continue;
+    q.tet = t;
+    const Cell cell(view, tet);
+    Real volume6 = 0;
+    for (int c = 0; c < 3; ++c) volume6 += cell.normal[1][c] * (cell.place[1][c] - cell.place[0][c]);
+    for (int i = 0; i < 4; ++i) {
+      const Real length = std::sqrt(dot(cell.normal[i], cell.normal[i]));
+      // A flat tet has no planes to speak of: its box alone decides.
+      const bool flat = std::abs(volume6) <= Real(1e-2) * length * reach;
+      const Real scale = flat ? Real(0) : (volume6 < 0 ? -1 : 1) / length;
+      for (int c = 0; c < 3; ++c) q.plane[i][c] = scale * cell.normal[i][c];
+      q.plane[i][3] = reach - dot(q.plane[i], cell.place[(i + 1) % 4]);
+    }
+    near_.push_back(q);
+  }
+
+  for (Record& record : records) {
+    record.begin = int(candidates.size());
+    const Real* p = packed_[record.vertex].at;
+    for (const NearTet& q : near_) {
+      if (p[0] < q.lower[0] || p[0] > q.upper[0] || p[1] < q.lower[1] || p[1] > q.upper[1] ||
+          p[2] < q.lower[2] || p[2] > q.upper[2])
+        continue;
+      int worst = 0;
+      Real least = std::numeric_limits<Real>::max();
+      for (int i = 0; i < 4; ++i) {
+        const Real distance = dot(q.plane[i], p) + q.plane[i][3];
+        if (distance < least) least = distance, worst = i;
+      }
+      if (least >= 0) candidates.push_back({q.tet, worst});
+    }
+    record.end = int(candidates.size());
+  }
+  std::erase_if(records, [](const Record& r) { return r.begin == r.end; });
+  for (const Record& r : records) list.nodes.push_back(r.vertex);
+  for (const Candidate& k : candidates) {
+    const int* node = topology_.tets[k.tet].node;
+    list.nodes.insert(list.nodes.end(), node, node + 4);
+  }
+}
+
+// The first tet that contains the vertex, in ascending order, has it: a point on a shared face has one owner.
+template <class Real>
+void Contacts<Real>::find_touches(const LaneView<Real>& view, int into, List& list, int direction) {
+  Real lower[3], upper[3];
+  for (int c = 0; c < 3; ++c) {
+    lower[c] = view.lower[(3 * into + c) * view.stride];
+    upper[c] = view.upper[(3 * into + c) * view.stride];
+  }
+  Candidate* const candidates = list.candidates[direction].data();
+  for (const Record& record : list.records[direction]) {
+    const Real* p = packed_[record.vertex].at;
+    if (p[0] < lower[0] || p[0] > upper[0] || p[1] < lower[1] || p[1] > upper[1] || p[2] < lower[2] ||
+        p[2] > upper[2])
+      continue;
+    for (Candidate* k = candidates + record.begin; k != candidates + record.end; ++k) {
+      const Topology::Tet& tet = topology_.tets[k->tet];
+      const auto side = [&](int i) {
+        const int* face = tet.face[i];
+        return Real(tet.sign[i]) * det_from(p, packed_[face[0]].at, packed_[face[1]].at, packed_[face[2]].at);
+      };
+      if (side(k->face) < 0) continue;
+      Touch<Real> touch{record.vertex, k->tet, {}, 0, {0, 0, 0}, false};
+      Real sum = 0;
+      bool inside = true;
+      for (int i = 0; i < 4 && inside; ++i) {
+        touch.weight[i] = side(i);
+        sum += touch.weight[i];
+        inside = touch.weight[i] >= 0;
+        if (!inside) k->face = i;
+      }
+      if (!inside || !(sum > 0)) continue;
+      for (Real& w : touch.weight) w /= sum;
+      touches_.push_back(touch);
+      break;
+    }
+  }
+}
+
+// Consistent penetration depth (Heidelberger, Teschner, Keiser, Müller, Gross 2004): vertices next to the
+// outside measure depth and direction where their edges leave the other body; the others take them from those
+// neighbours, layer by layer.
+template <class Real>
+void Contacts<Real>::measure_depths(const LaneView<Real>& view, int from, int into, std::size_t first,
+                                    std::size_t last) {
+  if (first == last) return;
+  constexpr Real tiny = Real(1e-12);  // m², keeps 1/distance² finite
+  std::size_t unknown = 0;
+  for (std::size_t i = first; i < last; ++i) {
+    Touch<Real>& touch = touches_[i];
+    touch_of_node_[touch.vertex] = int(i);
+    const Cell start(view, topology_.tets[touch.tet]);
+    Real p[3], sum = 0;
+    fetch(view, touch.vertex, p);
+    for (int k = topology_.neighbor_begin[touch.vertex]; k < topology_.neighbor_begin[touch.vertex + 1];
+         ++k) {
+      Real q[3], way[3], normal[3];
+      fetch(view, topology_.neighbors[k], q);
+      if (!walk_out(view, start, touch.tet, p, q, way, normal)) continue;
+      const Real weight = 1 / (dot(way, way) + tiny);
+      sum += weight;
+      touch.depth += weight * dot(way, normal);
+      for (int c = 0; c < 3; ++c) touch.direction[c] += weight * normal[c];
+    }
+    touch.known = finish(touch, sum);
+    unknown += !touch.known;
+  }
+  std::vector<std::size_t> layer;
+  while (unknown > 0) {
+    layer.clear();
+    for (std::size_t i = first; i < last; ++i) {
+      Touch<Real>& touch = touches_[i];
+      if (touch.known) continue;
+      Real p[3], sum = 0;
+      fetch(view, touch.vertex, p);
+      for (int k = topology_.neighbor_begin[touch.vertex]; k < topology_.neighbor_begin[touch.vertex + 1];
+           ++k) {
+        const int other = touch_of_node_[topology_.neighbors[k]];
+        if (other < 0 || !touches_[other].known) continue;
+        Real way[3];
+        fetch(view, topology_.neighbors[k], way);
+        for (int c = 0; c < 3; ++c) way[c] -= p[c];
+        const Real weight = 1 / (dot(way, way) + tiny);
+        sum += weight;
+        touch.depth += weight * (dot(way, touches_[other].direction) + touches_[other].depth);
+        for (int c = 0; c < 3; ++c) touch.direction[c] += weight * touches_[other].direction[c];
+      }
+      if (finish(touch, sum)) layer.push_back(i);
+    }
+    for (std::size_t i : layer) touches_[i].known = true;
+    unknown -= layer.size();
+    if (layer.empty()) break;
+  }
+  if (unknown > 0) leave_along_centers(view, from, into, first, last);
+  for (std::size_t i = first; i < last; ++i) touch_of_node_[touches_[i].vertex] = -1;
+}
+
+// Divides the weighted sums; false when there was nothing to sum, or the directions cancelled.
+template <class Real>
+bool Contacts<Real>::finish(Touch<Real>& touch, Real sum) {
+  const Real length = std::sqrt(dot(touch.direction, touch.direction));
+  if (sum > 0 && length > Real(1e-3) * sum) {
+    touch.depth /= sum;
+    for (Real& d : touch.direction) d /= length;
+    return true;
+  }
+  touch.depth = 0;
+  for (Real& d : touch.direction) d = 0;
+  return false;
+}
+
+// A patch of vertices none of which is next to the outside: the whole body is inside. It leaves along the
+// line of the two boxes' centres.
+template <class Real>
+void Contacts<Real>::leave_along_centers(const LaneView<Real>& view, int from, int into, std::size_t first,
+                                         std::size_t last) {
+  Real line[3], size2 = 0;
+  for (int c = 0; c < 3; ++c) {
+    const int kf = (3 * from + c) * view.stride, ki = (3 * into + c) * view.stride;
+    line[c] = (view.lower[kf] + view.upper[kf]) - (view.lower[ki] + view.upper[ki]);
+    size2 += (view.upper[ki] - view.lower[ki]) * (view.upper[ki] - view.lower[ki]);
+  }
+  if (!(dot(line, line) > Real(1e-8) * size2)) line[0] = 0, line[1] = 0, line[2] = 1;
+  const Real scale = 2 * std::sqrt(size2 / dot(line, line));
+  for (std::size_t i = first; i < last; ++i) {
+    Touch<Real>& touch = touches_[i];
+    if (touch.known) continue;
+    const Cell start(view, topology_.tets[touch.tet]);
+    Real p[3], far[3], way[3], normal[3];
+    fetch(view, touch.vertex, p);
+    for (int c = 0; c < 3; ++c) far[c] = p[c] + scale * line[c];
+    touch.known = walk_out(view, start, touch.tet, p, far, way, normal);
+    if (!touch.known) continue;
+    touch.depth = dot(way, normal);
+    std::copy_n(normal, 3, touch.direction);
+  }
+}
+
+// From p in a tet towards q through face neighbours. True when the body's surface is met first: `way` is the
+// part of q − p up to there, `normal` the outward unit normal.
+template <class Real>
+bool Contacts<Real>::walk_out(const LaneView<Real>& view, const Cell& start, int tet, const Real p[3],
+                              const Real q[3], Real way[3], Real normal[3]) const {
+  constexpr int most_tets = 256;  // inverted tets can lead in circles
+  const Real move[3] = {q[0] - p[0], q[1] - p[1], q[2] - p[2]};
+  Cell cell = start;
+  int entry = -1;
+  for (int walked = 0; walked < most_tets; ++walked) {
+    Real soonest = 1;
+    int exit = -1;
+    for (int i = 0; i < 4; ++i) {
+      const Real change = dot(cell.normal[i], move);
+      if (i == entry || !(change < 0)) continue;
+      const Real* on_face = cell.place[(i + 1) % 4];
+      const Real from_face[3] = {p[0] - on_face[0], p[1] - on_face[1], p[2] - on_face[2]};
+      const Real when = dot(cell.normal[i], from_face) / -change;
+      if (when < soonest) soonest = when, exit = i;
+    }
+    if (exit < 0) return false;
+    const int next = topology_.tets[tet].across[exit];
+    if (next < 0) {
+      const Real length = std::sqrt(dot(cell.normal[exit], cell.normal[exit]));
+      const Real share = std::max(soonest, Real(0));
+      for (int c = 0; c < 3; ++c) way[c] = share * move[c], normal[c] = -cell.normal[exit][c] / length;
+      return true;
+    }
+    for (int i = 0; i < 4; ++i)
+      if (topology_.tets[next].across[i] == tet) entry = i;
+    tet = next;
+    cell = Cell(view, topology_.tets[tet]);
+  }
+  return false;
+}
+
+template <class Real>
+void Contacts<Real>::respond(const LaneView<Real>& view, Real friction, const Touch<Real>& touch) const {
+  if (!(touch.depth > 0)) return;
+  const int* node = topology_.tets[touch.tet].node;
+  Real inverse_mass = tables_.inverse_mass[touch.vertex];
+  for (int i = 0; i < 4; ++i)
+    inverse_mass += touch.weight[i] * touch.weight[i] * tables_.inverse_mass[node[i]];
+  if (!(inverse_mass > 0)) return;
+  Real relative[3];
+  for (int c = 0; c < 3; ++c) {
+    relative[c] = view.v[(3 * touch.vertex + c) * view.stride];
+    for (int i = 0; i < 4; ++i) relative[c] -= touch.weight[i] * view.v[(3 * node[i] + c) * view.stride];
+  }
+  Real force[3];
+  if (!penalty_force(touch.depth, touch.direction, relative, 1 / inverse_mass, step_, friction, force))
+    return;
+  const auto add = [&](int n, Real share) {
+    if (tables_.inverse_mass[n] > 0)
+      for (int c = 0; c < 3; ++c) view.f[(3 * n + c) * view.stride] += share * force[c];
+  };
+  add(touch.vertex, 1);
+  for (int i = 0; i < 4; ++i) add(node[i], -touch.weight[i]);
+}
+
+template <class Real>
+void Contacts<Real>::add_wall_forces(const LaneView<Real>& view, int body) const {
+  for (int axis = 0; axis < 3; ++axis)
+    for (int side = 0; side < 2; ++side) {
+      const Real out = side == 0 ? Real(1) : Real(-1);  // the wall's normal along the axis
+      const Real wall = Real(side == 0 ? world_.bounds_m.lower[axis] : world_.bounds_m.upper[axis]);
+      const Real* reach = side == 0 ? view.lower : view.upper;
+      if (!(out * (wall - reach[(3 * body + axis) * view.stride]) > 0)) continue;
+      Real normal[3] = {0, 0, 0};
+      normal[axis] = out;
+      for (int n : topology_.bodies[body].surface_nodes) {
+        const Real depth = out * (wall - view.x[(3 * n + axis) * view.stride]);
+        if (!(depth > 0) || !(tables_.inverse_mass[n] > 0)) continue;
+        const Real velocity[3] = {view.v[3 * n * view.stride], view.v[(3 * n + 1) * view.stride],
+                                  view.v[(3 * n + 2) * view.stride]};
+        Real force[3];
+        if (!penalty_force(depth, normal, velocity, tables_.node_mass[n], step_,
+                           tables_.pair_friction[body * bodies_ + body], force))
+          continue;
+        for (int c = 0; c < 3; ++c) view.f[(3 * n + c) * view.stride] += force[c];
+      }
+    }
+}
+
+template class Contacts<float>;
+template class Contacts<double>;
+
+}  // namespace limber::fem::detail

@@ -1,0 +1,110 @@
+// Contact of one lane: who is inside whom, how deep, which force. Method and figures: docs/contact.md.
+#pragma once
+
+#include <utility>
+#include <vector>
+
+#include "core/types.h"
+#include "fem/detail/tables.h"
+
+namespace limber::fem {
+struct World;
+}
+
+namespace limber::fem::detail {
+
+// Penalty stiffness β m_eff/h², damping 2 ζ √(k m_eff), and the share of a slip that friction may stop in one
+// step.
+inline constexpr double contact_beta = 0.4;
+inline constexpr double contact_damping_ratio = 0.3;
+inline constexpr double contact_slip_stop = 0.5;
+
+// One lane's arrays: component c of node n is at [(3n + c) stride].
+template <class Real>
+struct LaneView {
+  const Real *x, *v;
+  Real* f;
+  int stride;
+  // Boxes of the bodies, [(3 body + c) stride], and how far each body's fastest node can have come since
+  // load, [body stride].
+  const Real *lower, *upper, *travel;
+};
+
+// A vertex inside a tet of another body. Everything follows from the present positions.
+template <class Real>
+struct Touch {
+  int vertex, tet;    // world node, world tet
+  Real weight[4];     // barycentric coordinates of the vertex in the tet
+  Real depth;         // metres along `direction` to the surface; ≤ 0: no force
+  Real direction[3];  // unit, out of the tet's body
+  bool known;         // depth and direction are set
+};
+
+template <class Real>
+class Contacts {
+ public:
+  Contacts(const World&, int lanes);
+  void forget(int lane);  // the lane holds another state now
+  // Adds the forces of all contacts and walls to view.f.
+  void add_forces(int lane, const LaneView<Real>& view);
+  // The touches of bodies a and b, a < b: vertices of a in b, then those of b in a, each ascending. For tests
+  // and observables; valid until the next call.
+  const std::vector<Touch<Real>>& find(int lane, const LaneView<Real>& view, int a, int b);
+
+ private:
+  struct Record {
+    int vertex, begin, end;  // candidates [begin, end)
+  };
+  struct Candidate {
+    int tet;
+    int face;  // the face that refused last time, tried first: changes cost, never results
+  };
+  // Candidates of one pair in one lane, [0] a in b, [1] b in a: derived data, a superset of what can touch.
+  struct List {
+    bool built = false;
+    Real travel_at_build = 0;
+    std::vector<Record> records[2];
+    std::vector<Candidate> candidates[2];
+    std::vector<int> nodes;  // every node they name, ascending
+  };
+  struct Place {
+    Real at[4];
+  };
+  struct NearTet {
+    int tet;
+    Real lower[3], upper[3];
+    Real plane[4][4];  // n·p + w ≥ 0 within reach of the inside
+  };
+  struct Cell;
+
+  void refresh(const LaneView<Real>&, int a, int b, List&);
+  void build_direction(const LaneView<Real>&, int from, int into, Real reach, List&, int direction);
+  void find_touches(const LaneView<Real>&, int into, List&, int direction);
+  void measure_depths(const LaneView<Real>&, int from, int into, std::size_t first, std::size_t last);
+  void leave_along_centers(const LaneView<Real>&, int from, int into, std::size_t first, std::size_t last);
+  static bool finish(Touch<Real>&, Real sum);
+  bool walk_out(const LaneView<Real>&, const Cell& start, int tet, const Real p[3], const Real q[3],
+                Real way[3], Real normal[3]) const;
+  void respond(const LaneView<Real>&, Real friction, const Touch<Real>&) const;
+  void add_wall_forces(const LaneView<Real>&, int body) const;
+
+  const World& world_;
+  const Topology& topology_;
+  const Tables<Real>& tables_;
+  int bodies_;
+  Real step_;  // the step from which stiffness follows
+  std::vector<std::pair<int, int>> pairs_;
+  std::vector<List> lists_;  // [lane × pairs + pair]
+  std::vector<Touch<Real>> touches_;
+  std::vector<Place> packed_;       // by world node; valid for the nodes of the list at hand
+  std::vector<int> touch_of_node_;  // index into touches_ while depths are measured, else −1
+  std::vector<NearTet> near_;
+};
+
+template <class Real>
+const Tables<Real>& tables_of(const World&);
+
+extern template class Contacts<float>;
+extern template class Contacts<double>;
+
+}  // namespace limber::fem::detail

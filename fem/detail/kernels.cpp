@@ -1,0 +1,41 @@
+// Which kernels this machine can run.
+#include "fem/detail/kernels.h"
+
+#include "core/error.h"
+
+namespace limber::fem::detail {
+
+const Kernels<float>* sse2_float();
+const Kernels<float>* avx2_float();
+const Kernels<float>* avx512_float();
+const Kernels<double>* sse2_double();
+const Kernels<double>* avx2_double();
+const Kernels<double>* avx512_double();
+
+bool machine_has(Isa isa) {
+  if (isa == Isa::avx512)
+    return __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") &&
+           __builtin_cpu_supports("avx512vl") && __builtin_cpu_supports("avx512bw");
+  return isa == Isa::sse2 || __builtin_cpu_supports("avx2");
+}
+
+Isa best_isa() {
+  return machine_has(Isa::avx512) ? Isa::avx512 : machine_has(Isa::avx2) ? Isa::avx2 : Isa::sse2;
+}
+
+template <>
+const Kernels<float>& kernels(Isa isa, int lanes) {
+  const Kernels<float>* all = isa == Isa::avx512 ? avx512_float()
+                              : isa == Isa::avx2 ? avx2_float()
+                                                 : sse2_float();
+  LIMBER_CHECK(lanes == 1 || lanes == 8 || lanes == 16, lanes);
+  return all[lanes == 1 ? 0 : lanes == 8 ? 1 : 2];
+}
+
+template <>
+const Kernels<double>& kernels(Isa isa, int lanes) {
+  LIMBER_CHECK(lanes == 1, lanes);
+  return isa == Isa::avx512 ? avx512_double()[0] : isa == Isa::avx2 ? avx2_double()[0] : sse2_double()[0];
+}
+
+}  // namespace limber::fem::detail

@@ -1,0 +1,127 @@
+#include "fem/detail/overlap.h"
+
+#include <algorithm>
+#include <set>
+#include <vector>
+
+namespace limber::fem::detail {
+namespace {
+
+bool meet(const Box& a, const Box& b) {
+  return (a.lower.array() <= b.upper.array()).all() && (b.lower.array() <= a.upper.array()).all();
+}
+
+template <class Row>
+Box box_of(const Points& p, const Row& corners) {
+  Box box;
+  for (int i = 0; i < corners.size(); ++i) box.include(Vec3(p.row(corners[i])));
+  return box;
+}
+
+Vec3 nearest_on_segment(const Vec3& p, const Vec3& a, const Vec3& b) {
+  const double length2 = (b - a).squaredNorm();
+  const double t = length2 > 0 ? std::clamp((p - a).dot(b - a) / length2, 0.0, 1.0) : 0;
+  return a + t * (b - a);
+}
+
+double distance_to_triangle(const Vec3& p, const Vec3& a, const Vec3& b, const Vec3& c) {
+  const Vec3 n = (b - a).cross(c - a);
+  const bool above = n.squaredNorm() > 0 && n.dot((b - a).cross(p - a)) >= 0 &&
+                     n.dot((c - b).cross(p - b)) >= 0 && n.dot((a - c).cross(p - c)) >= 0;
+  if (above) return std::abs(n.dot(p - a)) / n.norm();
+  return std::min({(p - nearest_on_segment(p, a, b)).norm(), (p - nearest_on_segment(p, b, c)).norm(),
+                   (p - nearest_on_segment(p, c, a)).norm()});
+}
+
+// The part of a body near a box.
+struct Near {
+  const Shape& shape;
+  std::vector<int> tets, triangles;
+  std::vector<Box> tet_boxes, triangle_boxes;
+
+  Near(const Shape& s, const Box& region) : shape(s) {
+    for (int t = 0; t < s.tets.rows(); ++t)
+      if (const Box box = box_of(s.positions, s.tets.row(t)); meet(box, region))
+        tets.push_back(t), tet_boxes.push_back(box);
+    for (int f = 0; f < s.surface.rows(); ++f)
+      if (const Box box = box_of(s.positions, s.surface.row(f)); meet(box, region))
+        triangles.push_back(f), triangle_boxes.push_back(box);
+  }
+  Vec3 corner(int node) const { return shape.positions.row(node); }
+
+  bool contains(const Vec3& p) const {
+    for (std::size_t k = 0; k < tets.size(); ++k) {
+      if (!meet(tet_boxes[k], {p, p})) continue;
+      const auto t = shape.tets.row(tets[k]);
+      const Vec3 a = corner(t[0]), b = corner(t[1]), c = corner(t[2]), d = corner(t[3]);
+      if (signed_volume(p, b, c, d) >= 0 && signed_volume(a, p, c, d) >= 0 &&
+          signed_volume(a, b, p, d) >= 0 && signed_volume(a, b, c, p) >= 0)
+        return true;
+    }
+    return false;
+  }
+
+  double depth(const Vec3& p) const {
+    double nearest = 1e300;
+    for (int f = 0; f < shape.surface.rows(); ++f) {
+      const auto t = shape.surface.row(f);
+      nearest = std::min(nearest, distance_to_triangle(p, corner(t[0]), corner(t[1]), corner(t[2])));
+    }
+    return nearest;
+  }
+
+  // Where from a (0) to b (1) the segment crosses the surface, ascending.
+  std::vector<double> crossings(const Vec3& a, const Vec3& b) const {
+    std::vector<double> at;
+    Box box;
+    box.include(a), box.include(b);
+    for (std::size_t k = 0; k < triangles.size(); ++k) {
+      if (!meet(triangle_boxes[k], box)) continue;
+      const auto f = shape.surface.row(triangles[k]);
+      const Vec3 u = corner(f[0]), v = corner(f[1]), w = corner(f[2]);
+      const double da = signed_volume(a, u, v, w), db = signed_volume(b, u, v, w);
+      if ((da > 0) == (db > 0)) continue;
+      const double su = signed_volume(a, b, v, w), sv = signed_volume(a, b, w, u),
+                   sw = signed_volume(a, b, u, v);
+      if ((su >= 0 && sv >= 0 && sw >= 0) || (su <= 0 && sv <= 0 && sw <= 0)) at.push_back(da / (da - db));
+    }
+    std::sort(at.begin(), at.end());
+    return at;
+  }
+};
+
+void include_points_of(const Shape& a, const Shape& b, const Box& region, Overlap& deepest) {
+  const Near near(b, region);
+  const auto consider = [&](const Vec3& p) {
+    if (!meet(region, {p, p}) || !near.contains(p)) return;
+    if (const double depth = near.depth(p); depth > deepest.depth_m) deepest = {depth, p};
+  };
+  for (int v : vertices_of(a.surface)) consider(a.positions.row(v));
+  std::set<std::pair<int, int>> edges;
+  for (int f = 0; f < a.surface.rows(); ++f)
+    for (int i = 0; i < 3; ++i) edges.insert(std::minmax(a.surface(f, i), a.surface(f, (i + 1) % 3)));
+  for (const auto& [i, j] : edges) {
+    const Vec3 p = a.positions.row(i), q = a.positions.row(j);
+    Box box;
+    box.include(p), box.include(q);
+    if (!meet(box, region)) continue;
+    std::vector<double> at = near.crossings(p, q);
+    if (at.empty()) continue;
+    at.insert(at.begin(), 0.0), at.push_back(1.0);
+    for (std::size_t k = 0; k + 1 < at.size(); ++k) consider(p + 0.5 * (at[k] + at[k + 1]) * (q - p));
+  }
+}
+
+}  // namespace
+
+Overlap deepest_overlap(const Shape& a, const Shape& b) {
+  const Box box_a = bounding_box(a.positions), box_b = bounding_box(b.positions);
+  Overlap deepest;
+  if (!meet(box_a, box_b)) return deepest;
+  const Box region{box_a.lower.cwiseMax(box_b.lower), box_a.upper.cwiseMin(box_b.upper)};
+  include_points_of(a, b, region, deepest);
+  include_points_of(b, a, region, deepest);
+  return deepest;
+}
+
+}  // namespace limber::fem::detail

@@ -1,0 +1,25 @@
+// How deep two tet bodies are in one another, measured slowly and plainly, apart from the contact code of the
+// steppers.
+#pragma once
+
+#include "core/mesh.h"
+
+namespace limber::fem::detail {
+
+struct Shape {
+  Points positions;
+  const Tets& tets;
+  const Triangles& surface;
+};
+
+struct Overlap {
+  double depth_m = 0;  // 0: apart
+  Vec3 place = Vec3::Zero();
+};
+
+// The largest distance to the other body's surface, over points of each body's surface edges that are inside
+// the other: the vertices, and the middle of each stretch of an edge that lies inside (so an edge that cuts a
+// corner is seen too).
+Overlap deepest_overlap(const Shape& a, const Shape& b);
+
+}  // namespace limber::fem::detail

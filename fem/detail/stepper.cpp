@@ -1,0 +1,143 @@
+#include "fem/detail/stepper.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "core/error.h"
+#include "fem/world.h"
+
+namespace limber::fem::detail {
+namespace {
+
+// Interpolation draws each node as a critically damped oscillator of this frequency would: rest within about
+// 2 s.
+constexpr double goal_frequency = 4;  // rad/s
+
+bool is_pushed(const World& world, const Control& control, int robot_node) {
+  if (control.manipulation == Manipulation::body) return true;
+  if (control.manipulation != Manipulation::control_point) return false;
+  const Body& robot = world.bodies[world.robot];
+  LIMBER_CHECK(control.node >= 0 && control.node < robot.node_count(), control.node);
+  return (robot.cage.positions.row(robot_node) - robot.cage.positions.row(control.node)).norm() <=
+         control.radius_m;
+}
+
+}  // namespace
+
+template <class Real>
+Stepper<Real>::Stepper(const World& world, int lanes, Isa isa)
+    : world_(world),
+      tables_(tables_of<Real>(world)),
+      kernels_(kernels<Real>(isa, lanes)),
+      lanes_(lanes),
+      contacts_(world, lanes),
+      controls_(std::size_t(lanes)),
+      contact_(std::size_t(lanes), false) {
+  const std::size_t values = std::size_t(3 * world.nodes * lanes),
+                    bodies = world.bodies.size() * std::size_t(lanes);
+  x_.resize(values), v_.assign(values, 0), f_.assign(values, 0);
+  push_.assign(std::size_t(3 * world.bodies[world.robot].node_count() * lanes), 0);
+  lower_.resize(3 * bodies), upper_.resize(3 * bodies);
+  speed2_.assign(bodies, 0), travel_.assign(bodies, 0);
+  for (int k = 0; k < 3 * world.nodes; ++k) std::fill_n(&x_[k * lanes], lanes, tables_.rest_positions[k]);
+  const std::vector<Real> still(std::size_t(3 * world.moving_nodes), 0);
+  for (int lane = 0; lane < lanes; ++lane) load(lane, tables_.rest_positions.data(), still.data(), {}, false);
+}
+
+template <class Real>
+void Stepper<Real>::load(int lane, const Real* positions, const Real* velocities, const Control& control,
+                         bool contact) {
+  for (int k = 0; k < 3 * world_.moving_nodes; ++k) {
+    x_[k * lanes_ + lane] = positions[k];
+    v_[k * lanes_ + lane] = velocities[k];
+  }
+  for (std::size_t b = 0; b < world_.bodies.size(); ++b) {
+    const Topology::Body& body = world_.topology.bodies[b];
+    for (int c = 0; c < 3; ++c) {
+      Real lower = std::numeric_limits<Real>::max(), upper = -lower;
+      for (int n = body.first_node; n < body.last_node; ++n) {
+        lower = std::min(lower, x_[(3 * n + c) * lanes_ + lane]);
+        upper = std::max(upper, x_[(3 * n + c) * lanes_ + lane]);
+      }
+      lower_[(3 * b + c) * lanes_ + lane] = lower;
+      upper_[(3 * b + c) * lanes_ + lane] = upper;
+    }
+    travel_[b * lanes_ + lane] = 0;
+  }
+  contacts_.forget(lane);
+  contact_[lane] = contact;
+  controls_[lane] = control;
+
+  const Body& robot = world_.bodies[world_.robot];
+  for (int n = 0; n < robot.node_count(); ++n) {
+    const bool pushed = !robot.fixed[n] && is_pushed(world_, control, n);
+    for (int c = 0; c < 3; ++c)
+      push_[(3 * n + c) * lanes_ + lane] = pushed ? Real(control.force_n[c]) / Real(robot.mass_kg) : Real(0);
+  }
+}
+
+template <class Real>
+void Stepper<Real>::store(int lane, Real* positions, Real* velocities) const {
+  for (int k = 0; k < 3 * world_.moving_nodes; ++k) {
+    positions[k] = x_[k * lanes_ + lane];
+    velocities[k] = v_[k * lanes_ + lane];
+  }
+}
+
+template <class Real>
+LaneView<Real> Stepper<Real>::view(int lane) {
+  return {&x_[lane], &v_[lane], &f_[lane], lanes_, &lower_[lane], &upper_[lane], &travel_[lane]};
+}
+
+template <class Real>
+void Stepper<Real>::pull_towards_goal(int lane) {
+  const Control& control = controls_[lane];
+  const Body& robot = world_.bodies[world_.robot];
+  const Real most = Real(control.max_force_n) / Real(robot.mass_kg);
+  for (int n = 0; n < robot.node_count(); ++n) {
+    if (robot.fixed[n]) continue;
+    Real pull[3], square = 0;
+    for (int c = 0; c < 3; ++c) {
+      const int k = (3 * (robot.first_node + n) + c) * lanes_ + lane;
+      const Real goal = tables_.rest_from_center[3 * n + c] + Real(control.target_m[c]);
+      pull[c] = Real(goal_frequency) * (Real(goal_frequency) * (goal - x_[k]) - 2 * v_[k]);
+      square += pull[c] * pull[c];
+    }
+    const Real scale = square > most * most ? most / std::sqrt(square) : Real(1);
+    for (int c = 0; c < 3; ++c) push_[(3 * n + c) * lanes_ + lane] = scale * pull[c];
+  }
+}
+
+template <class Real>
+void Stepper<Real>::step() {
+  for (int lane = 0; lane < lanes_; ++lane) {
+    if (contact_[lane]) contacts_.add_forces(lane, view(lane));
+    if (controls_[lane].manipulation == Manipulation::interpolation) pull_towards_goal(lane);
+  }
+  kernels_.elastic({tables_.springs.data(), int(tables_.springs.size()), tables_.volumes.data(),
+                    int(tables_.volumes.size())},
+                   x_.data(), v_.data(), f_.data());
+  for (std::size_t b = 0; b < world_.bodies.size(); ++b) {
+    const Topology::Body& body = world_.topology.bodies[b];
+    if (!body.moving) continue;
+    Motion<Real> motion{body.first_node,
+                        body.last_node,
+                        tables_.inverse_mass.data(),
+                        Real(world_.dt_s),
+                        {},
+                        int(b) == world_.robot ? push_.data() : nullptr,
+                        &lower_[3 * b * lanes_],
+                        &upper_[3 * b * lanes_],
+                        &speed2_[b * lanes_]};
+    for (int c = 0; c < 3; ++c) motion.gravity[c] = Real(world_.gravity_m_s2[c]);
+    kernels_.integrate(motion, x_.data(), v_.data(), f_.data());
+    for (int lane = 0; lane < lanes_; ++lane)
+      travel_[b * lanes_ + lane] += motion.dt * std::sqrt(speed2_[b * lanes_ + lane]);
+  }
+}
+
+template class Stepper<float>;
+template class Stepper<double>;
+
+}  // namespace limber::fem::detail

@@ -1,0 +1,42 @@
+// Kick-drift over lanes: one step is contact, controls, elastic forces, integration. Float for all work,
+// double for the reference; the code is the same.
+#pragma once
+
+#include <vector>
+
+#include "core/state.h"
+#include "fem/detail/contact.h"
+#include "fem/detail/kernels.h"
+
+namespace limber::fem::detail {
+
+template <class Real>
+class Stepper {
+ public:
+  Stepper(const World&, int lanes, Isa);
+  // 3 × moving_nodes numbers each. A lane without contact (idle) costs nothing but its share of the kernels.
+  void load(int lane, const Real* positions, const Real* velocities, const Control&, bool contact);
+  void store(int lane, Real* positions, Real* velocities) const;
+  void step();
+
+ private:
+  LaneView<Real> view(int lane);
+  void pull_towards_goal(int lane);
+
+  const World& world_;
+  const Tables<Real>& tables_;
+  const Kernels<Real>& kernels_;
+  int lanes_;
+  Contacts<Real> contacts_;
+  std::vector<Real> x_, v_, f_;        // [node][xyz][lane]
+  std::vector<Real> push_;             // [robot node][xyz][lane] accelerations
+  std::vector<Real> lower_, upper_;    // [body][xyz][lane]
+  std::vector<Real> speed2_, travel_;  // [body][lane]
+  std::vector<Control> controls_;      // [lane]
+  std::vector<bool> contact_;          // [lane]
+};
+
+extern template class Stepper<float>;
+extern template class Stepper<double>;
+
+}  // namespace limber::fem::detail

@@ -1,0 +1,43 @@
+// What the steppers read of a World: flat arrays in the order in which they are walked.
+#pragma once
+
+#include <vector>
+
+#include "fem/detail/kernels.h"
+
+namespace limber::fem::detail {
+
+template <class Real>
+struct Tables {
+  std::vector<Spring<Real>> springs;         // every edge of the moving bodies once, i < j, ascending
+  std::vector<VolumeElement<Real>> volumes;  // tets of the moving bodies
+  std::vector<Real> node_mass;               // a world node
+  std::vector<Real> inverse_mass;            // a world node; 0: never moves
+  std::vector<Real> rest_positions;          // (3 × nodes)
+  std::vector<Real>
+      rest_from_center;             // (3 × robot nodes) place in the rest shape seen from its centre of mass
+  std::vector<Real> pair_friction;  // [body a × bodies + body b]
+  std::vector<Real> skin;           // a body: share of its mean edge by which contact candidates may be old
+};
+
+// Connectivity for contact, world nodes and world tets. Face i of a tet is opposite its node i.
+struct Topology {
+  struct Tet {
+    int node[4];
+    int face[4][3];  // nodes of each face, ascending: two tets compute the same plane from the same face
+    float sign[4];   // +1 or −1: makes det(face − p) positive for p inside
+    int across[4];   // the tet behind each face, −1 outside
+  };
+  std::vector<Tet> tets;
+  std::vector<int> neighbor_begin;  // (nodes + 1) into neighbors
+  std::vector<int> neighbors;       // nodes that share an edge with a node, ascending
+  std::vector<int> body_of_node;
+  struct Body {
+    int first_node, last_node, first_tet, last_tet;
+    bool moving;
+    std::vector<int> surface_nodes;  // world nodes, ascending
+  };
+  std::vector<Body> bodies;
+};
+
+}  // namespace limber::fem::detail

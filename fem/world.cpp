@@ -1,0 +1,354 @@
+#include "fem/world.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <map>
+
+#include "core/error.h"
+#include "fem/detail/overlap.h"
+#include "fem/detail/timestep.h"
+
+namespace limber::fem {
+namespace {
+
+using detail::Spring;
+using detail::Topology;
+using detail::VolumeElement;
+
+// Share of the largest stable elastic step that is taken: contact needs the rest (docs/contact.md).
+constexpr double step_safety = 1.0 / 3;
+// Inverted tets are pushed back with at least this many μV, which springs cannot hold against
+// (docs/dynamics.md).
+constexpr double inversion_stiffness = 6;
+
+constexpr int tet_edges[6][2] = {{0, 1}, {0, 2}, {0, 3}, {1, 2}, {1, 3}, {2, 3}};
+
+void require_range(const BodySpec& spec, const char* name, double value, double lower, double upper,
+                   const char* text) {
+  if (!(value >= lower && value <= upper))
+    throw InputError(fmt::format("body {}: {} is {}; it must be {}", spec.name, name, value, text));
+}
+
+void check(const BodySpec& spec) {
+  validate(spec.cage, fmt::format("body {}: cage", spec.name));
+  const Material& m = spec.material;
+  require_range(spec, "youngs_modulus_pa", m.youngs_modulus_pa, 1e-3, 1e13, "from 0.001 to 1e13");
+  require_range(spec, "poisson_ratio", m.poisson_ratio, 0.25, 0.495, "from 0.25 to 0.495");
+  require_range(spec, "density_kg_m3", m.density_kg_m3, 1e-6, 1e6, "from 1e-6 to 1e6");
+  require_range(spec, "damping_ratio", m.damping_ratio, 0, 1, "from 0 to 1");
+  require_range(spec, "friction", m.friction, 0, 2, "from 0 to 2");
+  const int nodes = int(spec.cage.positions.rows());
+  for (int n : spec.fixed_nodes)
+    if (n < 0 || n >= nodes)
+      throw InputError(
+          fmt::format("body {}: fixed node {} does not exist; nodes are 0 to {}", spec.name, n, nodes - 1));
+  std::vector<bool> used(std::size_t(nodes), false);
+  for (int t = 0; t < spec.cage.tets.rows(); ++t)
+    for (int i = 0; i < 4; ++i) used[spec.cage.tets(t, i)] = true;
+  for (int n = 0; n < nodes; ++n)
+    if (!used[n])
+      throw InputError(
+          fmt::format("body {}: node {} belongs to no tet and so has no mass; remove it", spec.name, n));
+  // Float32 resolves 6e-8 of a coordinate; forces need the edges to a thousandth.
+  const double far = spec.cage.positions.cwiseAbs().maxCoeff();
+  double shortest = 1e300;
+  for (int t = 0; t < spec.cage.tets.rows(); ++t)
+    for (const auto& [i, j] : tet_edges)
+      shortest = std::min(shortest, (spec.cage.positions.row(spec.cage.tets(t, i)) -
+                                     spec.cage.positions.row(spec.cage.tets(t, j)))
+                                        .norm());
+  if (far * 6e-8 > 1e-3 * shortest)
+    throw InputError(fmt::format(
+        "body {}: its shortest edge, {:.3g} m, is too short for coordinates of {:.3g} m in float32; "
+        "move the scene to the origin or mesh coarser",
+        spec.name, shortest, far));
+}
+
+Body make_body(const BodySpec& spec) {
+  check(spec);
+  Body body;
+  body.name = spec.name;
+  body.material = spec.material;
+  body.cage = spec.cage;
+  body.cage.positions = spec.cage.positions.cast<float>().cast<double>();
+  validate(body.cage, fmt::format("body {}: cage in float32", spec.name));
+  body.surface = boundary_triangles(body.cage.tets);
+  body.surface_nodes = vertices_of(body.surface);
+  const int nodes = body.node_count();
+  body.fixed.assign(std::size_t(nodes), spec.rigid);
+  for (int n : spec.fixed_nodes) body.fixed[n] = true;
+  body.moving = std::find(body.fixed.begin(), body.fixed.end(), false) != body.fixed.end();
+  body.node_mass_kg.assign(std::size_t(nodes), 0.0);
+  body.rest_volume_m3 = volume(body.cage);
+  body.mass_kg = body.material.density_kg_m3 * body.rest_volume_m3;
+  body.elastic_dt_limit_s = std::numeric_limits<double>::infinity();
+  const auto& x = body.cage.positions;
+  for (int t = 0; t < body.cage.tets.rows(); ++t) {
+    const auto q = body.cage.tets.row(t);
+    const double v = signed_volume(x.row(q[0]), x.row(q[1]), x.row(q[2]), x.row(q[3]));
+    for (int i = 0; i < 4; ++i) body.node_mass_kg[q[i]] += body.material.density_kg_m3 * v / 4;
+  }
+  return body;
+}
+
+// k_d = τ k everywhere, so that the lowest longitudinal mode of a cube of the body's volume has the damping
+// ratio asked for.
+double damping_time(const Body& body) {
+  const double speed = std::sqrt(body.material.youngs_modulus_pa / body.material.density_kg_m3);
+  const double frequency = M_PI * speed / std::cbrt(body.rest_volume_m3);
+  return 2 * body.material.damping_ratio / frequency;
+}
+
+// The material's energies on the body's own node numbers. Sources and derivation: docs/dynamics.md.
+void make_elements(const Body& body, std::vector<Spring<double>>& springs,
+                   std::vector<VolumeElement<double>>& volumes) {
+  const double young = body.material.youngs_modulus_pa, poisson = body.material.poisson_ratio;
+  const double mu = young / (2 * (1 + poisson)),
+               lambda = young * poisson / ((1 + poisson) * (1 - 2 * poisson));
+  const double tau = damping_time(body);
+  const auto& x = body.cage.positions;
+  std::map<std::pair<int, int>, double> stiffness_of_edge;
+  for (int t = 0; t < body.cage.tets.rows(); ++t) {
+    const auto q = body.cage.tets.row(t);
+    const double v = signed_volume(x.row(q[0]), x.row(q[1]), x.row(q[2]), x.row(q[3]));
+    for (const auto& [i, j] : tet_edges) stiffness_of_edge[std::minmax(q[i], q[j])] += 2.5 * mu * v;
+    const double k = (lambda - mu) * v, scale = 1 / (36 * v * v);
+    const double inverted = std::max(0.0, inversion_stiffness * mu * v - k);
+    volumes.push_back({{q[0], q[1], q[2], q[3]}, 6 * v, k * scale, inverted * scale, tau * k * scale});
+  }
+  for (const auto& [edge, k] : stiffness_of_edge) {
+    const double rest = (x.row(edge.first) - x.row(edge.second)).norm();
+    springs.push_back({edge.first, edge.second, rest, k / (rest * rest), tau * k / (rest * rest)});
+  }
+}
+
+double largest_stable_step(const Body& body, const std::vector<Spring<double>>& springs,
+                           const std::vector<VolumeElement<double>>& volumes) {
+  std::vector<double> positions(body.cage.positions.data(),
+                                body.cage.positions.data() + body.cage.positions.size());
+  std::vector<double> inverse_mass;
+  for (int n = 0; n < body.node_count(); ++n)
+    inverse_mass.push_back(body.fixed[n] ? 0 : 1 / body.node_mass_kg[n]);
+  return detail::stable_step(detail::highest_frequency2(springs, volumes, positions, inverse_mass),
+                             damping_time(body));
+}
+
+void append(const Body& body, std::vector<Spring<double>> springs, std::vector<VolumeElement<double>> volumes,
+            detail::Tables<double>& tables) {
+  for (auto& s : springs) {
+    s.i += body.first_node, s.j += body.first_node;
+    tables.springs.push_back(s);
+  }
+  for (auto& q : volumes) {
+    for (int& n : q.node) n += body.first_node;
+    tables.volumes.push_back(q);
+  }
+}
+
+void append_nodes(const Body& body, detail::Tables<double>& tables) {
+  for (int n = 0; n < body.node_count(); ++n) {
+    tables.node_mass.push_back(body.node_mass_kg[n]);
+    tables.inverse_mass.push_back(body.fixed[n] ? 0 : 1 / body.node_mass_kg[n]);
+    for (int c = 0; c < 3; ++c) tables.rest_positions.push_back(body.cage.positions(n, c));
+  }
+}
+
+Vec3 rest_center(const Body& body) {
+  Vec3 sum = Vec3::Zero();
+  for (int n = 0; n < body.node_count(); ++n)
+    sum += body.node_mass_kg[n] * body.cage.positions.row(n).transpose();
+  return sum / body.mass_kg;
+}
+
+double mean_edge(const Body& body) {
+  double sum = 0;
+  for (int t = 0; t < body.cage.tets.rows(); ++t)
+    for (const auto& [i, j] : tet_edges)
+      sum += (body.cage.positions.row(body.cage.tets(t, i)) - body.cage.positions.row(body.cage.tets(t, j)))
+                 .norm();
+  return sum / double(6 * body.cage.tets.rows());
+}
+
+template <class To>
+detail::Tables<To> converted(const detail::Tables<double>& t) {
+  detail::Tables<To> out;
+  for (const auto& s : t.springs)
+    out.springs.push_back({s.i, s.j, To(s.rest_length), To(s.stiffness), To(s.damping)});
+  for (const auto& q : t.volumes)
+    out.volumes.push_back({{q.node[0], q.node[1], q.node[2], q.node[3]},
+                           To(q.rest_volume6),
+                           To(q.stiffness),
+                           To(q.inverted_stiffness),
+                           To(q.damping)});
+  const auto copy = [](const std::vector<double>& v) { return std::vector<To>(v.begin(), v.end()); };
+  out.node_mass = copy(t.node_mass), out.inverse_mass = copy(t.inverse_mass);
+  out.rest_positions = copy(t.rest_positions), out.rest_from_center = copy(t.rest_from_center);
+  out.pair_friction = copy(t.pair_friction), out.skin = copy(t.skin);
+  return out;
+}
+
+void append_topology(const Body& body, int index, Topology& topology) {
+  const Tets& tets = body.cage.tets;
+  std::map<std::array<int, 3>, std::pair<int, int>> faces;  // nodes → the tet and face that wait; −1: matched
+  std::vector<std::vector<int>> neighbors(std::size_t(body.node_count()));
+  for (int t = 0; t < tets.rows(); ++t) {
+    Topology::Tet tet;
+    for (int i = 0; i < 4; ++i) tet.node[i] = tets(t, i) + body.first_node;
+    for (int i = 0; i < 4; ++i) {
+      std::array<int, 3> face;
+      for (int k = 0, m = 0; k < 4; ++k)
+        if (k != i) face[m++] = tet.node[k];
+      // The face's nodes in the tet's own order make det(face − p) positive inside for i = 0 and 2; each swap
+      // turns it.
+      float sign = i % 2 ? -1.f : 1.f;
+      for (int pass = 0; pass < 2; ++pass)
+        for (int k = 0; k < 2; ++k)
+          if (face[k] > face[k + 1]) std::swap(face[k], face[k + 1]), sign = -sign;
+      std::copy(face.begin(), face.end(), tet.face[i]);
+      tet.sign[i] = sign;
+      tet.across[i] = -1;
+      const auto [waiting, is_new] = faces.try_emplace(face, body.first_tet + t, i);
+      if (is_new) continue;
+      auto& [other_tet, other_face] = waiting->second;
+      if (other_tet < 0)
+        throw InputError(
+            fmt::format("body {}: cage: tet {} shares a face with two others; a face may join two tets only",
+                        body.name, t));
+      tet.across[i] = other_tet;
+      topology.tets[other_tet].across[other_face] = body.first_tet + t;
+      other_tet = -1;
+    }
+    topology.tets.push_back(tet);
+    for (const auto& [i, j] : tet_edges) {
+      neighbors[tets(t, i)].push_back(tet.node[j]);
+      neighbors[tets(t, j)].push_back(tet.node[i]);
+    }
+  }
+  for (auto& list : neighbors) {
+    std::sort(list.begin(), list.end());
+    list.erase(std::unique(list.begin(), list.end()), list.end());
+    topology.neighbors.insert(topology.neighbors.end(), list.begin(), list.end());
+    topology.neighbor_begin.push_back(int(topology.neighbors.size()));
+    topology.body_of_node.push_back(index);
+  }
+  Topology::Body& range = topology.bodies[index];
+  range = {body.first_node, body.first_node + body.node_count(),
+           body.first_tet,  body.first_tet + int(tets.rows()),
+           body.moving,     {}};
+  for (int n : body.surface_nodes) range.surface_nodes.push_back(body.first_node + n);
+}
+
+void check_places(const World& world) {
+  const double size = world.bounds_m.diagonal();
+  for (const Body& body : world.bodies)
+    for (int n = 0; n < body.node_count() && world.walls && body.moving; ++n)
+      for (int c = 0; c < 3; ++c) {
+        const double x = body.cage.positions(n, c);
+        if (x < world.bounds_m.lower[c] - 1e-6 * size || x > world.bounds_m.upper[c] + 1e-6 * size)
+          throw InputError(fmt::format(
+              "body {}: node {} at {} = {:.6g} m is outside the bounds {:.6g} to {:.6g}; move the "
+              "body or widen bounds_m",
+              body.name, n, "xyz"[c], x, world.bounds_m.lower[c], world.bounds_m.upper[c]));
+      }
+  for (std::size_t a = 0; a < world.bodies.size(); ++a)
+    for (std::size_t b = a + 1; b < world.bodies.size(); ++b) {
+      const Body &one = world.bodies[a], &two = world.bodies[b];
+      if (!one.moving && !two.moving) continue;
+      const auto overlap = detail::deepest_overlap({one.cage.positions, one.cage.tets, one.surface},
+                                                   {two.cage.positions, two.cage.tets, two.surface});
+      if (overlap.depth_m > 1e-6 * size)
+        throw InputError(fmt::format(
+            "bodies {} and {} overlap at the start, {:.3g} m deep at ({:.4g}, {:.4g}, {:.4g}); move "
+            "them apart",
+            one.name, two.name, overlap.depth_m, overlap.place.x(), overlap.place.y(), overlap.place.z()));
+    }
+}
+
+void check(const WorldSpec& spec) {
+  if (spec.bodies.empty()) throw InputError("the world has no body; add at least the robot");
+  if (spec.robot < 0 || spec.robot >= int(spec.bodies.size()))
+    throw InputError(
+        fmt::format("robot is body {}, but there are {} bodies", spec.robot, spec.bodies.size()));
+  const auto& box = spec.bounds_m;
+  if (!box.lower.allFinite() || !box.upper.allFinite() || !(box.size().array() > 0).all())
+    throw InputError("bounds_m must be two finite corners, the first below the second on every axis");
+  if (!spec.gravity_m_s2.allFinite()) throw InputError("gravity_m_s2 is not finite");
+  if (!(spec.max_dt_s >= 0 && std::isfinite(spec.max_dt_s)))
+    throw InputError(
+        fmt::format("max_dt_s is {}; it must be 0 (automatic) or a positive time", spec.max_dt_s));
+}
+
+void choose_step(double max_dt_s, World& world) {
+  const auto stiffest = std::min_element(
+      world.bodies.begin(), world.bodies.end(),
+      [](const Body& a, const Body& b) { return a.elastic_dt_limit_s < b.elastic_dt_limit_s; });
+  world.contact_dt_s = float(step_safety * stiffest->elastic_dt_limit_s);
+  world.dt_s = max_dt_s > 0 ? std::min(world.contact_dt_s, double(float(max_dt_s))) : world.contact_dt_s;
+  if (!(world.dt_s >= 1e-7))
+    throw InputError(fmt::format(
+        "body {}: its stable time step is {:.2g} s, too short to be of use; soften it, or mesh it "
+        "without slivers",
+        stiffest->name, world.dt_s));
+}
+
+}  // namespace
+
+World build_world(const WorldSpec& spec) {
+  check(spec);
+  World world;
+  world.robot = spec.robot;
+  world.bounds_m = spec.bounds_m;
+  world.walls = spec.walls;
+  world.gravity_m_s2 = spec.gravity_m_s2;
+  for (const BodySpec& body : spec.bodies) world.bodies.push_back(make_body(body));
+  if (!world.bodies[spec.robot].moving)
+    throw InputError(
+        fmt::format("body {}: the robot has no node that can move", world.bodies[spec.robot].name));
+
+  auto& tables = world.tables64;
+  world.topology.neighbor_begin = {0};
+  world.topology.bodies.resize(world.bodies.size());
+  world.nodes = 0;
+  int tets = 0;
+  for (const bool moving : {true, false}) {
+    for (std::size_t b = 0; b < world.bodies.size(); ++b) {
+      Body& body = world.bodies[b];
+      if (body.moving != moving) continue;
+      body.first_node = world.nodes, body.first_tet = tets;
+      world.nodes += body.node_count(), tets += int(body.cage.tets.rows());
+      append_nodes(body, tables);
+      append_topology(body, int(b), world.topology);
+      if (!moving) continue;
+      std::vector<Spring<double>> springs;
+      std::vector<VolumeElement<double>> volumes;
+      make_elements(body, springs, volumes);
+      body.elastic_dt_limit_s = largest_stable_step(body, springs, volumes);
+      append(body, springs, volumes, tables);
+    }
+    if (moving) world.moving_nodes = world.nodes;
+  }
+  const Body& robot = world.bodies[world.robot];
+  const Vec3 center = rest_center(robot);
+  for (int n = 0; n < robot.node_count(); ++n)
+    for (int c = 0; c < 3; ++c) tables.rest_from_center.push_back(robot.cage.positions(n, c) - center[c]);
+  for (const Body& a : world.bodies) {
+    for (const Body& b : world.bodies)
+      tables.pair_friction.push_back(std::sqrt(a.material.friction * b.material.friction));
+    tables.skin.push_back(0.2 * mean_edge(a));
+  }
+  world.tables = converted<float>(tables);
+  choose_step(spec.max_dt_s, world);
+  check_places(world);
+  return world;
+}
+
+State rest_state(const World& world) {
+  State state;
+  state.positions.assign(world.tables.rest_positions.begin(),
+                         world.tables.rest_positions.begin() + 3 * world.moving_nodes);
+  state.velocities.assign(std::size_t(3 * world.moving_nodes), 0.f);
+  return state;
+}
+
+}  // namespace limber::fem

@@ -1,0 +1,83 @@
+// Soft bodies as tet cages, and the world they share. Method, sources, figures: docs/dynamics.md,
+// docs/contact.md.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "core/mesh.h"
+#include "core/state.h"
+#include "fem/detail/tables.h"
+
+namespace limber::fem {
+
+struct Material {
+  double youngs_modulus_pa = 5e3;  // > 0
+  double poisson_ratio = 0.45;  // 0.25 ≤ ν ≤ 0.495: springs alone have 0.25, the volume term adds the rest
+  double density_kg_m3 = 100;   // > 0
+  double damping_ratio = 0.05;  // 0 … 1, share of critical damping of the body's lowest longitudinal mode
+  double friction = 0.2;        // 0 … 2, Coulomb; a pair has the geometric mean, a wall the body's own
+};
+
+struct BodySpec {
+  std::string name;
+  TetMesh cage;  // the rest shape, where the body starts
+  Material material;
+  std::vector<int> fixed_nodes;  // rows of cage.positions that never move
+  bool rigid = false;            // static: no node ever moves. (All nodes fixed means the same.)
+};
+
+struct WorldSpec {
+  std::vector<BodySpec> bodies;
+  int robot = 0;                     // index of the body that controls push
+  Box bounds_m;                      // every body starts inside
+  bool walls = true;                 // the bounds are rigid walls
+  Vec3 gravity_m_s2 = Vec3::Zero();  // on every node that is not fixed
+  double max_dt_s = 0;               // 0: automatic; a scene may only lower the step
+};
+
+// The rest cage and what follows from it and the material; constant.
+struct Body {
+  std::string name;
+  Material material;
+  bool moving;        // false: static, not part of State
+  TetMesh cage;       // rest; positions rounded to float32, as the simulation has them
+  int first_node;     // the body's row 0 among the world's nodes; for moving bodies also among those of State
+  int first_tet;      // its tet 0 among the world's
+  Triangles surface;  // boundary faces, rows of cage.positions
+  std::vector<int> surface_nodes;    // rows of cage.positions, ascending
+  std::vector<bool> fixed;           // (N)
+  std::vector<double> node_mass_kg;  // (N) density × a quarter of each adjacent tet's rest volume
+  double mass_kg, rest_volume_m3;
+  double elastic_dt_limit_s;  // largest stable step of the damped elastic body; infinite when static
+  int node_count() const { return int(cage.positions.rows()); }
+};
+
+// Constant while stepping; threads share it. Nodes and tets are numbered body after body, moving bodies
+// first.
+struct World {
+  std::vector<Body> bodies;  // in the order of WorldSpec
+  int robot;
+  Box bounds_m;
+  bool walls;
+  Vec3 gravity_m_s2;
+  double dt_s;  // time step, exactly a float32
+  double
+      contact_dt_s;  // step from which contact stiffness follows: the automatic one, also when dt_s is lower
+  int moving_nodes;  // nodes of State
+  int nodes;         // with those of static bodies
+  detail::Tables<float> tables;     // what the float32 steppers read
+  detail::Tables<double> tables64;  // the same for the double reference
+  detail::Topology topology;
+};
+
+// Throws InputError naming body and element: a cage that is not valid, a node in no tet, a fixed node that
+// does not exist, a material out of range, a robot that is missing or cannot move, a body outside the bounds,
+// two bodies that overlap at the start (and how deep), coordinates too large for float32, a step too small to
+// be of use.
+World build_world(const WorldSpec&);
+
+// All moving bodies in their rest shapes and places, at rest.
+State rest_state(const World&);
+
+}  // namespace limber::fem

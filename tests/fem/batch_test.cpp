@@ -1,0 +1,88 @@
+// A rollout is a function of world, state and control alone.
+#include "fem/batch.h"
+
+#include <gtest/gtest.h>
+
+#include "core/error.h"
+#include "core/random.h"
+#include "fem/observe.h"
+#include "tests/fem/worlds.h"
+
+namespace limber::fem {
+namespace {
+
+struct Case {
+  State start;
+  Control control;
+};
+
+// States in the middle of contact, and controls of every kind and of different lengths.
+std::vector<Case> pressed_cases(const World& world, int count) {
+  Rng rng(21, 0);
+  Control press;
+  press.manipulation = Manipulation::body;
+  press.force_n = {900, 0, -100};
+  press.steps = 500;
+  const State pressed = propagate(world, rest_state(world), press).end;
+  EXPECT_EQ(deepest_penetration(world, pressed).other, 1);
+  std::vector<Case> cases;
+  for (int i = 0; i < count; ++i) {
+    Control control;
+    control.steps = 20 + rng.below(60);
+    control.manipulation = Manipulation(i % 4);
+    control.force_n = (800 * rng.direction()).cast<float>();
+    control.node = rng.below(world.bodies[world.robot].node_count());
+    control.radius_m = 0.5f;
+    control.target_m = {2.5f, 1.5f, 1.5f};
+    control.max_force_n = 700;
+    cases.push_back({pressed, control});
+  }
+  return cases;
+}
+
+std::vector<State> run(const World& world, const std::vector<Case>& cases, const std::vector<int>& order,
+                       int lanes, InstructionSet set = InstructionSet::automatic) {
+  std::vector<Rollout> rollouts;
+  for (int i : order) rollouts.push_back({&cases[i].start, cases[i].control, {}, {}});
+  Batch batch(world, lanes, set);
+  propagate(batch, rollouts);
+  std::vector<State> ends(cases.size());
+  for (std::size_t k = 0; k < order.size(); ++k) {
+    EXPECT_EQ(rollouts[k].outcome.status, RunStatus::ok) << rollouts[k].outcome.reason;
+    ends[order[k]] = rollouts[k].end;
+  }
+  return ends;
+}
+
+TEST(Batch, ResultsDoNotDependOnLanesNeighboursOrderOrInstructionSet) {
+  const World world = build_world(testing::barriers());
+  const std::vector<Case> cases = pressed_cases(world, 24);
+  std::vector<int> order;
+  for (int i = 0; i < int(cases.size()); ++i) order.push_back(i);
+  const std::vector<State> alone = run(world, cases, order, 1);
+  EXPECT_NE(alone[0], alone[1]);
+  for (const int lanes : {8, 16}) {
+    EXPECT_EQ(run(world, cases, order, lanes), alone) << lanes;
+    std::reverse(order.begin(), order.end());
+    std::rotate(order.begin(), order.begin() + 5, order.end());
+    EXPECT_EQ(run(world, cases, order, lanes), alone) << lanes;
+  }
+  for (const auto set : {InstructionSet::sse2, InstructionSet::avx2, InstructionSet::avx512}) {
+    if (set == InstructionSet::avx512 && !__builtin_cpu_supports("avx512bw"))
+      GTEST_SKIP() << "no AVX-512 here";
+    for (const int lanes : {1, 8, 16}) EXPECT_EQ(run(world, cases, order, lanes, set), alone) << lanes;
+  }
+}
+
+TEST(Batch, AHundredStepsAreFortyAndThenSixty) {
+  const World world = build_world(testing::barriers());
+  for (const Case& c : pressed_cases(world, 4)) {
+    Control whole = c.control, first = c.control, second = c.control;
+    whole.steps = 100, first.steps = 40, second.steps = 60;
+    const State middle = propagate(world, c.start, first).end;
+    EXPECT_EQ(propagate(world, middle, second).end, propagate(world, c.start, whole).end);
+  }
+}
+
+}  // namespace
+}  // namespace limber::fem
