@@ -1,0 +1,202 @@
+#include "meshing/cage.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "core/error.h"
+#include "meshing/detail/delaunay.h"
+#include "meshing/detail/glued.h"
+#include "meshing/detail/lattice_cage.h"
+#include "meshing/detail/shrink_fit.h"
+#include "meshing/detail/tet_faces.h"
+
+namespace limber::meshing {
+namespace {
+
+using detail::Model;
+using detail::Selection;
+
+void require(bool holds, const std::string& text) {
+  if (!holds) throw InputError("cage: " + text);
+}
+
+void check(const CageOptions& o) {
+  require(o.tets >= 24 && o.tets <= 200'000, fmt::format("tets is {}, but must lie in 24 … 200000", o.tets));
+  require(o.min_dihedral_deg >= 1 && o.min_dihedral_deg <= 45,
+          fmt::format("min_dihedral_deg is {}, but must lie in 1 … 45", o.min_dihedral_deg));
+  require(o.max_dihedral_deg >= 100 && o.max_dihedral_deg <= 179,
+          fmt::format("max_dihedral_deg is {}, but must lie in 100 … 179", o.max_dihedral_deg));
+  require(o.gap >= 1e-6 && o.gap <= 0.1, fmt::format("gap is {}, but must lie in 1e-6 … 0.1", o.gap));
+}
+
+// A vertex of no triangle must be enclosed too, for it will be bound: it becomes a triangle of one point.
+SurfaceMesh with_lone_vertices(const SurfaceMesh& surface) {
+  std::vector<bool> used(std::size_t(surface.positions.rows()), false);
+  for (Eigen::Index i = 0; i < surface.triangles.size(); ++i) used[surface.triangles.data()[i]] = true;
+  SurfaceMesh all = surface;
+  const Eigen::Index lone = std::count(used.begin(), used.end(), false);
+  all.triangles.conservativeResize(surface.triangles.rows() + lone, 3);
+  Eigen::Index row = surface.triangles.rows();
+  for (std::size_t v = 0; v < used.size(); ++v)
+    if (!used[v]) all.triangles.row(row++).setConstant(int(v));
+  return all;
+}
+
+// The spacing whose count comes nearest to the budget. The count falls with the spacing, but by jumps, and on
+// a model that is aligned with the axes by large ones; then other places of the lattice help.
+Selection fit_budget(const Model& model, int budget) {
+  // The first place is none where a node, an edge or a face would lie on a plane that users like.
+  static const std::array<Vec3, 6> phases{Vec3(0.137, 0.291, 0.413), Vec3(0.613, 0.171, 0.829),
+                                          Vec3(0.371, 0.743, 0.059), Vec3(0.887, 0.537, 0.271),
+                                          Vec3(0.211, 0.947, 0.671), Vec3(0.463, 0.389, 0.983)};
+  constexpr double near_enough = 0.03;
+  constexpr int tries_a_phase = 12;
+  Selection best;
+  const auto miss = [&](const Selection& s) { return std::abs(double(s.tets.size()) / budget - 1); };
+  double spacing = model.box.diagonal() / std::cbrt(double(budget));
+  for (const Vec3& phase : phases) {
+    double too_fine = 0, too_coarse = 0;
+    for (int i = 0; i < tries_a_phase; ++i) {
+      Selection s = detail::select_tets(model, spacing, phase);
+      const double count = double(s.tets.size());
+      // No tets: the lattice would be too large.
+      const double ratio = s.tets.empty() ? 4 : count / budget;
+      (ratio > 1 ? too_fine : too_coarse) = spacing;
+      if (!s.tets.empty() && (best.tets.empty() || miss(s) < miss(best))) best = std::move(s);
+      if (!best.tets.empty() && miss(best) < near_enough) return best;
+      spacing *= std::pow(ratio, 0.42);
+      if (too_fine > 0 && too_coarse > 0) {
+        if (too_coarse / too_fine < 1.0005) break;
+        const double low = too_fine * std::pow(too_coarse / too_fine, 0.1),
+                     high = too_coarse * too_fine / low;
+        spacing = std::clamp(spacing, low, high);
+      }
+    }
+    if (miss(best) < 0.1) return best;
+    spacing = best.lattice.spacing;
+  }
+  return best;
+}
+
+// Planes n·x = d of a shell's triangles, n outwards and of length 1.
+struct HalfSpaces {
+  Points normals;
+  Eigen::VectorXd offsets;
+};
+
+HalfSpaces half_spaces(const ConvexShell& shell) {
+  HalfSpaces h{Points(shell.triangles.rows(), 3), Eigen::VectorXd(shell.triangles.rows())};
+  for (Eigen::Index f = 0; f < shell.triangles.rows(); ++f) {
+    const Vec3 a = shell.vertices.row(shell.triangles(f, 0)), b = shell.vertices.row(shell.triangles(f, 1)),
+               c = shell.vertices.row(shell.triangles(f, 2));
+    const Vec3 n = (b - a).cross(c - a).normalized();
+    h.normals.row(f) = n;
+    h.offsets[f] = n.dot(a);
+  }
+  return h;
+}
+
+std::vector<int> label_tets(const TetMesh& mesh, const std::vector<ConvexShell>& shells) {
+  std::vector<HalfSpaces> bounds;
+  for (const ConvexShell& shell : shells) bounds.push_back(half_spaces(shell));
+  std::vector<int> label(std::size_t(mesh.tets.rows()), 0);
+  for (std::size_t t = 0; t < label.size(); ++t) {
+    Vec3 middle = Vec3::Zero();
+    for (int k = 0; k < 4; ++k)
+      middle += 0.25 * mesh.positions.row(mesh.tets(Eigen::Index(t), k)).transpose();
+    double deepest = -1e300;
+    for (std::size_t s = 0; s < bounds.size(); ++s) {
+      const double depth = (bounds[s].offsets - bounds[s].normals * middle).minCoeff();
+      if (depth > deepest) deepest = depth, label[t] = int(s);
+    }
+  }
+  return label;
+}
+
+int component_count(const Tets& tets) {
+  const std::vector<int> lowest = detail::components(tets);
+  int count = 0;
+  for (std::size_t t = 0; t < lowest.size(); ++t) count += lowest[t] == int(t);
+  return count;
+}
+
+Cage lattice_cage(const SurfaceMesh& surface, const CageOptions& options) {
+  // Times a power of two: exact, so it changes no answer, and keeps products of coordinates far from under-
+  // and overflow.
+  const double diagonal = bounding_box(surface.positions).diagonal();
+  const double unit = std::exp2(std::ilogb(diagonal));
+  SurfaceMesh scaled = with_lone_vertices(surface);
+  scaled.positions /= unit;
+  const Model model(scaled);
+  const Selection selection = fit_budget(model, options.tets);
+  require(!selection.tets.empty(), "the model is too thin for its length; give fewer tets");
+
+  Cage cage;
+  cage.mesh = detail::build_mesh(selection).mesh;
+  if (options.mode == CageMode::lattice)
+    cage.passes = detail::shrink_fit(
+        model.tree, {options.gap * diagonal / unit, options.min_dihedral_deg, options.max_dihedral_deg},
+        cage.mesh);
+  cage.glued_share = detail::glued_share(model, scaled, cage.mesh);
+  cage.mesh.positions *= unit;
+  cage.spacing_m = selection.lattice.spacing * unit;
+  if (model.closed && volume(surface) > 0) cage.volume_ratio = volume(cage.mesh) / volume(surface);
+  const double tets = double(cage.mesh.tets.rows());
+  if (std::abs(tets / options.tets - 1) > 0.1)
+    cage.notes.push_back(
+        fmt::format("{} tets were asked for, {} is the nearest that the lattice gave", options.tets, tets));
+  return cage;
+}
+
+Cage paper_cage(const std::vector<ConvexShell>& shells) {
+  require(!shells.empty(), "mode paper needs convex shells; decompose the model first");
+  Cage cage;
+  std::vector<Vec3> positions;
+  std::vector<std::array<int, 4>> tets;
+  const auto before = [](const Vec3& a, const Vec3& b) {
+    return std::lexicographical_compare(a.begin(), a.end(), b.begin(), b.end());
+  };
+  for (const ConvexShell& shell : shells)
+    for (Eigen::Index v = 0; v < shell.vertices.rows(); ++v) positions.push_back(shell.vertices.row(v));
+  std::sort(positions.begin(), positions.end(), before);
+  positions.erase(std::unique(positions.begin(), positions.end()), positions.end());
+  for (std::size_t s = 0; s < shells.size(); ++s)
+    for (std::array<int, 4> tet : detail::delaunay_tets(shells[s].vertices)) {
+      for (int& v : tet)
+        v = int(
+            std::lower_bound(positions.begin(), positions.end(), Vec3(shells[s].vertices.row(v)), before) -
+            positions.begin());
+      tets.push_back(tet);
+      cage.shell_from_tet.push_back(int(s));
+    }
+  require(!tets.empty(), "no shell has a volume; decompose the model anew");
+  cage.mesh.positions.resize(Eigen::Index(positions.size()), 3);
+  for (std::size_t v = 0; v < positions.size(); ++v) cage.mesh.positions.row(Eigen::Index(v)) = positions[v];
+  cage.mesh.tets.resize(Eigen::Index(tets.size()), 4);
+  for (std::size_t t = 0; t < tets.size(); ++t)
+    cage.mesh.tets.row(Eigen::Index(t)) << tets[t][0], tets[t][1], tets[t][2], tets[t][3];
+  cage.notes.push_back(
+      "mode paper: tets as the shells give them; the budget, the dihedrals and enclosure are not heeded");
+  return cage;
+}
+
+}  // namespace
+
+Cage build_cage(const SurfaceMesh& surface, const std::vector<ConvexShell>& shells,
+                const CageOptions& options) {
+  check(options);
+  validate(surface, "cage");
+  require(bounding_box(surface.positions).diagonal() > 0, "all vertices of the model are one point");
+  Cage cage = options.mode == CageMode::paper ? paper_cage(shells) : lattice_cage(surface, options);
+  if (options.mode != CageMode::paper) cage.shell_from_tet = label_tets(cage.mesh, shells);
+  cage.components = component_count(cage.mesh.tets);
+  if (cage.components > 1)
+    cage.notes.push_back(
+        fmt::format("the cage has {} pieces that nothing joins, as the model has", cage.components));
+  return cage;
+}
+
+}  // namespace limber::meshing

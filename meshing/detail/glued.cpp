@@ -1,0 +1,112 @@
+#include "meshing/detail/glued.h"
+
+#include <algorithm>
+#include <array>
+#include <map>
+
+#include "meshing/detail/edges.h"
+
+namespace limber::meshing::detail {
+namespace {
+
+using TetCorners = std::array<Vec3, 4>;
+
+struct Plane {
+  Vec3 normal;  // inwards
+  double offset;
+};
+
+std::array<Plane, 4> planes_of(const TetCorners& p) {
+  static constexpr int face[4][3] = {{1, 2, 3}, {0, 3, 2}, {0, 1, 3}, {0, 2, 1}};
+  std::array<Plane, 4> planes;
+  for (int i = 0; i < 4; ++i) {
+    const Vec3& a = p[face[i][0]];
+    const Vec3 n = -(p[face[i][1]] - a).cross(p[face[i][2]] - a);
+    planes[i] = {n, n.dot(a)};
+  }
+  return planes;
+}
+
+// The part of a segment within the tet; its two ends, or nothing.
+bool clip(const std::array<Plane, 4>& planes, Vec3& a, Vec3& b) {
+  for (const Plane& plane : planes) {
+    const double da = plane.normal.dot(a) - plane.offset, db = plane.normal.dot(b) - plane.offset;
+    if (da < 0 && db < 0) return false;
+    if (da < 0)
+      a += (b - a) * (da / (da - db));
+    else if (db < 0)
+      b = a + (b - a) * (da / (da - db));
+  }
+  return true;
+}
+
+// A polygon within the tet by clipping a triangle (Sutherland and Hodgman 1974).
+std::vector<Vec3> clip(const std::array<Plane, 4>& planes, std::vector<Vec3> polygon) {
+  for (const Plane& plane : planes) {
+    std::vector<Vec3> next;
+    for (std::size_t i = 0; i < polygon.size(); ++i) {
+      const Vec3 &p = polygon[i], &q = polygon[(i + 1) % polygon.size()];
+      const double dp = plane.normal.dot(p) - plane.offset, dq = plane.normal.dot(q) - plane.offset;
+      if (dp >= 0) next.push_back(p);
+      if ((dp < 0) != (dq < 0)) next.push_back(p + (q - p) * (dp / (dp - dq)));
+    }
+    polygon = std::move(next);
+  }
+  return polygon;
+}
+
+bool holds_strangers(const Model& model, const SurfaceMesh& surface, const TetCorners& corners) {
+  const std::vector<int> triangles =
+      model.tree.triangles_meeting_tet(corners[0], corners[1], corners[2], corners[3]);
+  const std::array<Plane, 4> planes = planes_of(corners);
+  const auto at = [&](int v) { return Vec3(surface.positions.row(v)); };
+
+  UnionFind pieces(int(triangles.size()));
+  std::map<std::array<int, 2>, int> first_of_edge;
+  for (int i = 0; i < int(triangles.size()); ++i)
+    for (int k = 0; k < 3; ++k) {
+      const int v = surface.triangles(triangles[i], k), w = surface.triangles(triangles[i], (k + 1) % 3);
+      const auto [found, is_new] = first_of_edge.try_emplace({std::min(v, w), std::max(v, w)}, i);
+      Vec3 a = at(v), b = at(w);
+      if (!is_new && clip(planes, a, b)) pieces.join(found->second, i);
+    }
+  std::map<int, std::vector<Vec3>> points;  // of each piece, within the tet
+  for (int i = 0; i < int(triangles.size()); ++i) {
+    const auto row = surface.triangles.row(triangles[i]);
+    for (const Vec3& p : clip(planes, {at(row[0]), at(row[1]), at(row[2])}))
+      points[pieces.root(i)].push_back(p);
+  }
+  if (points.size() < 2) return false;
+
+  UnionFind bodies(int(triangles.size()));
+  constexpr std::size_t samples = 200;  // of a piece
+  for (auto a = points.begin(); a != points.end(); ++a)
+    for (auto b = std::next(a); b != points.end(); ++b) {
+      double nearest = 1e300;
+      Vec3 middle;
+      for (std::size_t i = 0; i < a->second.size(); i += 1 + a->second.size() / samples)
+        for (std::size_t j = 0; j < b->second.size(); j += 1 + b->second.size() / samples)
+          if (const double d = (a->second[i] - b->second[j]).squaredNorm(); d < nearest)
+            nearest = d, middle = 0.5 * (a->second[i] + b->second[j]);
+      if (nearest == 0 || model.winding.inside(middle)) bodies.join(a->first, b->first);
+    }
+  const int first = bodies.root(points.begin()->first);
+  return std::any_of(points.begin(), points.end(),
+                     [&](const auto& piece) { return bodies.root(piece.first) != first; });
+}
+
+}  // namespace
+
+double glued_share(const Model& model, const SurfaceMesh& surface, const TetMesh& mesh) {
+  int meeting = 0, glued = 0;
+  for (Eigen::Index t = 0; t < mesh.tets.rows(); ++t) {
+    TetCorners p;
+    for (int k = 0; k < 4; ++k) p[k] = mesh.positions.row(mesh.tets(t, k));
+    if (!model.tree.meets_tet(p[0], p[1], p[2], p[3])) continue;
+    ++meeting;
+    glued += holds_strangers(model, surface, p);
+  }
+  return meeting > 0 ? double(glued) / meeting : 0;
+}
+
+}  // namespace limber::meshing::detail

@@ -1,0 +1,250 @@
+#include "meshing/detail/lattice_cage.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+
+#include "core/error.h"
+#include "meshing/detail/edges.h"
+
+namespace limber::meshing::detail {
+namespace {
+
+enum State : std::uint8_t { unknown, outside, inside, touched, filled };
+
+bool kept(std::uint8_t state) { return state > outside; }
+
+struct Grid {
+  Lattice lattice;
+  std::vector<std::uint8_t> state;  // of each tet
+};
+
+bool is_closed(const Triangles& triangles) {
+  bool closed = true;
+  for_each_edge(edge_uses(triangles), [&](std::span<const EdgeUse> uses) {
+    int balance = 0;
+    for (const EdgeUse& use : uses) balance += use.forward ? 1 : -1;
+    closed = closed && balance == 0;
+  });
+  return closed;
+}
+
+std::vector<Box> triangle_boxes(const SurfaceMesh& surface) {
+  std::vector<Box> boxes(std::size_t(surface.triangles.rows()));
+  for (std::size_t f = 0; f < boxes.size(); ++f)
+    for (int k = 0; k < 3; ++k) boxes[f].include(Vec3(surface.positions.row(surface.triangles(int(f), k))));
+  return boxes;
+}
+
+Box union_of(const std::vector<Box>& boxes) {
+  Box all;
+  for (const Box& box : boxes) all.include(box);
+  return all;
+}
+
+Lattice lattice_round(const Box& box, double spacing, const Vec3& phase) {
+  constexpr int margin = 3;  // cells: room for what mending adds, and for neighbours of neighbours
+  Lattice lattice;
+  lattice.spacing = spacing;
+  lattice.origin = box.lower - spacing * (Vec3::Constant(margin) + phase);
+  const Vec3 cells = (box.size() / spacing).array().ceil() + 2 * margin + 1;
+  // As doubles first: a product of ints would overflow.
+  lattice.cells = cells.prod() <= double(max_cells) ? Cell(cells.cast<int>()) : Cell::Zero();
+  return lattice;
+}
+
+void mark_touched(const Model& model, Grid& grid) {
+  const Lattice& lattice = grid.lattice;
+  std::vector<bool> near(std::size_t(lattice.cell_count()));
+  for (const Box& box : model.boxes) {
+    // The tets of a cell reach from half a cell below its lower corner to its upper corner.
+    const Vec3 lower = (box.lower - lattice.origin) / lattice.spacing,
+               upper = (box.upper - lattice.origin) / lattice.spacing;
+    const Cell first = (lower.array() - 1.001).floor().cast<int>(),
+               last = (upper.array() + 0.501).floor().cast<int>();
+    for (int z = first.z(); z <= last.z(); ++z)
+      for (int y = first.y(); y <= last.y(); ++y)
+        for (int x = first.x(); x <= last.x(); ++x) near[lattice.index({x, y, z})] = true;
+  }
+  for (int cell = 0; cell < int(near.size()); ++cell) {
+    if (!near[cell]) continue;
+    for (int tet = cell * tets_a_cell; tet < (cell + 1) * tets_a_cell; ++tet) {
+      const auto [a, b, c, d] = lattice.tet_positions(tet);
+      if (model.tree.meets_tet(a, b, c, d)) grid.state[tet] = touched;
+    }
+  }
+}
+
+// From each touched tet to the untouched ones beside it, and on through those that are inside.
+void mark_inside(const Model& model, const std::vector<int>& touched_tets, Grid& grid) {
+  const auto judge = [&](int tet) -> std::uint8_t {
+    const auto [a, b, c, d] = grid.lattice.tet_positions(tet);
+    return model.winding.inside(0.25 * (a + b + c + d)) ? inside : outside;
+  };
+  std::vector<int> pending;
+  for (int start : touched_tets)
+    for (int corner = 0; corner < 4; ++corner) {
+      const int seed = grid.lattice.neighbour(start, corner);
+      if (seed < 0 || grid.state[seed] != unknown) continue;
+      grid.state[seed] = judge(seed);
+      pending.push_back(seed);
+      while (!pending.empty()) {
+        const int tet = pending.back();
+        pending.pop_back();
+        // The verdict of one tet holds for all that it reaches when the model is closed. When it is open,
+        // each is asked.
+        if (!model.closed && grid.state[tet] == outside) continue;
+        for (int k = 0; k < 4; ++k) {
+          const int next = grid.lattice.neighbour(tet, k);
+          if (next < 0 || grid.state[next] != unknown) continue;
+          grid.state[next] = model.closed ? grid.state[tet] : judge(next);
+          pending.push_back(next);
+        }
+      }
+    }
+}
+
+using StarMask = std::uint32_t;  // of the tets round a node
+constexpr StarMask whole_star = (1u << tets_a_node) - 1;
+
+// The tets of `mask` that the lowest of them reaches through shared faces.
+StarMask first_group(int kind, StarMask mask) {
+  StarMask group = mask & -mask, grown = group;
+  while (grown != 0) {
+    StarMask next = 0;
+    for (StarMask rest = grown; rest != 0; rest &= rest - 1)
+      for (int j : pattern().star_neighbours[kind][std::countr_zero(rest)]) next |= 1u << j;
+    grown = next & mask & ~group;
+    group |= grown;
+  }
+  return group;
+}
+
+struct Star {
+  std::array<int, tets_a_node> tets;  // −1 outside the lattice
+  StarMask kept = 0;
+};
+
+Star star_of(const Grid& grid, const LatticeNode& node) {
+  Star star;
+  for (int i = 0; i < tets_a_node; ++i) {
+    const LatticeTet& t = pattern().star[node.kind][i];
+    const Cell cell = node.cell + t.cell;
+    star.tets[i] = grid.lattice.holds(cell) ? grid.lattice.tet_index({cell, t.which}) : -1;
+    if (star.tets[i] >= 0 && kept(grid.state[star.tets[i]])) star.kept |= 1u << i;
+  }
+  return star;
+}
+
+// The tets that are missing round a node: each group of kept tets must leave the rest of the star in one
+// piece, so that its boundary is one fan of triangles. The largest piece of the rest stays open, the others
+// are filled.
+StarMask missing(int kind, StarMask kept_tets) {
+  for (StarMask todo = kept_tets; todo != 0;) {
+    const StarMask group = first_group(kind, todo);
+    todo &= ~group;
+    StarMask largest = 0;
+    for (StarMask rest = whole_star & ~group; rest != 0;) {
+      const StarMask piece = first_group(kind, rest);
+      rest &= ~piece;
+      if (std::popcount(piece) > std::popcount(largest)) largest = piece;
+    }
+    const StarMask wanted = whole_star & ~group & ~largest & ~kept_tets;
+    if (wanted != 0) return wanted;
+  }
+  return 0;
+}
+
+int node_index(const Lattice& lattice, const LatticeNode& n) { return 2 * lattice.index(n.cell) + n.kind; }
+LatticeNode node_at(const Lattice& lattice, int index) { return {lattice.cell(index / 2), index % 2}; }
+
+std::vector<int> nodes_of(const Lattice& lattice, const std::vector<int>& tets) {
+  std::vector<int> nodes;
+  nodes.reserve(4 * tets.size());
+  for (int tet : tets)
+    for (int k = 0; k < 4; ++k) nodes.push_back(node_index(lattice, lattice.tet_corner(tet, k)));
+  std::sort(nodes.begin(), nodes.end());
+  nodes.erase(std::unique(nodes.begin(), nodes.end()), nodes.end());
+  return nodes;
+}
+
+std::vector<int> kept_tets(const Grid& grid) {
+  std::vector<int> tets;
+  for (int t = 0; t < int(grid.state.size()); ++t)
+    if (kept(grid.state[t])) tets.push_back(t);
+  return tets;
+}
+
+// Only ever adds tets, so it ends.
+void mend(Grid& grid) {
+  for (std::vector<int> nodes = nodes_of(grid.lattice, kept_tets(grid)); !nodes.empty();) {
+    std::vector<int> added;
+    for (int index : nodes) {
+      const LatticeNode node = node_at(grid.lattice, index);
+      const Star star = star_of(grid, node);
+      for (StarMask wanted = missing(node.kind, star.kept); wanted != 0; wanted &= wanted - 1) {
+        const int tet = star.tets[std::countr_zero(wanted)];
+        LIMBER_CHECK(tet >= 0, tet);
+        grid.state[tet] = filled;
+        added.push_back(tet);
+      }
+    }
+    nodes = nodes_of(grid.lattice, added);
+  }
+}
+
+}  // namespace
+
+Model::Model(const SurfaceMesh& surface)
+    : boxes(triangle_boxes(surface)),
+      box(union_of(boxes)),
+      tree(surface.positions, surface.triangles),
+      winding(surface.positions, surface.triangles),
+      closed(is_closed(surface.triangles)) {}
+
+Selection select_tets(const Model& model, double spacing, const Vec3& phase) {
+  Grid grid{lattice_round(model.box, spacing, phase), {}};
+  grid.state.assign(std::size_t(grid.lattice.cell_count() * tets_a_cell), unknown);
+  mark_touched(model, grid);
+  mark_inside(model, kept_tets(grid), grid);
+  mend(grid);
+  Selection selection{grid.lattice, kept_tets(grid), {}};
+  for (int tet : selection.tets) selection.touched.push_back(grid.state[tet] == touched);
+  return selection;
+}
+
+LatticeMesh build_mesh(const Selection& selection) {
+  const Lattice& lattice = selection.lattice;
+  Grid grid{lattice, std::vector<std::uint8_t>(std::size_t(lattice.cell_count() * tets_a_cell), outside)};
+  std::vector<int> row_from_tet(grid.state.size(), -1);
+  for (std::size_t row = 0; row < selection.tets.size(); ++row) {
+    grid.state[selection.tets[row]] = touched;
+    row_from_tet[selection.tets[row]] = int(row);
+  }
+  LatticeMesh result;
+  result.mesh.tets.setConstant(Eigen::Index(selection.tets.size()), 4, -1);
+  std::vector<Vec3> positions;
+  for (int index : nodes_of(lattice, selection.tets)) {
+    const LatticeNode node = node_at(lattice, index);
+    const Star star = star_of(grid, node);
+    int copies = 0;
+    for (StarMask todo = star.kept; todo != 0; ++copies) {
+      const StarMask group = first_group(node.kind, todo);
+      todo &= ~group;
+      for (StarMask rest = group; rest != 0; rest &= rest - 1) {
+        const int tet = star.tets[std::countr_zero(rest)];
+        for (int k = 0; k < 4; ++k)
+          if (lattice.tet_corner(tet, k) == node)
+            result.mesh.tets(row_from_tet[tet], k) = int(positions.size());
+      }
+      positions.push_back(lattice.position(node));
+    }
+    result.split_vertices += copies > 1;
+  }
+  result.mesh.positions.resize(Eigen::Index(positions.size()), 3);
+  for (std::size_t i = 0; i < positions.size(); ++i)
+    result.mesh.positions.row(Eigen::Index(i)) = positions[i];
+  return result;
+}
+
+}  // namespace limber::meshing::detail

@@ -1,0 +1,143 @@
+#include "meshing/detail/shrink_fit.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <span>
+
+#include "meshing/detail/tet_faces.h"
+
+namespace limber::meshing::detail {
+namespace {
+
+constexpr int max_passes = 10;     // more gained under 0.2 % of volume
+constexpr int tries_a_vertex = 2;  // passes without success after which a vertex rests
+
+// Cosines of the sharpest and the widest dihedral of a tet; {1, −1} when its volume is not positive.
+struct Cosines {
+  double sharpest, widest;
+};
+
+Cosines cosines(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& d) {
+  const Vec3 ab = b - a, ac = c - a, ad = d - a, bc = c - b, bd = d - b;
+  std::array<Vec3, 4> normal{bc.cross(bd), ad.cross(ac), ab.cross(ad), ac.cross(ab)};
+  if (!(normal[3].dot(ad) < 0)) return {1, -1};
+  for (Vec3& n : normal) n /= n.norm();
+  Cosines c_all{-1, 1};
+  for (int i = 0; i < 4; ++i)
+    for (int j = 0; j < i; ++j) {
+      const double cosine = -normal[i].dot(normal[j]);
+      c_all.sharpest = std::max(c_all.sharpest, cosine);
+      c_all.widest = std::min(c_all.widest, cosine);
+    }
+  return c_all;
+}
+
+class Fitter {
+ public:
+  Fitter(const SurfaceTree& surface, const FitLimits& limits, TetMesh& mesh)
+      : surface_(surface),
+        mesh_(mesh),
+        gap_(limits.gap_m),
+        // A hair inside the limits, so that whoever measures anew finds them kept whatever the rounding.
+        sharpest_(std::cos(limits.min_dihedral_deg * radians) - 1e-9),
+        widest_(std::cos(limits.max_dihedral_deg * radians) + 1e-9),
+        boundary_(boundary_triangles(mesh.tets)),
+        tets_(stars(mesh.tets, int(mesh.positions.rows()))),
+        triangles_(stars(boundary_, int(mesh.positions.rows()))),
+        failures_(std::size_t(mesh.positions.rows()), 0) {}
+
+  int run() {
+    int passes = 0;
+    for (bool moved = true; moved && passes < max_passes; ++passes) {
+      moved = false;
+      for (int v = 0; v < mesh_.positions.rows(); ++v) {
+        if (on_boundary(v))
+          moved = draw_in(v) || moved;
+        else
+          relax(v);
+      }
+    }
+    return passes;
+  }
+
+ private:
+  static constexpr double radians = std::numbers::pi / 180;
+
+  Vec3 at(int v) const { return mesh_.positions.row(v); }
+  std::span<const int> round(const Stars& s, int v) const {
+    return {s.things.data() + s.first[v], s.things.data() + s.first[v + 1]};
+  }
+  bool on_boundary(int v) const { return !round(triangles_, v).empty(); }
+
+  Cosines star_cosines(int v, const Vec3& p) const {
+    Cosines worst{-1, 1};
+    for (int t : round(tets_, v)) {
+      std::array<Vec3, 4> q;
+      for (int k = 0; k < 4; ++k) q[k] = mesh_.tets(t, k) == v ? p : at(mesh_.tets(t, k));
+      const Cosines c = cosines(q[0], q[1], q[2], q[3]);
+      worst.sharpest = std::max(worst.sharpest, c.sharpest), worst.widest = std::min(worst.widest, c.widest);
+      if (!keeps_limits(worst)) break;
+    }
+    return worst;
+  }
+  bool keeps_limits(const Cosines& c) const { return c.sharpest <= sharpest_ && c.widest >= widest_; }
+
+  bool may_move(int v, const Vec3& to) const {
+    if (!keeps_limits(star_cosines(v, to))) return false;
+    const Vec3 from = at(v);
+    for (int f : round(triangles_, v)) {
+      const int k = boundary_(f, 0) == v ? 0 : boundary_(f, 1) == v ? 1 : 2;
+      const Vec3 a = at(boundary_(f, (k + 1) % 3)), b = at(boundary_(f, (k + 2) % 3));
+      if (orientation(from, a, b, to) > 0) return false;
+      if (surface_.meets_tet(from, a, b, to)) return false;
+    }
+    return true;
+  }
+
+  bool draw_in(int v) {
+    if (failures_[v] >= tries_a_vertex) return false;
+    const Vec3 from = at(v), nearest = surface_.closest_point(from);
+    const double distance = (from - nearest).norm();
+    if (!(distance > 0)) return false;
+    const Vec3 step = (gap_ / distance - 1) * (from - nearest);
+    if (step.norm() < 0.05 * gap_) return false;
+    for (double share : {1.0, 0.5, 0.25, 0.1}) {
+      const Vec3 to = from + share * step;
+      if (!may_move(v, to)) continue;
+      mesh_.positions.row(v) = to;
+      failures_[v] = 0;
+      return true;
+    }
+    ++failures_[v];
+    return false;
+  }
+
+  // To the middle of its neighbours, unless that makes its worst tet worse.
+  void relax(int v) {
+    Vec3 sum = Vec3::Zero();
+    for (int t : round(tets_, v))
+      for (int k = 0; k < 4; ++k)
+        if (mesh_.tets(t, k) != v) sum += at(mesh_.tets(t, k));
+    const Vec3 middle = sum / (3 * double(round(tets_, v).size()));
+    const Cosines before = star_cosines(v, at(v)), after = star_cosines(v, middle);
+    if (std::max(after.sharpest, -after.widest) <= std::max(before.sharpest, -before.widest))
+      mesh_.positions.row(v) = middle;
+  }
+
+  const SurfaceTree& surface_;
+  TetMesh& mesh_;
+  double gap_, sharpest_, widest_;
+  Triangles boundary_;
+  Stars tets_, triangles_;
+  std::vector<int> failures_;
+};
+
+}  // namespace
+
+int shrink_fit(const SurfaceTree& surface, const FitLimits& limits, TetMesh& mesh) {
+  return Fitter(surface, limits, mesh).run();
+}
+
+}  // namespace limber::meshing::detail

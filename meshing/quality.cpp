@@ -1,0 +1,55 @@
+#include "meshing/quality.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+
+#include "meshing/detail/tet_faces.h"
+
+namespace limber::meshing {
+
+DihedralRange dihedral_range(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& d) {
+  const Vec3 ab = b - a, ac = c - a, ad = d - a, bc = c - b, bd = d - b;
+  const std::array<Vec3, 4> normal{bc.cross(bd), ad.cross(ac), ab.cross(ad), ac.cross(ab)};  // outwards
+  double min_cos = 1, max_cos = -1;
+  for (int i = 0; i < 4; ++i)
+    for (int j = 0; j < i; ++j) {
+      const double length = std::sqrt(normal[i].squaredNorm() * normal[j].squaredNorm());
+      if (!(length > 0)) return {0, 180};
+      const double cosine = std::clamp(-normal[i].dot(normal[j]) / length, -1.0, 1.0);
+      min_cos = std::min(min_cos, cosine), max_cos = std::max(max_cos, cosine);
+    }
+  constexpr double degrees = 180 / std::numbers::pi;
+  return {std::acos(max_cos) * degrees, std::acos(min_cos) * degrees};
+}
+
+TetQuality measure_quality(const TetMesh& mesh) {
+  TetQuality q;
+  q.tets = int(mesh.tets.rows());
+  q.vertices = int(mesh.positions.rows());
+  q.boundary_triangles = int(boundary_triangles(mesh.tets).rows());
+  const std::vector<int> lowest = detail::components(mesh.tets);
+  for (int t = 0; t < q.tets; ++t) q.components += lowest[t] == t;
+  q.volume_m3 = volume(mesh);
+  if (q.tets == 0) return q;
+  q.min_dihedral_deg = 180;
+  q.min_volume_m3 = 1e300;
+  std::vector<double> smallest;
+  for (int t = 0; t < q.tets; ++t) {
+    std::array<Vec3, 4> p;
+    for (int k = 0; k < 4; ++k) p[k] = mesh.positions.row(mesh.tets(t, k));
+    const DihedralRange range = dihedral_range(p[0], p[1], p[2], p[3]);
+    smallest.push_back(range.min_deg);
+    q.min_dihedral_deg = std::min(q.min_dihedral_deg, range.min_deg);
+    q.max_dihedral_deg = std::max(q.max_dihedral_deg, range.max_deg);
+    q.min_volume_m3 = std::min(q.min_volume_m3, signed_volume(p[0], p[1], p[2], p[3]));
+  }
+  q.share_under_5_deg =
+      double(std::count_if(smallest.begin(), smallest.end(), [](double x) { return x < 5; })) / q.tets;
+  std::nth_element(smallest.begin(), smallest.begin() + q.tets / 2, smallest.end());
+  q.median_min_dihedral_deg = smallest[q.tets / 2];
+  return q;
+}
+
+}  // namespace limber::meshing

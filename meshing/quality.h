@@ -1,0 +1,28 @@
+// Figures that say how good the tets of a mesh are.
+#pragma once
+
+#include "core/mesh.h"
+
+namespace limber::meshing {
+
+// Smallest and largest dihedral angle of a tet, degrees; 0 and 180 where a face has no area.
+struct DihedralRange {
+  double min_deg, max_deg;
+};
+DihedralRange dihedral_range(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& d);
+
+struct TetQuality {
+  int tets = 0;
+  int vertices = 0;
+  int boundary_triangles = 0;
+  int components = 0;           // of tets joined by faces
+  double min_dihedral_deg = 0;  // over all tets
+  double max_dihedral_deg = 0;
+  double median_min_dihedral_deg = 0;  // median over the tets of each one's smallest
+  double share_under_5_deg = 0;        // of tets whose smallest dihedral is below 5 degrees
+  double min_volume_m3 = 0;            // signed
+  double volume_m3 = 0;
+};
+TetQuality measure_quality(const TetMesh&);
+
+}  // namespace limber::meshing

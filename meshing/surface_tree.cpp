@@ -1,0 +1,260 @@
+#include "meshing/surface_tree.h"
+
+#include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+namespace limber::meshing {
+namespace {
+
+using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
+using ExactPoint = Kernel::Point_3;
+
+ExactPoint exact(const Vec3& p) { return {p.x(), p.y(), p.z()}; }
+
+bool disjoint(const Box& a, const Box& b) {
+  return (a.lower.array() > b.upper.array()).any() || (b.lower.array() > a.upper.array()).any();
+}
+
+template <std::size_t N>
+Box box_of(const std::array<Vec3, N>& corners) {
+  Box box;
+  for (const Vec3& p : corners) box.include(p);
+  return box;
+}
+
+// +1 or −1 when all are that, else 0.
+template <class... Signs>
+int common(int first, Signs... rest) {
+  return ((first == rest) && ...) ? first : 0;
+}
+
+using Tri = std::array<Vec3, 3>;
+using Tet = std::array<Vec3, 4>;
+
+// Two convex bodies are disjoint when a plane through an edge of one and a corner of the other, or through a
+// face, has one body on one side and the other beyond it. Every sign below is that of four corners, so no
+// plane is ever computed. In general position this finds all disjoint pairs; a pair that shares a plane may
+// go unproved.
+bool proved_disjoint(const Tet& tet, const Tri& tri) {
+  // side[i][m]: where tri[m] lies of the face opposite tet[i]; positive where tet[i] would be in a positive
+  // tet.
+  static constexpr int face[4][3] = {{1, 3, 2}, {0, 2, 3}, {0, 3, 1}, {0, 1, 2}};
+  const int own = orientation(tet[0], tet[1], tet[2], tet[3]);
+  int side[4][3];
+  for (int i = 0; i < 4; ++i) {
+    for (int m = 0; m < 3; ++m)
+      side[i][m] = orientation(tet[face[i][0]], tet[face[i][1]], tet[face[i][2]], tri[m]);
+    const int all = common(side[i][0], side[i][1], side[i][2]);
+    if (all != 0 && all != own) return true;
+  }
+  if (own != 0)
+    for (int m = 0; m < 3; ++m)
+      if (side[0][m] != -own && side[1][m] != -own && side[2][m] != -own && side[3][m] != -own) return false;
+  const auto of_tri_plane = [&](int i) { return orientation(tri[0], tri[1], tri[2], tet[i]); };
+  const int beyond[4] = {of_tri_plane(0), of_tri_plane(1), of_tri_plane(2), of_tri_plane(3)};
+  if (common(beyond[0], beyond[1], beyond[2], beyond[3]) != 0) return true;
+
+  // mixed[e][m]: the edge e of the tet with the edge of the triangle opposite tri[m].
+  static constexpr int edge[6][4] = {{0, 1, 2, 3}, {0, 2, 3, 1}, {0, 3, 1, 2},
+                                     {1, 2, 0, 3}, {1, 3, 2, 0}, {2, 3, 0, 1}};
+  int mixed[6][3];
+  for (int e = 0; e < 6; ++e)
+    for (int m = 0; m < 3; ++m)
+      mixed[e][m] = orientation(tet[edge[e][0]], tet[edge[e][1]], tri[(m + 1) % 3], tri[(m + 2) % 3]);
+
+  // Sign of (p q r x) for an edge pq of the tet and its corner x, from the face sides above.
+  const auto tet_corner = [&](int p, int q, int r, int x) {
+    const int i = 6 - p - q - x;  // the corner that is not in the face p q x
+    // face[i] is some rotation or reflection of (p, x, q), and (p q r x) has the sign of (p x q r).
+    for (int k = 0; k < 3; ++k)
+      if (face[i][k] == p) return face[i][(k + 1) % 3] == x ? side[i][r] : -side[i][r];
+    return 0;
+  };
+  for (int e = 0; e < 6; ++e) {
+    const auto [p, q, x, y] = std::array{edge[e][0], edge[e][1], edge[e][2], edge[e][3]};
+    for (int r = 0; r < 3; ++r) {
+      const int tri_side = common(mixed[e][(r + 2) % 3], -mixed[e][(r + 1) % 3]);
+      if (tri_side != 0 && common(tet_corner(p, q, r, x), tet_corner(p, q, r, y)) == -tri_side) return true;
+    }
+  }
+  for (int m = 0; m < 3; ++m) {    // the edge of the triangle opposite tri[m]
+    for (int p = 0; p < 4; ++p) {  // and a corner of the tet
+      // (s t p tri[m]) = −(s t tri[m] p) = −(tri[m] s t p)
+      const int tri_side = -beyond[p];
+      if (tri_side == 0) continue;
+      bool separates = true;
+      for (int e = 0; e < 6 && separates; ++e) {
+        // (s t p x) = (p x s t)
+        if (edge[e][0] == p) separates = mixed[e][m] == -tri_side;
+        if (edge[e][1] == p) separates = mixed[e][m] == tri_side;
+      }
+      if (separates) return true;
+    }
+  }
+  return false;
+}
+
+bool flat(const Tri& t) { return CGAL::collinear(exact(t[0]), exact(t[1]), exact(t[2])); }
+
+// Exact; at least one of the two is not flat.
+bool triangles_meet(const Tri& a, const Tri& b) {
+  const auto side_of = [](const Tri& plane, const Tri& t) {
+    return common(orientation(plane[0], plane[1], plane[2], t[0]),
+                  orientation(plane[0], plane[1], plane[2], t[1]),
+                  orientation(plane[0], plane[1], plane[2], t[2]));
+  };
+  if (side_of(a, b) != 0 || side_of(b, a) != 0) return false;
+  const bool b_flat = flat(b);
+  const Tri& full = b_flat ? a : b;
+  const Tri& other = b_flat ? b : a;
+  const Kernel::Triangle_3 triangle(exact(full[0]), exact(full[1]), exact(full[2]));
+  if (!b_flat && !flat(other))
+    return CGAL::do_intersect(triangle, Kernel::Triangle_3(exact(a[0]), exact(a[1]), exact(a[2])));
+  Tri sorted = other;
+  std::sort(sorted.begin(), sorted.end(), [](const Vec3& p, const Vec3& q) {
+    return std::lexicographical_compare(p.begin(), p.end(), q.begin(), q.end());
+  });
+  if (sorted[0] == sorted[2]) return triangle.has_on(exact(sorted[0]));
+  return CGAL::do_intersect(triangle, Kernel::Segment_3(exact(sorted[0]), exact(sorted[2])));
+}
+
+Vec3 closest_on_segment(const Vec3& a, const Vec3& b, const Vec3& p) {
+  const Vec3 ab = b - a;
+  const double length = ab.squaredNorm();
+  return length > 0 ? Vec3(a + std::clamp((p - a).dot(ab) / length, 0.0, 1.0) * ab) : a;
+}
+
+Vec3 closest_on_triangle(const Tri& t, const Vec3& p) {
+  const Vec3 u = t[1] - t[0], v = t[2] - t[0], w = p - t[0];
+  const Vec3 n = u.cross(v);
+  const double area = n.squaredNorm();
+  if (area > 0) {
+    const double beta = w.cross(v).dot(n) / area, gamma = u.cross(w).dot(n) / area;
+    if (beta >= 0 && gamma >= 0 && beta + gamma <= 1) return t[0] + beta * u + gamma * v;
+  }
+  Vec3 best = closest_on_segment(t[0], t[1], p);
+  for (const Vec3& q : {closest_on_segment(t[1], t[2], p), closest_on_segment(t[2], t[0], p)})
+    if ((q - p).squaredNorm() < (best - p).squaredNorm()) best = q;
+  return best;
+}
+
+std::vector<Box> boxes_of(const Points& positions, const Triangles& triangles) {
+  std::vector<Box> boxes(triangles.rows());
+  for (int f = 0; f < triangles.rows(); ++f)
+    for (int k = 0; k < 3; ++k) boxes[f].include(Vec3(positions.row(triangles(f, k))));
+  return boxes;
+}
+
+Tri corners(const Points& positions, const Triangles& triangles, int f) {
+  return {positions.row(triangles(f, 0)), positions.row(triangles(f, 1)), positions.row(triangles(f, 2))};
+}
+
+// Rejects boxes that lie beyond one of the tet's faces; a rounding margin keeps it from rejecting too much.
+struct TetRejects {
+  Box box;
+  std::array<Vec3, 4> normal;      // outwards
+  std::array<double, 4> farthest;  // n·x of the face, plus the margin
+
+  explicit TetRejects(const Tet& t) : box(box_of(t)) {
+    static constexpr int face[4][3] = {{1, 3, 2}, {0, 2, 3}, {0, 3, 1}, {0, 1, 2}};
+    const double size = box.lower.cwiseAbs().cwiseMax(box.upper.cwiseAbs()).maxCoeff();
+    for (int i = 0; i < 4; ++i) {
+      const Vec3& a = t[face[i][0]];
+      Vec3 n = (t[face[i][1]] - a).cross(t[face[i][2]] - a);
+      if (n.dot(t[i] - a) > 0) n = -n;
+      normal[i] = n;
+      farthest[i] =
+          std::max({n.dot(t[0]), n.dot(t[1]), n.dot(t[2]), n.dot(t[3])}) + 1e-13 * n.cwiseAbs().sum() * size;
+    }
+  }
+  bool operator()(const Box& other) const {
+    if (disjoint(box, other)) return true;
+    for (int i = 0; i < 4; ++i) {
+      const Vec3& n = normal[i];
+      const double nearest = n.x() * (n.x() > 0 ? other.lower.x() : other.upper.x()) +
+                             n.y() * (n.y() > 0 ? other.lower.y() : other.upper.y()) +
+                             n.z() * (n.z() > 0 ? other.lower.z() : other.upper.z());
+      if (nearest > farthest[i]) return true;
+    }
+    return false;
+  }
+};
+
+}  // namespace
+
+int orientation(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& d) {
+  const double ax = a.x() - d.x(), ay = a.y() - d.y(), az = a.z() - d.z();
+  const double bx = b.x() - d.x(), by = b.y() - d.y(), bz = b.z() - d.z();
+  const double cx = c.x() - d.x(), cy = c.y() - d.y(), cz = c.z() - d.z();
+  const double bxcy = bx * cy, cxby = cx * by, cxay = cx * ay, axcy = ax * cy, axby = ax * by, bxay = bx * ay;
+  const double det = az * (bxcy - cxby) + bz * (cxay - axcy) + cz * (axby - bxay);
+  const double size = (std::abs(bxcy) + std::abs(cxby)) * std::abs(az) +
+                      (std::abs(cxay) + std::abs(axcy)) * std::abs(bz) +
+                      (std::abs(axby) + std::abs(bxay)) * std::abs(cz);
+  // Shewchuk 1997, bound A of orient3d; below it, and where products underflow, CGAL decides.
+  const double bound = 7.7715611723761027e-16 * size;
+  if (size > 1e-280) {
+    if (det > bound) return -1;
+    if (det < -bound) return 1;
+  }
+  return int(CGAL::orientation(exact(a), exact(b), exact(c), exact(d)));
+}
+
+bool tet_holds(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& d, const Vec3& p) {
+  return orientation(a, b, c, p) >= 0 && orientation(a, c, d, p) >= 0 && orientation(a, d, b, p) >= 0 &&
+         orientation(b, d, c, p) >= 0;
+}
+
+SurfaceTree::SurfaceTree(const Points& positions, const Triangles& triangles)
+    : positions_(positions), triangles_(triangles), boxes_(boxes_of(positions, triangles)), tree_(boxes_) {}
+
+bool SurfaceTree::meets_triangle(const Vec3& a, const Vec3& b, const Vec3& c) const {
+  const Tri query{a, b, c};
+  const Box box = box_of(query);
+  return tree_.any([&](const Box& other) { return disjoint(box, other); },
+                   [&](int f) {
+                     return !disjoint(box, boxes_[f]) &&
+                            triangles_meet(query, corners(positions_, triangles_, f));
+                   });
+}
+
+bool SurfaceTree::meets_tet(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& d) const {
+  const Tet query{a, b, c, d};
+  const TetRejects rejects(query);
+  return tree_.any(rejects, [&](int f) {
+    return !rejects(boxes_[f]) && !proved_disjoint(query, corners(positions_, triangles_, f));
+  });
+}
+
+std::vector<int> SurfaceTree::triangles_meeting_tet(const Vec3& a, const Vec3& b, const Vec3& c,
+                                                    const Vec3& d) const {
+  const Tet query{a, b, c, d};
+  const TetRejects rejects(query);
+  std::vector<int> found;
+  tree_.any(rejects, [&](int f) {
+    if (!rejects(boxes_[f]) && !proved_disjoint(query, corners(positions_, triangles_, f)))
+      found.push_back(f);
+    return false;
+  });
+  std::sort(found.begin(), found.end());
+  return found;
+}
+
+Vec3 SurfaceTree::closest_point(const Vec3& p) const {
+  Vec3 best = Vec3::Zero();
+  double best_distance = 1e300;
+  tree_.nearest(p, [&](int f) {
+    const Vec3 q = closest_on_triangle(corners(positions_, triangles_, f), p);
+    const double distance = (q - p).squaredNorm();
+    const bool tie_won = distance == best_distance &&
+                         std::lexicographical_compare(q.begin(), q.end(), best.begin(), best.end());
+    if (distance < best_distance || tie_won) best_distance = distance, best = q;
+    return best_distance * (1 + 1e-9) + 1e-300;  // the slack visits every tie, whatever the rounding of a box
+  });
+  return best;
+}
+
+}  // namespace limber::meshing

@@ -1,0 +1,38 @@
+// A triangle soup, and questions to it that are answered without rounding: triangles may be flat, doubled, or
+// cross one another. Touching counts as meeting. Method: docs/cage.md.
+#pragma once
+
+#include <vector>
+
+#include "meshing/detail/box_tree.h"
+
+namespace limber::meshing {
+
+// The sign of (b−a)×(c−a)·(d−a), exact.
+int orientation(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& d);
+
+// Whether p lies in the closed tet (a b c d), whose volume is positive; exact.
+bool tet_holds(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& d, const Vec3& p);
+
+class SurfaceTree {
+ public:
+  SurfaceTree(const Points& positions, const Triangles& triangles);  // keeps copies
+
+  // Exact, unless both (a b c) and a triangle of the soup are flat.
+  bool meets_triangle(const Vec3& a, const Vec3& b, const Vec3& c) const;
+  // The solid tet, of any orientation. Never misses a meeting; says so too of some flat tets that meet
+  // nothing, and of pairs that lie within one plane.
+  bool meets_tet(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& d) const;
+  // Ascending.
+  std::vector<int> triangles_meeting_tet(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& d) const;
+  // The same for any order of the triangles: among equally near points the lexicographically least.
+  Vec3 closest_point(const Vec3& p) const;
+
+ private:
+  Points positions_;
+  Triangles triangles_;
+  std::vector<Box> boxes_;
+  detail::BoxTree tree_;
+};
+
+}  // namespace limber::meshing
