@@ -1,0 +1,683 @@
+#include "scenes/detail/schema.h"
+
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace limber::scenes {
+
+namespace {
+
+constexpr double huge = 1e9;  // a larger number than this is a slip in any unit used here
+
+constexpr Interval any{-huge, huge};
+constexpr Interval at_least_zero{0, huge};
+constexpr Interval positive{0, huge, true};
+constexpr Interval share{0, 1};
+
+constexpr Interval from_to(double lower, double upper) { return {lower, upper}; }
+
+// The scene file, from top to bottom.
+constexpr Key all_keys[] = {
+    {"name", Type::name, {}, 0, required, "what the scene is called", "", ""},
+    {"description", Type::text, {}, 0, "\"\"", "one line that `limber scenes` shows", "", ""},
+
+    {"world", Type::table, {}, 0, required, "the space in which all happens", "", ""},
+    {"world.bounds_m", Type::box, any, 0, required, "m; lower and upper corner", "", ""},
+    {"world.walls", Type::boolean, {}, 0, "true", "the bounds are closed by rigid walls", "", ""},
+    {"world.gravity_m_s2", Type::vector, from_to(-1000, 1000), 3, "[0, 0, 0]", "m/s²", "", ""},
+    {"world.max_dt_s",
+     Type::number,
+     {0, 1, true},
+     0,
+     may_lack,
+     "s; lowers the time step that is otherwise found from the bodies; it never raises it",
+     "",
+     ""},
+
+    {"bodies",
+     Type::tables,
+     {},
+     0,
+     required,
+     "one `[[bodies]]` for each thing; exactly one is the robot",
+     "",
+     ""},
+    {"bodies[].name",
+     Type::name,
+     {},
+     0,
+     required,
+     "names its folder and `--set bodies.NAME.key=value`",
+     "",
+     ""},
+    {"bodies[].role",
+     Type::choice,
+     {},
+     0,
+     required,
+     "the robot is moved by forces, obstacles and free bodies only by contact and gravity",
+     "robot, obstacle, free",
+     ""},
+    {"bodies[].kind",
+     Type::choice,
+     {},
+     0,
+     "\"deformable\"",
+     "a rigid body is an obstacle and does not move",
+     "deformable, rigid",
+     ""},
+    {"bodies[].color",
+     Type::color,
+     {},
+     0,
+     may_lack,
+     "`\"#rrggbb\"`; else robot #c0392b, obstacle #3f7cac, free #e0a030",
+     "",
+     ""},
+
+    {"bodies[].model",
+     Type::table,
+     {},
+     0,
+     required,
+     "what is seen: exactly one of file, made, box, plate, sphere",
+     "",
+     ""},
+    {"bodies[].model.file",
+     Type::text,
+     {},
+     0,
+     may_lack,
+     "a model file, looked for beside the scene and in the cache of models",
+     "",
+     ""},
+    {"bodies[].model.made",
+     Type::choice,
+     {},
+     0,
+     may_lack,
+     "a model that limber makes; beside `file`: used where the file cannot be had",
+     "bunny",
+     ""},
+    {"bodies[].model.scale", Type::number, positive, 0, may_lack,
+     "m a file unit; with file; 1 when not given", "", ""},
+    {"bodies[].model.height_m", Type::number, positive, 0, may_lack,
+     "m; with file (instead of scale) or made: the model is scaled to be this high; made alone: 1 when not "
+     "given",
+     "", ""},
+    {"bodies[].model.up",
+     Type::choice,
+     {},
+     0,
+     may_lack,
+     "with file: its axis that points up; +z when not given",
+     "+x, -x, +y, -y, +z, -z",
+     ""},
+    {"bodies[].model.front",
+     Type::choice,
+     {},
+     0,
+     may_lack,
+     "with file: its axis that is turned to our +x; +x when not given",
+     "+x, -x, +y, -y, +z, -z",
+     ""},
+    {"bodies[].model.box", Type::table, {}, 0, may_lack, "a box", "", ""},
+    {"bodies[].model.box.size_m", Type::vector, positive, 3, required, "m; along x, y, z", "", ""},
+    {"bodies[].model.box.bevel_m", Type::number, at_least_zero, 0, "0.0",
+     "m; radius of the rounded edges, at most half the smallest size", "", ""},
+    {"bodies[].model.box.triangle_m", Type::number, positive, 0, may_lack,
+     "m; longest edge of a triangle on a flat face; a 32nd of the largest size when not given", "", ""},
+    {"bodies[].model.plate",
+     Type::table,
+     {},
+     0,
+     may_lack,
+     "a box with a hole along its thinnest axis",
+     "",
+     ""},
+    {"bodies[].model.plate.size_m", Type::vector, positive, 3, required, "m; along x, y, z", "", ""},
+    {"bodies[].model.plate.bevel_m", Type::number, at_least_zero, 0, "0.0",
+     "m; radius of the rounded edges, also of the hole's", "", ""},
+    {"bodies[].model.plate.triangle_m", Type::number, positive, 0, may_lack, "m; as of a box", "", ""},
+    {"bodies[].model.plate.hole", Type::table, {}, 0, may_lack, "the hole; none when not given", "", ""},
+    {"bodies[].model.plate.hole.shape", Type::choice, {}, 0, "\"round\"", "", "round, square", ""},
+    {"bodies[].model.plate.hole.size_m", Type::number, positive, 0, required,
+     "m; diameter, or side of the square", "", ""},
+    {"bodies[].model.plate.hole.center_m", Type::vector, any, 2, "[0, 0]",
+     "m; from the plate's middle, along its two longer axes in the order x, y, z", "", ""},
+    {"bodies[].model.sphere", Type::table, {}, 0, may_lack, "a sphere", "", ""},
+    {"bodies[].model.sphere.diameter_m", Type::number, positive, 0, required, "m", "", ""},
+    {"bodies[].model.sphere.triangle_m", Type::number, positive, 0, may_lack,
+     "m; longest edge of a triangle; a 32nd of the diameter when not given", "", ""},
+
+    {"bodies[].cage",
+     Type::table,
+     {},
+     0,
+     required,
+     "the coarse tets that are simulated: either tets or cells",
+     "",
+     ""},
+    {"bodies[].cage.tets", Type::integer, from_to(5, 1'000'000), 0, may_lack,
+     "budget of a cage made round the model", "", ""},
+    {"bodies[].cage.cells", Type::integers, from_to(1, 200), 3, may_lack,
+     "boxes, and plates without a hole: cells along x, y, z, five tets each", "", ""},
+    {"bodies[].cage.mode",
+     Type::choice,
+     {},
+     0,
+     "\"lattice\"",
+     "with tets: how the cage is made (docs/cage.md)",
+     "lattice, fast, paper",
+     ""},
+    {"bodies[].cage.shells", Type::integer, from_to(1, 1000), 0, "32",
+     "with tets: at most so many convex shells (docs/decomposition.md)", "", ""},
+
+    {"bodies[].material", Type::table, {}, 0, may_lack, "required for deformable bodies", "", ""},
+    {"bodies[].material.youngs_modulus_pa",
+     Type::number,
+     {0, 1e12, true},
+     0,
+     required,
+     "Pa; stiffness",
+     "",
+     ""},
+    {"bodies[].material.poisson_ratio", Type::number, from_to(0.25, 0.495), 0, "0.45",
+     "near 0.5: keeps its volume", "", ""},
+    {"bodies[].material.density_kg_m3", Type::number, {0, 1e5, true}, 0, required, "kg/m³", "", ""},
+    {"bodies[].material.damping_ratio", Type::number, share, 0, "0.05",
+     "share of the critical damping of the body's slowest stretching", "", ""},
+    {"bodies[].material.friction", Type::number, from_to(0, 2), 0, "0.2",
+     "Coulomb's; a pair of bodies has the geometric mean", "", ""},
+
+    {"bodies[].pose", Type::table, {}, 0, "{}", "where the body is at the start", "", ""},
+    {"bodies[].pose.position_m", Type::vector, any, 3, "[0, 0, 0]", "m; where the anchor goes", "", ""},
+    {"bodies[].pose.anchor",
+     Type::choice,
+     {},
+     0,
+     "\"origin\"",
+     "the model's own origin (made models: their middle), the middle of its bounding box, or the middle of "
+     "the lower "
+     "face of that box",
+     "origin, center, bottom",
+     ""},
+    {"bodies[].pose.axis", Type::vector, any, 3, "[0, 0, 1]", "of the turn, of any length but 0", "", ""},
+    {"bodies[].pose.angle_deg", Type::number, from_to(-360, 360), 0, "0.0",
+     "degrees; turn about that axis through the model's origin", "", ""},
+
+    {"bodies[].fixed",
+     Type::fixed,
+     {},
+     0,
+     "[]",
+     "cage nodes that are held: `\"walls\"` (those on a wall of the bounds), or a list of `\"walls\"` and "
+     "boxes "
+     "`{ box_m = [[…], […]] }`",
+     "",
+     ""},
+    {"bodies[].fixed[].box_m", Type::region, any, 0, required,
+     "m; in world coordinates; holds all nodes inside it", "", ""},
+
+    {"goal",
+     Type::table,
+     {},
+     0,
+     required,
+     "reached when the robot's centre of mass is within radius_m",
+     "",
+     ""},
+    {"goal.center_of_mass_m", Type::vector, any, 3, required, "m; within the bounds", "", ""},
+    {"goal.radius_m", Type::number, positive, 0, required, "m; half the robot's radius is usual", "", ""},
+
+    {"planner", Type::table, {}, 0, required, "how the motion is searched", "", ""},
+    {"planner.preset",
+     Type::choice,
+     {},
+     0,
+     "\"paper\"",
+     "paper: the search of Rodriguez, Lien and Amato (ICRA 2006); fast: what we found to be better",
+     "paper, fast",
+     ""},
+    {"planner.seed", Type::integer, from_to(0, 1e9), 0, "1", "of all random numbers", "", ""},
+    {"planner.iterations", Type::integer, from_to(1, 1e7), 0, "1000", "gives up after so many expansions", "",
+     ""},
+    {"planner.goal_bias", Type::number, share, 0, "0.1", "share of the expansions that aim at the goal", "",
+     ""},
+    {"planner.weights",
+     Type::table,
+     {},
+     0,
+     "{}",
+     "how often each manipulation is chosen; at least one is > 0",
+     "",
+     ""},
+    {"planner.weights.body", Type::number, at_least_zero, 0, "0.6", "a force on the whole robot", "", ""},
+    {"planner.weights.control_point", Type::number, at_least_zero, 0, "0.3",
+     "the same force a volume, only round a random node: turns the robot", "", ""},
+    {"planner.weights.interpolation", Type::number, at_least_zero, 0, "0.1",
+     "every node towards its place at the goal; only when aiming at the goal", "", ""},
+    {"planner.max_force_n", Type::number, positive, 0, required, "N; on the whole robot", "", ""},
+    {"planner.force_share", Type::range, share, 0, "[0.0, 1.0]",
+     "of max_force_n; each force is drawn evenly between the two", "", "[0.8, 1.0]"},
+    {"planner.duration_s",
+     Type::range,
+     {0, 100, true},
+     0,
+     "[0.2, 1.0]",
+     "s; a manipulation is held for a time drawn evenly between the two",
+     "",
+     "[0.2, 3.0]"},
+    {"planner.control_point_radius_m", Type::number, positive, 0, "0.25",
+     "m; round the node, in the rest shape", "", ""},
+    {"planner.settle_time_s", Type::number, from_to(0, 100), 0, "3.0",
+     "s; at the goal the robot is given at most so long to come to rest", "", ""},
+    {"planner.settle_speed_m_s", Type::number, positive, 0, "0.02",
+     "m/s; mean speed below which it is at rest", "", ""},
+    {"planner.settle_force_share", Type::number, share, 0, "1.0",
+     "of max_force_n; the largest force while it comes to rest", "", ""},
+
+    {"camera", Type::table, {}, 0, "{}", "framed automatically unless there are keyframes", "", ""},
+    {"camera.direction", Type::vector, any, 3, "[-0.35, -1.0, 0.45]",
+     "from the scene to the camera, of any length but 0", "", ""},
+    {"camera.fov_deg", Type::number, from_to(1, 120), 0, "30.0", "degrees; vertical opening", "", ""},
+    {"camera.keyframes", Type::tables, {}, 0, "[]", "the camera moves smoothly from one to the next", "", ""},
+    {"camera.keyframes[].at", Type::number, share, 0, required, "share of the film; ascending", "", ""},
+    {"camera.keyframes[].eye_m", Type::vector, any, 3, required, "m; where the camera is", "", ""},
+    {"camera.keyframes[].target_m", Type::vector, any, 3, required, "m; what it looks at", "", ""},
+
+    {"film", Type::table, {}, 0, "{}", "what is rendered", "", ""},
+    {"film.size_px", Type::integers, from_to(16, 16384), 2, "[1920, 1080]", "pixels; width and height", "",
+     ""},
+    {"film.frames_per_second", Type::integer, from_to(1, 1000), 0, "30",
+     "also of the states that a plan stores", "", ""},
+    {"film.background", Type::color, {}, 0, "\"#eceff3\"", "`\"#rrggbb\"`", "", ""},
+    {"film.bounds_lines",
+     Type::boolean,
+     {},
+     0,
+     "true",
+     "draw the edges of the bounds as thin pale lines",
+     "",
+     ""},
+    {"film.sheet", Type::integers, from_to(1, 20), 2, "[4, 3]", "columns and rows of the contact sheet", "",
+     ""},
+};
+
+[[noreturn]] void complain(const Where& where, const std::string& what) {
+  throw InputError(fmt::format("{}: {}", where.text(), what));
+}
+
+[[noreturn]] void complain_of_type(const Key& key, const std::string& shown, const Node& node) {
+  complain(node.where, fmt::format("{} must be {}, not {}; write for example {}", shown, key.expected(),
+                                   node.type_name(), key.example()));
+}
+
+double checked_number(const Key& key, const std::string& shown, const Node& node) {
+  double x = 0;
+  if (const auto* integer = std::get_if<std::int64_t>(&node.value))
+    x = double(*integer);
+  else if (const auto* number = std::get_if<double>(&node.value))
+    x = *number;
+  else
+    complain_of_type(key, shown, node);
+  if (!std::isfinite(x)) complain(node.where, fmt::format("{} is {}; write a finite number", shown, x));
+  if (!key.interval.holds(x))
+    complain(node.where, fmt::format("{} is {}, out of its range; it must be {}", shown, x,
+                                     std::abs(x) > huge ? fmt::format("between {} and {}", -huge, huge)
+                                                        : key.interval.text()));
+  if ((key.type == Type::integer || key.type == Type::integers) && x != std::floor(x))
+    complain(node.where, fmt::format("{} is {}; it must be a whole number", shown, x));
+  return x;
+}
+
+const Array& checked_list(const Key& key, const std::string& shown, const Node& node, std::size_t count) {
+  const Array* elements = node.array();
+  if (!elements) complain_of_type(key, shown, node);
+  if (elements->size() != count)
+    complain(node.where, fmt::format("{} has {} elements; it must be {}, for example {}", shown,
+                                     elements->size(), key.expected(), key.example()));
+  return *elements;
+}
+
+std::vector<double> checked_numbers(const Key& key, const std::string& shown, const Node& node,
+                                    std::size_t count) {
+  std::vector<double> numbers;
+  for (const Node& element : checked_list(key, shown, node, count))
+    numbers.push_back(checked_number(key, fmt::format("{}[{}]", shown, numbers.size()), element));
+  return numbers;
+}
+
+const std::string& checked_text(const Key& key, const std::string& shown, const Node& node) {
+  const auto* text = std::get_if<std::string>(&node.value);
+  if (!text) complain_of_type(key, shown, node);
+  return *text;
+}
+
+std::vector<std::string> split_choices(std::string_view choices) {
+  std::vector<std::string> made;
+  while (!choices.empty()) {
+    const auto comma = std::min(choices.find(", "), choices.size());
+    made.emplace_back(choices.substr(0, comma));
+    choices.remove_prefix(std::min(choices.size(), comma + 2));
+  }
+  return made;
+}
+
+void check_table(Node& node, const std::string& path, const std::string& shown);
+
+void check_choice(const Key& key, const std::string& shown, const Node& node) {
+  const std::string& text = checked_text(key, shown, node);
+  const auto choices = split_choices(key.choices);
+  if (std::find(choices.begin(), choices.end(), text) != choices.end()) return;
+  const std::string meant = nearest(text, choices);
+  complain(node.where, fmt::format("{} is \"{}\"; it must be {}{}", shown, text, key.expected(),
+                                   meant.empty() ? "" : fmt::format("; did you mean \"{}\"?", meant)));
+}
+
+void check_name(const Key& key, const std::string& shown, const Node& node) {
+  const std::string& text = checked_text(key, shown, node);
+  const auto allowed = [](unsigned char c) { return std::isalnum(c) || c == '_' || c == '-'; };
+  if (text.empty() || text.size() > 64 || !std::all_of(text.begin(), text.end(), allowed))
+    complain(node.where,
+             fmt::format("{} is \"{}\"; use 1 to 64 letters, digits, _ and - (it becomes a file name)", shown,
+                         text));
+}
+
+void check_color(const Key& key, const std::string& shown, const Node& node) {
+  const std::string& text = checked_text(key, shown, node);
+  const auto hexadecimal = [](unsigned char c) { return std::isxdigit(c) != 0; };
+  if (text.size() != 7 || text[0] != '#' || !std::all_of(text.begin() + 1, text.end(), hexadecimal))
+    complain(node.where,
+             fmt::format("{} is \"{}\"; write \"#rrggbb\" with hexadecimal digits, for example {}", shown,
+                         text, key.example()));
+}
+
+void check_box(const Key& key, const std::string& shown, const Node& node) {
+  const Array& corners = checked_list(key, shown, node, 2);
+  const auto lower = checked_numbers(key, shown + "[0]", corners[0], 3);
+  const auto upper = checked_numbers(key, shown + "[1]", corners[1], 3);
+  for (std::size_t i = 0; i < 3; ++i)
+    if (key.type == Type::region ? lower[i] > upper[i] : lower[i] >= upper[i])
+      complain(
+          corners[1].where,
+          fmt::format("{} has upper {} = {}, which is not above lower {} = {}; write the lower corner first",
+                      shown, "xyz"[i], upper[i], "xyz"[i], lower[i]));
+}
+
+void check_fixed(const Key& key, const std::string& shown, Node& node) {
+  const auto is_walls = [](const Node& n) {
+    const auto* text = std::get_if<std::string>(&n.value);
+    return text && *text == "walls";
+  };
+  if (is_walls(node)) return;
+  auto* elements = std::get_if<Array>(&node.value);
+  if (!elements) complain_of_type(key, shown, node);
+  for (std::size_t i = 0; i < elements->size(); ++i) {
+    Node& element = (*elements)[i];
+    if (is_walls(element)) continue;
+    const std::string element_shown = fmt::format("{}[{}]", shown, i);
+    if (!element.table()) complain_of_type(key, element_shown, element);
+    check_table(element, "bodies[].fixed[]", element_shown);
+  }
+}
+
+// "bodies.robot" for the body of that name, else "bodies[2]".
+std::string shown_element(const std::string& shown, std::size_t i, const Node& element) {
+  const Node* name = element.find("name");
+  const auto* text = name ? std::get_if<std::string>(&name->value) : nullptr;
+  return text && !text->empty() ? fmt::format("{}.{}", shown, *text) : fmt::format("{}[{}]", shown, i);
+}
+
+void check_value(const Key& key, const std::string& shown, Node& node) {
+  switch (key.type) {
+    case Type::text:
+      checked_text(key, shown, node);
+      return;
+    case Type::name:
+      return check_name(key, shown, node);
+    case Type::choice:
+      return check_choice(key, shown, node);
+    case Type::number:
+    case Type::integer:
+      checked_number(key, shown, node);
+      return;
+    case Type::boolean:
+      if (!std::holds_alternative<bool>(node.value)) complain_of_type(key, shown, node);
+      return;
+    case Type::vector:
+    case Type::integers:
+      checked_numbers(key, shown, node, std::size_t(key.count));
+      return;
+    case Type::range: {
+      const auto ends = checked_numbers(key, shown, node, 2);
+      if (ends[0] > ends[1])
+        complain(node.where,
+                 fmt::format("{} runs from {} to {}; write the smaller one first", shown, ends[0], ends[1]));
+      return;
+    }
+    case Type::box:
+    case Type::region:
+      return check_box(key, shown, node);
+    case Type::color:
+      return check_color(key, shown, node);
+    case Type::fixed:
+      return check_fixed(key, shown, node);
+    case Type::table:
+      if (!node.table()) complain_of_type(key, shown, node);
+      return check_table(node, std::string(key.path), shown);
+    case Type::tables: {
+      auto* elements = std::get_if<Array>(&node.value);
+      if (!elements) complain_of_type(key, shown, node);
+      for (std::size_t i = 0; i < elements->size(); ++i) {
+        Node& element = (*elements)[i];
+        if (!element.table()) complain_of_type(key, fmt::format("{}[{}]", shown, i), element);
+        check_table(element, std::string(key.path) + "[]", shown_element(shown, i, element));
+      }
+      return;
+    }
+  }
+}
+
+bool fast_preset(const Node& planner) {
+  const Node* preset = planner.find("preset");
+  const auto* text = preset ? std::get_if<std::string>(&preset->value) : nullptr;
+  return text && *text == "fast";
+}
+
+Node fallback_of(const Key& key, const Node& parent) {
+  const bool fast = !key.fast.empty() && fast_preset(parent);
+  Node node = parse_set_value(std::string(fast ? key.fast : key.fallback), parent.where.source);
+  node.where = parent.where;
+  return node;
+}
+
+void check_table(Node& node, const std::string& path, const std::string& shown) {
+  const auto known = keys_in(path);
+  const std::string prefix = shown.empty() ? "" : shown + ".";
+  for (Entry& entry : std::get<Table>(node.value)) {
+    const auto at =
+        std::find_if(known.begin(), known.end(), [&](const Key* k) { return k->name() == entry.key; });
+    if (at == known.end())
+      complain(entry.where, fmt::format("unknown key \"{}\"{}; {}", entry.key,
+                                        shown.empty() ? std::string() : fmt::format(" in {}", shown),
+                                        suggestion(path, entry.key)));
+    check_value(**at, prefix + entry.key, entry.value);
+  }
+  for (const Key* key : known) {
+    if (node.find(key->name()) || key->fallback == may_lack) continue;
+    if (key->fallback == required)
+      complain(node.where, fmt::format("{} lacks \"{}\" ({}); add {}", shown.empty() ? "the scene" : shown,
+                                       key->name(), key->meaning, key->example()));
+    Entry added{std::string(key->name()), node.where, fallback_of(*key, node)};
+    check_value(*key, prefix + added.key, added.value);
+    std::get<Table>(node.value).push_back(std::move(added));
+  }
+}
+
+// Edits that turn a into b: insert, delete, replace, swap two neighbours.
+std::size_t edit_distance(std::string_view a, std::string_view b) {
+  std::vector<std::vector<std::size_t>> d(a.size() + 1, std::vector<std::size_t>(b.size() + 1));
+  for (std::size_t i = 0; i <= a.size(); ++i)
+    for (std::size_t j = 0; j <= b.size(); ++j) {
+      if (i == 0 || j == 0) {
+        d[i][j] = i + j;
+        continue;
+      }
+      d[i][j] = std::min({d[i - 1][j] + 1, d[i][j - 1] + 1, d[i - 1][j - 1] + (a[i - 1] != b[j - 1])});
+      if (i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1])
+        d[i][j] = std::min(d[i][j], d[i - 2][j - 2] + 1);
+    }
+  return d[a.size()][b.size()];
+}
+
+}  // namespace
+
+bool Interval::holds(double x) const {
+  return (above_lower ? x > lower : x >= lower) && (below_upper ? x < upper : x <= upper);
+}
+
+std::string Interval::text() const {
+  std::string made;
+  if (lower > -huge) made = fmt::format("{} {}", above_lower ? ">" : "≥", lower);
+  if (upper < huge)
+    made += fmt::format("{}{} {}", made.empty() ? "" : " and ", below_upper ? "<" : "≤", upper);
+  return made;
+}
+
+std::string_view Key::parent() const {
+  const auto dot = path.rfind('.');
+  return dot == path.npos ? std::string_view() : path.substr(0, dot);
+}
+std::string_view Key::name() const {
+  const auto dot = path.rfind('.');
+  return dot == path.npos ? path : path.substr(dot + 1);
+}
+
+std::string Key::expected() const {
+  const std::string range = interval.text().empty() ? std::string() : fmt::format(" {}", interval.text());
+  switch (type) {
+    case Type::text:
+      return "a text";
+    case Type::name:
+      return "a name";
+    case Type::choice: {
+      const auto words = split_choices(choices);
+      std::string made;
+      for (std::size_t i = 0; i < words.size(); ++i)
+        made += fmt::format("{}\"{}\"", i == 0 ? "" : i + 1 == words.size() ? " or " : ", ", words[i]);
+      return made;
+    }
+    case Type::number:
+      return "a number" + range;
+    case Type::integer:
+      return "a whole number" + range;
+    case Type::boolean:
+      return "true or false";
+    case Type::vector:
+      return fmt::format("a list of {} numbers{}", count, range);
+    case Type::integers:
+      return fmt::format("a list of {} whole numbers{}", count, range);
+    case Type::range:
+      return fmt::format("a list [from, to] of two numbers{}", range);
+    case Type::box:
+    case Type::region:
+      return "two corners [[x, y, z], [x, y, z]], the lower one first";
+    case Type::color:
+      return "a colour \"#rrggbb\"";
+    case Type::fixed:
+      return "\"walls\", or a list of \"walls\" and { box_m = [[x, y, z], [x, y, z]] }";
+    case Type::table:
+      return "a table";
+    case Type::tables:
+      return "a list of tables";
+  }
+  return "";
+}
+
+std::string Key::example() const {
+  const bool telling = fallback != required && fallback != may_lack &&
+                       fallback.find_first_of("{}") == fallback.npos && fallback != "[]";
+  if (type == Type::table && parent().empty()) return fmt::format("[{}]", path);
+  if (type == Type::tables) return fmt::format("[[{}]]", path);
+  const auto value = [&]() -> std::string {
+    if (telling) return std::string(fallback);
+    const double inside = std::clamp(1.0, interval.lower, interval.upper);
+    switch (type) {
+      case Type::text:
+        return "\"…\"";
+      case Type::name:
+        return "\"robot\"";
+      case Type::choice:
+        return fmt::format("\"{}\"", split_choices(choices).front());
+      case Type::number:
+        return fmt::format("{:.1f}", inside);
+      case Type::integer:
+        return fmt::format("{}", std::max(1.0, interval.lower));
+      case Type::boolean:
+        return "true";
+      case Type::vector:
+        return count == 2 ? "[1.0, 1.0]" : "[1.0, 1.0, 1.0]";
+      case Type::integers:
+        return count == 2 ? "[3, 3]" : "[3, 3, 3]";
+      case Type::range:
+        return "[0.5, 1.0]";
+      case Type::box:
+      case Type::region:
+        return "[[0, 0, 0], [10, 3, 3]]";
+      case Type::color:
+        return "\"#c0392b\"";
+      case Type::fixed:
+        return "\"walls\"";
+      case Type::table:
+        return "{ … }";
+      case Type::tables:
+        break;
+    }
+    return "";
+  };
+  return fmt::format("{} = {}", name(), value());
+}
+
+std::span<const Key> keys() { return all_keys; }
+
+const Key* find_key(std::string_view path) {
+  for (const Key& key : all_keys)
+    if (key.path == path) return &key;
+  return nullptr;
+}
+
+std::vector<const Key*> keys_in(std::string_view path) {
+  std::vector<const Key*> made;
+  for (const Key& key : all_keys)
+    if (key.parent() == path) made.push_back(&key);
+  return made;
+}
+
+std::string nearest(std::string_view word, std::span<const std::string> known) {
+  std::string best;
+  std::size_t best_distance = std::max<std::size_t>(2, word.size() / 3) + 1;
+  for (const std::string& candidate : known) {
+    const bool is_start = word.size() >= 3 && candidate.starts_with(word);
+    const std::size_t distance = is_start ? 1 : edit_distance(word, candidate);
+    if (distance < std::min(best_distance, candidate.size())) best = candidate, best_distance = distance;
+  }
+  return best;
+}
+
+std::string suggestion(std::string_view parent_path, std::string_view unknown) {
+  std::vector<std::string> names;
+  for (const Key* key : keys_in(parent_path)) names.emplace_back(key->name());
+  for (const Key& key : all_keys)
+    if (key.name() == unknown && key.parent() != parent_path && key.parent().starts_with(parent_path))
+      return fmt::format("{} belongs into {}", unknown, key.parent());
+  const std::string meant = nearest(unknown, names);
+  if (!meant.empty()) return fmt::format("did you mean \"{}\"?", meant);
+  return fmt::format("known here: {}", fmt::join(names, ", "));
+}
+
+void check_and_complete(Node& root) { check_table(root, "", ""); }
+
+}  // namespace limber::scenes

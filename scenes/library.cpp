@@ -1,0 +1,111 @@
+#include "scenes/library.h"
+
+#include <fmt/ranges.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cstdlib>
+
+#include "core/error.h"
+#include "scenes/detail/schema.h"
+
+namespace limber::scenes {
+
+namespace {
+
+std::string environment(const char* name) {
+  const char* value = std::getenv(name);
+  return value ? value : "";
+}
+
+bool is_file(const fs::path& path) {
+  std::error_code ignored;
+  return fs::is_regular_file(path, ignored);
+}
+bool is_folder(const fs::path& path) {
+  std::error_code ignored;
+  return fs::is_directory(path, ignored);
+}
+
+fs::path program_folder() {
+  std::error_code failed;
+  const fs::path program = fs::read_symlink("/proc/self/exe", failed);
+  return failed ? fs::path() : program.parent_path();
+}
+
+}  // namespace
+
+std::vector<fs::path> scene_folders() {
+  std::vector<fs::path> candidates;
+  std::string listed = environment("LIMBER_SCENES");
+  while (!listed.empty()) {
+    const auto colon = std::min(listed.find(':'), listed.size());
+    if (colon > 0) candidates.emplace_back(listed.substr(0, colon));
+    listed.erase(0, colon + 1);
+  }
+  candidates.push_back(program_folder() / ".." / "share" / "limber" / "scenes");
+  candidates.emplace_back(LIMBER_SCENES_SOURCE);
+  std::vector<fs::path> folders;
+  for (const fs::path& folder : candidates)
+    if (is_folder(folder)) folders.push_back(folder.lexically_normal());
+  return folders;
+}
+
+std::vector<KnownScene> known_scenes() {
+  std::vector<KnownScene> known;
+  for (const fs::path& folder : scene_folders()) {
+    std::error_code failed;
+    for (fs::directory_iterator at(folder, failed), end; !failed && at != end; at.increment(failed)) {
+      const std::string name = at->path().filename().string();
+      const bool seen =
+          std::any_of(known.begin(), known.end(), [&](const KnownScene& k) { return k.name == name; });
+      if (!seen && is_file(at->path() / "scene.toml")) known.push_back({name, at->path() / "scene.toml"});
+    }
+  }
+  std::sort(known.begin(), known.end(),
+            [](const KnownScene& a, const KnownScene& b) { return a.name < b.name; });
+  return known;
+}
+
+fs::path find_scene(const std::string& name_or_path) {
+  if (is_file(name_or_path)) return name_or_path;
+  if (is_folder(name_or_path) && is_file(fs::path(name_or_path) / "scene.toml"))
+    return fs::path(name_or_path) / "scene.toml";
+  std::vector<std::string> names;
+  for (const KnownScene& scene : known_scenes()) {
+    if (scene.name == name_or_path) return scene.file;
+    names.push_back(scene.name);
+  }
+  const std::string meant = nearest(name_or_path, names);
+  throw InputError(fmt::format("{}: no such scene file, and no scene of that name; {}known scenes: {}",
+                               name_or_path, meant.empty() ? "" : fmt::format("did you mean \"{}\"? ", meant),
+                               names.empty() ? "none (set LIMBER_SCENES to their folder)"
+                                             : fmt::format("{}", fmt::join(names, ", "))));
+}
+
+fs::path model_cache() {
+  if (const std::string own = environment("LIMBER_MODELS"); !own.empty()) return own;
+  const std::string cache = environment("XDG_CACHE_HOME");
+  return (cache.empty() ? fs::path(environment("HOME")) / ".cache" : fs::path(cache)) / "limber" / "models";
+}
+
+std::optional<fs::path> find_model(const std::string& file, const std::vector<fs::path>& folders) {
+  if (fs::path(file).is_absolute()) return is_file(file) ? std::optional<fs::path>(file) : std::nullopt;
+  for (const fs::path& folder : folders)
+    if (is_file(folder / file)) return folder / file;
+  if (is_file(model_cache() / file)) return model_cache() / file;
+  return std::nullopt;
+}
+
+std::string how_to_get_model(const std::string& file, const std::vector<fs::path>& folders) {
+  std::vector<std::string> searched;
+  for (const fs::path& folder : folders) searched.push_back(folder.string());
+  searched.push_back(model_cache().string());
+  std::string text = fmt::format("model {} was not found in {}", file, fmt::join(searched, ", "));
+  for (const fs::path& folder : folders)
+    if (is_file(folder / "setup"))
+      return text + fmt::format("; run {} to fetch it", (folder / "setup").string());
+  return text + "; put it into one of these folders";
+}
+
+}  // namespace limber::scenes

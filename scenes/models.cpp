@@ -1,0 +1,161 @@
+#include "scenes/models.h"
+
+#include <fmt/ranges.h>
+
+#include <cmath>
+#include <numbers>
+
+#include "core/error.h"
+#include "scenes/shapes.h"
+
+namespace limber::scenes {
+
+namespace {
+
+template <class... Visitors>
+struct Overloaded : Visitors... {
+  using Visitors::operator()...;
+};
+
+Eigen::Matrix3d pose_turn(const Pose& pose) {
+  return Eigen::AngleAxisd(pose.angle_deg * std::numbers::pi / 180, pose.axis).toRotationMatrix();
+}
+
+Vec3 anchor_of(const std::string& anchor, const Box& bounds) {
+  if (anchor == "center") return bounds.center();
+  if (anchor == "bottom") return {bounds.center().x(), bounds.center().y(), bounds.lower.z()};
+  return Vec3::Zero();
+}
+
+// Turns the file's axes into ours; exact, for all its elements are 0, 1 or −1.
+Eigen::Matrix3d ours_from_file(const FileModel& model) {
+  Eigen::Matrix3d rows;
+  rows << model.front.transpose(), model.up.cross(model.front).transpose(), model.up.transpose();
+  return rows;
+}
+
+Box turned_bounds(const Eigen::Matrix3d& turn, const Points& positions) {
+  Box bounds;
+  for (Eigen::Index v = 0; v < positions.rows(); ++v) bounds.include(turn * positions.row(v).transpose());
+  return bounds;
+}
+
+Eigen::Matrix3d metres_from_model(const BodySpec& body, const Points& positions, bool made) {
+  const auto to_height = [&](const Eigen::Matrix3d& turn, double height_m) -> Eigen::Matrix3d {
+    const double height = turned_bounds(turn, positions).size().z();
+    if (!(height > 0))
+      throw InputError(
+          fmt::format("bodies.{}: the model has no height, so it cannot be made {} m high; give scale",
+                      body.name, height_m));
+    return turn * (height_m / height);
+  };
+  const Eigen::Matrix3d same = Eigen::Matrix3d::Identity();
+  if (const auto* model = std::get_if<MadeModel>(&body.model)) return to_height(same, model->height_m);
+  const auto* model = std::get_if<FileModel>(&body.model);
+  if (!model) return same;
+  const Eigen::Matrix3d turn = made ? same : ours_from_file(*model);
+  return model->height_m ? to_height(turn, *model->height_m) : Eigen::Matrix3d(turn * model->scale);
+}
+
+Points corners(const Vec3& size_m) {
+  Points made(8, 3);
+  for (int i = 0; i < 8; ++i)
+    made.row(i) << (i & 1 ? 0.5 : -0.5) * size_m.x(), (i & 2 ? 0.5 : -0.5) * size_m.y(),
+        (i & 4 ? 0.5 : -0.5) * size_m.z();
+  return made;
+}
+
+const Vec3* box_size(const Model& model) {
+  if (const auto* box = std::get_if<BoxModel>(&model)) return &box->size_m;
+  if (const auto* plate = std::get_if<PlateModel>(&model)) return &plate->box.size_m;
+  return nullptr;
+}
+
+}  // namespace
+
+std::array<int, 2> plate_plane(const Vec3& size_m) {
+  int thin = 0;
+  size_m.minCoeff(&thin);
+  return thin == 0 ? std::array{1, 2} : thin == 1 ? std::array{0, 2} : std::array{0, 1};
+}
+
+std::optional<SurfaceMesh> made_surface(const BodySpec& body) {
+  auto surface = std::visit(Overloaded{[](const FileModel& m) {
+                                         return m.made.empty() ? std::nullopt : std::optional(make_bunny());
+                                       },
+                                       [](const MadeModel&) { return std::optional(make_bunny()); },
+                                       [](const BoxModel& m) { return std::optional(make_box(m)); },
+                                       [](const PlateModel& m) { return std::optional(make_plate(m)); },
+                                       [](const SphereModel& m) { return std::optional(make_sphere(m)); }},
+                            body.model);
+  if (body.cage.tets == 0) surface->positions *= 1 - 1e-6;
+  return surface;
+}
+
+std::optional<TetMesh> made_cage(const BodySpec& body) {
+  if (body.cage.tets > 0) return std::nullopt;
+  const Vec3* size_m = box_size(body.model);
+  LIMBER_CHECK(size_m, body.name);
+  return make_box_cage(*size_m, body.cage.cells);
+}
+
+Eigen::Affine3d world_from_model(const BodySpec& body, const Points& model_positions, bool made) {
+  const Eigen::Matrix3d linear = pose_turn(body.pose) * metres_from_model(body, model_positions, made);
+  const Vec3 anchor = anchor_of(body.pose.anchor, turned_bounds(linear, model_positions));
+  Eigen::Affine3d map = Eigen::Affine3d::Identity();
+  map.linear() = linear;
+  map.translation() = body.pose.position_m - anchor;
+  return map;
+}
+
+std::optional<Box> start_box(const BodySpec& body) {
+  Box bounds;
+  if (const Vec3* size_m = box_size(body.model))
+    bounds = turned_bounds(pose_turn(body.pose), corners(*size_m));
+  else if (const auto* sphere = std::get_if<SphereModel>(&body.model))
+    bounds = {Vec3::Constant(-sphere->diameter_m / 2), Vec3::Constant(sphere->diameter_m / 2)};
+  else
+    return std::nullopt;
+  const Vec3 shift = body.pose.position_m - anchor_of(body.pose.anchor, bounds);
+  return Box{bounds.lower + shift, bounds.upper + shift};
+}
+
+void transform(const Eigen::Affine3d& map, Points& positions) {
+  for (Eigen::Index v = 0; v < positions.rows(); ++v)
+    positions.row(v) = (map * Vec3(positions.row(v).transpose())).transpose();
+}
+
+std::vector<int> fixed_nodes(const BodySpec& body, const Box& bounds_m, const Points& cage_positions) {
+  const double tolerance_m = 1e-6 * bounds_m.diagonal();
+  const auto on_wall = [&](const Vec3& p) {
+    return ((p - bounds_m.lower).cwiseAbs().minCoeff() <= tolerance_m) ||
+           ((p - bounds_m.upper).cwiseAbs().minCoeff() <= tolerance_m);
+  };
+  const auto in = [&](const Box& box, const Vec3& p) {
+    return ((p - box.lower).array() >= -tolerance_m).all() && ((box.upper - p).array() >= -tolerance_m).all();
+  };
+  std::vector<int> nodes;
+  std::vector<bool> box_holds_one(body.fixed.boxes_m.size());
+  for (int n = 0; n < int(cage_positions.rows()); ++n) {
+    const Vec3 p = cage_positions.row(n);
+    bool held = body.kind == Kind::rigid || (body.fixed.walls && on_wall(p));
+    for (std::size_t b = 0; b < body.fixed.boxes_m.size(); ++b)
+      if (in(body.fixed.boxes_m[b], p)) held = box_holds_one[b] = true;
+    if (held) nodes.push_back(n);
+  }
+  if (body.fixed.walls && nodes.empty())
+    throw InputError(fmt::format(
+        "bodies.{}.fixed is \"walls\", but no node of its cage lies on a wall of the bounds; move "
+        "the body to a wall or use boxes",
+        body.name));
+  for (std::size_t b = 0; b < box_holds_one.size(); ++b)
+    if (!box_holds_one[b])
+      throw InputError(fmt::format(
+          "bodies.{}.fixed: no node of its cage lies in the box from [{:.6g}] to [{:.6g}]; move or "
+          "enlarge the box",
+          body.name, fmt::join(body.fixed.boxes_m[b].lower, ", "),
+          fmt::join(body.fixed.boxes_m[b].upper, ", ")));
+  return nodes;
+}
+
+}  // namespace limber::scenes

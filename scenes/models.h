@@ -1,0 +1,40 @@
+// From the body that a scene describes to meshes in the world.
+#pragma once
+
+#include <Eigen/Geometry>
+#include <array>
+#include <optional>
+#include <vector>
+
+#include "core/mesh.h"
+#include "scenes/scene.h"
+
+namespace limber::scenes {
+
+// The fine surface of a model that limber makes itself, in the model's own frame, z up and x to the front;
+// nothing for a file without a fall-back. Of a box whose cage is cells, it is a millionth smaller, so that it
+// lies inside that cage.
+std::optional<SurfaceMesh> made_surface(const BodySpec&);
+
+// The cage of a body with cage.cells, in the model's own frame; nothing for other bodies.
+std::optional<TetMesh> made_cage(const BodySpec&);
+
+// The bounding box at the start, where it follows from the scene alone: boxes, plates and spheres.
+std::optional<Box> start_box(const BodySpec&);
+
+// Where a model goes at the start: p_world = world_from_model * p_model. `bounds` is the bounding box of the
+// model as it was made or read from its file. `made` says that it was made (in metres, z up), also as the
+// fall-back of a file.
+Eigen::Affine3d world_from_model(const BodySpec&, const Points& model_positions, bool made);
+
+// The two longer axes of a plate, in the order x, y, z (0, 1, 2); the hole goes along the third.
+std::array<int, 2> plate_plane(const Vec3& size_m);
+
+// positions ← map * positions, row by row.
+void transform(const Eigen::Affine3d& map, Points& positions);
+
+// Rows of `cage_positions` (in the world, at the start) that the scene holds fixed, ascending; all of a rigid
+// body. Throws InputError naming the body when it asks for fixed nodes and no node is where it says.
+std::vector<int> fixed_nodes(const BodySpec&, const Box& bounds_m, const Points& cage_positions);
+
+}  // namespace limber::scenes

@@ -1,0 +1,458 @@
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "scenes/detail/schema.h"
+#include "scenes/models.h"
+#include "scenes/scene.h"
+
+namespace limber::scenes {
+
+namespace {
+
+[[noreturn]] void complain(const Node& node, const std::string& what) {
+  throw InputError(fmt::format("{}: {}", node.where.text(), what));
+}
+
+// ---- typed reads; check_and_complete() has made sure that they succeed ----
+
+const Node& child(const Node& table, std::string_view key) {
+  const Node* node = table.find(key);
+  LIMBER_CHECK(node, key);
+  return *node;
+}
+double as_number(const Node& node) {
+  const auto* integer = std::get_if<std::int64_t>(&node.value);
+  return integer ? double(*integer) : std::get<double>(node.value);
+}
+double number(const Node& table, std::string_view key) { return as_number(child(table, key)); }
+int integer(const Node& table, std::string_view key) { return int(number(table, key)); }
+std::optional<double> maybe_number(const Node& table, std::string_view key) {
+  const Node* node = table.find(key);
+  return node ? std::optional(as_number(*node)) : std::nullopt;
+}
+bool flag(const Node& table, std::string_view key) { return std::get<bool>(child(table, key).value); }
+const std::string& as_text(const Node& node) { return std::get<std::string>(node.value); }
+const std::string& text(const Node& table, std::string_view key) { return as_text(child(table, key)); }
+std::string text_or(const Node& table, std::string_view key, const char* otherwise) {
+  const Node* node = table.find(key);
+  return node ? as_text(*node) : otherwise;
+}
+const Array& list(const Node& table, std::string_view key) { return *child(table, key).array(); }
+Vec3 as_vector(const Node& node) {
+  const Array& a = *node.array();
+  return {as_number(a[0]), as_number(a[1]), as_number(a[2])};
+}
+Vec3 vector(const Node& table, std::string_view key) { return as_vector(child(table, key)); }
+Eigen::Vector2d vector2(const Node& table, std::string_view key) {
+  const Array& a = list(table, key);
+  return {as_number(a[0]), as_number(a[1])};
+}
+Box box(const Node& table, std::string_view key) {
+  const Array& corners = list(table, key);
+  return {as_vector(corners[0]), as_vector(corners[1])};
+}
+Vec3 as_color(const std::string& rrggbb) {
+  const auto channel = [&](std::size_t at) { return std::stoi(rrggbb.substr(at, 2), nullptr, 16) / 255.0; };
+  return {channel(1), channel(3), channel(5)};
+}
+Vec3 direction(const Node& table, std::string_view key, const char* what) {
+  const Vec3 v = vector(table, key);
+  if (v.norm() < 1e-9)
+    complain(child(table, key),
+             fmt::format("{} is [0, 0, 0], which points nowhere; write a direction", what));
+  return v.normalized();
+}
+Vec3 axis_named(const std::string& name) { return (name[0] == '-' ? -1.0 : 1.0) * Vec3::Unit(name[1] - 'x'); }
+
+// ---- edits: --set a.b.c=value ----
+
+std::vector<std::string> split_path(std::string_view path) {
+  std::vector<std::string> parts;
+  while (true) {
+    const auto dot = path.find('.');
+    parts.emplace_back(path.substr(0, dot));
+    if (dot == path.npos) return parts;
+    path.remove_prefix(dot + 1);
+  }
+}
+
+// The tables between `table` (at `path`) and the one known key of that name further down, as material between
+// a body and friction; empty when there is no such key, or more than one.
+std::vector<std::string> tables_between(const Node& table, const std::string& path, const std::string& name) {
+  const auto present = [&](const std::vector<std::string>& between) {
+    const Node* node = &table;
+    for (const std::string& part : between) node = node ? node->find(part) : nullptr;
+    return node != nullptr;
+  };
+  std::vector<std::vector<std::string>> all, there;
+  for (const Key& key : keys()) {
+    const std::string_view parent = key.parent();
+    if (key.name() != name || !parent.starts_with(path + ".")) continue;
+    const std::string_view rest = parent.substr(path.size() + 1);
+    if (rest.find("[]") != rest.npos) continue;
+    all.push_back(split_path(rest));
+    if (present(all.back())) there.push_back(all.back());
+  }
+  if (there.size() == 1) return there.front();
+  return all.size() == 1 ? all.front() : std::vector<std::string>{};
+}
+
+Node& element_of(Node& array, const std::string& name, const std::string& source, const std::string& path) {
+  auto& elements = std::get<Array>(array.value);
+  std::vector<std::string> names;
+  for (std::size_t i = 0; i < elements.size(); ++i) {
+    const Node* own = elements[i].find("name");
+    const auto* own_name = own ? std::get_if<std::string>(&own->value) : nullptr;
+    names.push_back(own_name ? *own_name : std::to_string(i));
+    if (name == names.back() || name == std::to_string(i)) return elements[i];
+  }
+  const std::string meant = nearest(name, names);
+  throw InputError(fmt::format("{}: {} has no \"{}\"; {}", source, path, name,
+                               meant.empty() ? fmt::format("there are: {}", fmt::join(names, ", "))
+                                             : fmt::format("did you mean \"{}\"?", meant)));
+}
+
+void edit(Node& root, const std::string& set) {
+  const std::string source = "--set " + set;
+  const auto equals = set.find('=');
+  if (equals == set.npos || equals == 0)
+    throw InputError(
+        fmt::format("{}: there is no key=value; write for example --set planner.seed=7", source));
+  std::vector<std::string> parts = split_path(std::string_view(set).substr(0, equals));
+  Node* node = &root;
+  std::string path;  // of the schema
+  for (std::size_t i = 0; i < parts.size(); ++i) {
+    if (std::holds_alternative<Array>(node->value)) {
+      node = &element_of(*node, parts[i], source, path);
+      path += "[]";
+      continue;
+    }
+    auto* entries = std::get_if<Table>(&node->value);
+    if (!entries)
+      throw InputError(fmt::format("{}: {} is {}, so nothing in it can be set; set {} itself", source, path,
+                                   node->type_name(), path));
+    if (!find_key(path.empty() ? parts[i] : path + "." + parts[i])) {
+      const auto between = tables_between(*node, path, parts[i]);
+      if (!between.empty()) {
+        parts.insert(parts.begin() + std::ptrdiff_t(i), between.begin(), between.end());
+        --i;
+        continue;
+      }
+    }
+    path += (path.empty() ? "" : ".") + parts[i];
+    if (!node->find(parts[i])) entries->push_back({parts[i], {source}, {{source}, Table{}}});
+    node = node->find(parts[i]);
+  }
+  *node = parse_set_value(set.substr(equals + 1), source);
+}
+
+// ---- the parts of a scene, with the checks that look at more than one key ----
+
+double triangle_edge(const Node& table, const Vec3& size) {
+  return maybe_number(table, "triangle_m").value_or(size.maxCoeff() / 32);
+}
+
+// Triangles of a flat-faced or round model of this area; a few more with bevels.
+void check_fineness(const Node& table, double area, double triangle_m) {
+  constexpr double most = 4e6;
+  const double triangles = 2 * area / (triangle_m * triangle_m);
+  if (triangles > most)
+    complain(child(table, "triangle_m"),
+             fmt::format(
+                 "triangle_m = {} would make about {:.0f} triangles, more than {:.0f}; write at least {:.2g}",
+                 triangle_m, triangles, most, triangle_m * std::sqrt(triangles / most)));
+}
+
+BoxModel read_box(const Node& table, const std::string& what) {
+  BoxModel model{vector(table, "size_m"), number(table, "bevel_m"), 0};
+  model.triangle_m = triangle_edge(table, model.size_m);
+  const Vec3& s = model.size_m;
+  check_fineness(table, 2 * (s.x() * s.y() + s.y() * s.z() + s.z() * s.x()), model.triangle_m);
+  if (model.bevel_m > s.minCoeff() / 2)
+    complain(child(table, "bevel_m"),
+             fmt::format("{}.bevel_m is {}, more than half the smallest size; it must be ≤ {}", what,
+                         model.bevel_m, s.minCoeff() / 2));
+  return model;
+}
+
+PlateModel read_plate(const Node& table, const std::string& what) {
+  PlateModel model{read_box(table, what), {}};
+  const Node* node = table.find("hole");
+  if (!node) return model;
+  const Hole hole{text(*node, "shape") == "round", number(*node, "size_m"), vector2(*node, "center_m")};
+  const auto [u, v] = plate_plane(model.box.size_m);
+  const double room = std::min(model.box.size_m[u] / 2 - std::abs(hole.center_m[0]),
+                               model.box.size_m[v] / 2 - std::abs(hole.center_m[1])) -
+                      2 * model.box.bevel_m;
+  if (!(hole.size_m / 2 < room))
+    complain(child(*node, "size_m"),
+             fmt::format("{}.hole of {} m does not fit in the plate; it must be < {} there", what,
+                         hole.size_m, std::max(0.0, 2 * room)));
+  model.hole = hole;
+  return model;
+}
+
+FileModel read_file_model(const Node& table, const std::string& what) {
+  FileModel model;
+  model.file = text(table, "file");
+  if (model.file.empty())
+    complain(child(table, "file"), what + ".file is empty; write the name of a model file");
+  model.made = text_or(table, "made", "");
+  model.height_m = maybe_number(table, "height_m");
+  if (model.height_m && table.find("scale"))
+    complain(*table.find("scale"), what + " has both scale and height_m; keep one of them");
+  model.scale = maybe_number(table, "scale").value_or(1);
+  model.up = axis_named(text_or(table, "up", "+z"));
+  model.front = axis_named(text_or(table, "front", "+x"));
+  if (model.up.dot(model.front) != 0)
+    complain(*(table.find("front") ? table.find("front") : table.find("up")),
+             what + ": up and front lie along the same axis of the file; give two different axes");
+  return model;
+}
+
+Model read_model(const Node& table, const std::string& body) {
+  const std::string what = body + ".model";
+  const auto given = [&](std::string_view key) { return table.find(key) != nullptr; };
+  const int kinds =
+      given("file") + given("box") + given("plate") + given("sphere") + (given("made") && !given("file"));
+  if (kinds != 1)
+    complain(table,
+             fmt::format(
+                 "{} has {} of file, made, box, plate, sphere; give exactly one (made may stand beside file)",
+                 what, kinds == 0 ? "none" : "more than one"));
+  for (const char* key : {"scale", "up", "front"})
+    if (given(key) && !given("file"))
+      complain(*table.find(key), fmt::format("{}.{} goes with file only; remove it", what, key));
+  if (given("height_m") && !given("file") && !given("made"))
+    complain(*table.find("height_m"), what + ".height_m goes with file or made only; remove it");
+  if (given("file")) return read_file_model(table, what);
+  if (given("made")) return MadeModel{text(table, "made"), maybe_number(table, "height_m").value_or(1)};
+  if (given("box")) return read_box(child(table, "box"), what + ".box");
+  if (given("plate")) return read_plate(child(table, "plate"), what + ".plate");
+  const Node& sphere = child(table, "sphere");
+  const double d = number(sphere, "diameter_m");
+  const SphereModel model{d, triangle_edge(sphere, Vec3::Constant(d))};
+  check_fineness(sphere, 3.15 * d * d, model.triangle_m);
+  return model;
+}
+
+CageSpec read_cage(const Node& table, const Model& model, const std::string& body) {
+  CageSpec cage;
+  cage.mode = text(table, "mode");
+  cage.shells = integer(table, "shells");
+  const Node* cells = table.find("cells");
+  if ((cells != nullptr) == (table.find("tets") != nullptr))
+    complain(table, fmt::format("{}.cage has {}; give either tets = N or cells = [nx, ny, nz]", body,
+                                cells ? "both tets and cells" : "neither tets nor cells"));
+  if (!cells) {
+    cage.tets = integer(table, "tets");
+    return cage;
+  }
+  const auto* plate = std::get_if<PlateModel>(&model);
+  if (!std::holds_alternative<BoxModel>(model) && !(plate && !plate->hole))
+    complain(
+        *cells,
+        fmt::format("{}.cage.cells needs a box, or a plate without a hole; write tets = N instead", body));
+  cage.cells = as_vector(*cells).cast<int>();
+  return cage;
+}
+
+MaterialSpec read_material(const Node& body_table, Kind kind, const std::string& body) {
+  const Node* table = body_table.find("material");
+  if (!table && kind == Kind::deformable)
+    complain(body_table, fmt::format("{} is deformable and lacks a material; add for example material = "
+                                     "{{ youngs_modulus_pa = 5e3, density_kg_m3 = 100 }}",
+                                     body));
+  if (!table)
+    return {.friction = as_number(
+                parse_set_value(std::string(find_key("bodies[].material.friction")->fallback), ""))};
+  return {number(*table, "youngs_modulus_pa"), number(*table, "poisson_ratio"),
+          number(*table, "density_kg_m3"), number(*table, "damping_ratio"), number(*table, "friction")};
+}
+
+FixedSpec read_fixed(const Node& node) {
+  FixedSpec fixed;
+  const auto* elements = node.array();
+  if (!elements)
+    fixed.walls = true;
+  else
+    for (const Node& element : *elements)
+      if (element.table())
+        fixed.boxes_m.push_back(box(element, "box_m"));
+      else
+        fixed.walls = true;
+  return fixed;
+}
+
+Role read_role(const std::string& word) {
+  return word == "robot" ? Role::robot : word == "obstacle" ? Role::obstacle : Role::free;
+}
+
+Vec3 read_body_color(const Node& table, Role role) {
+  const char* usual[] = {"#c0392b", "#3f7cac", "#e0a030"};
+  return as_color(text_or(table, "color", usual[int(role)]));
+}
+
+void check_inside(const BodySpec& body, const Box& bounds, const Node& position, const std::string& what) {
+  const auto start = start_box(body);
+  const Box occupied = start ? *start : Box{body.pose.position_m, body.pose.position_m};
+  const double tolerance_m = 1e-9 * bounds.diagonal();
+  for (int i = 0; i < 3; ++i) {
+    const bool below = occupied.lower[i] < bounds.lower[i] - tolerance_m;
+    if (!below && occupied.upper[i] <= bounds.upper[i] + tolerance_m) continue;
+    complain(position, fmt::format("{} is outside the bounds: it reaches {} = {:.6g}, they end at {:.6g}; "
+                                   "move it or enlarge world.bounds_m",
+                                   what, "xyz"[i], below ? occupied.lower[i] : occupied.upper[i],
+                                   below ? bounds.lower[i] : bounds.upper[i]));
+  }
+}
+
+BodySpec read_body(const Node& table, const Box& bounds) {
+  BodySpec body;
+  body.name = text(table, "name");
+  const std::string what = "bodies." + body.name;
+  body.role = read_role(text(table, "role"));
+  body.kind = text(table, "kind") == "rigid" ? Kind::rigid : Kind::deformable;
+  if (body.kind == Kind::rigid && body.role != Role::obstacle)
+    complain(child(table, "kind"),
+             fmt::format("{} is rigid, but its role is {}; rigid bodies do not move: make it "
+                         "deformable, or role = \"obstacle\"",
+                         what, text(table, "role")));
+  body.model = read_model(child(table, "model"), what);
+  body.cage = read_cage(child(table, "cage"), body.model, what);
+  body.material = read_material(table, body.kind, what);
+  const Node& pose = child(table, "pose");
+  body.pose = {vector(pose, "position_m"), direction(pose, "axis", (what + ".pose.axis").c_str()),
+               number(pose, "angle_deg"), text(pose, "anchor")};
+  body.fixed = read_fixed(child(table, "fixed"));
+  body.color_srgb = read_body_color(table, body.role);
+  check_inside(body, bounds, child(pose, "position_m"), what);
+  return body;
+}
+
+void read_bodies(const Node& root, Scene& scene) {
+  for (const Node& table : list(root, "bodies")) {
+    BodySpec body = read_body(table, scene.bounds_m);
+    for (const BodySpec& other : scene.bodies)
+      if (other.name == body.name)
+        complain(child(table, "name"),
+                 fmt::format("two bodies are called \"{}\"; give each its own name", body.name));
+    if (body.role == Role::robot) {
+      if (scene.robot >= 0)
+        complain(child(table, "role"),
+                 fmt::format("two robots, {} and {}; exactly one body may have role = \"robot\"",
+                             scene.bodies[std::size_t(scene.robot)].name, body.name));
+      scene.robot = int(scene.bodies.size());
+    }
+    scene.bodies.push_back(std::move(body));
+  }
+  if (scene.robot < 0)
+    complain(child(root, "bodies"), "there is no robot; give the body that is to move role = \"robot\"");
+}
+
+Goal read_goal(const Node& table, const Box& bounds) {
+  const Goal goal{vector(table, "center_of_mass_m"), number(table, "radius_m")};
+  for (int i = 0; i < 3; ++i)
+    if (goal.center_of_mass_m[i] < bounds.lower[i] || goal.center_of_mass_m[i] > bounds.upper[i])
+      complain(
+          child(table, "center_of_mass_m"),
+          fmt::format(
+              "the goal is outside the bounds: {} = {} is not between {} and {}; move the goal or enlarge "
+              "world.bounds_m",
+              "xyz"[i], goal.center_of_mass_m[i], bounds.lower[i], bounds.upper[i]));
+  return goal;
+}
+
+PlannerSpec read_planner(const Node& table) {
+  PlannerSpec planner;
+  planner.preset = text(table, "preset");
+  planner.seed = integer(table, "seed");
+  planner.iterations = integer(table, "iterations");
+  planner.goal_bias = number(table, "goal_bias");
+  const Node& weights = child(table, "weights");
+  planner.weight_body = number(weights, "body");
+  planner.weight_control_point = number(weights, "control_point");
+  planner.weight_interpolation = number(weights, "interpolation");
+  if (!(planner.weight_body + planner.weight_control_point > 0))
+    complain(
+        weights,
+        "planner.weights of body and control_point are both 0, so nothing could move the robot away from the "
+        "goal's direction; make one of them > 0");
+  planner.max_force_n = number(table, "max_force_n");
+  const Eigen::Vector2d share = vector2(table, "force_share"), duration = vector2(table, "duration_s");
+  planner.min_force_share = share[0], planner.max_force_share = share[1];
+  planner.min_duration_s = duration[0], planner.max_duration_s = duration[1];
+  planner.control_point_radius_m = number(table, "control_point_radius_m");
+  planner.settle_time_s = number(table, "settle_time_s");
+  planner.settle_speed_m_s = number(table, "settle_speed_m_s");
+  planner.settle_force_share = number(table, "settle_force_share");
+  return planner;
+}
+
+CameraSpec read_camera(const Node& table) {
+  CameraSpec camera{direction(table, "direction", "camera.direction"), number(table, "fov_deg"), {}};
+  for (const Node& node : list(table, "keyframes")) {
+    const Keyframe frame{number(node, "at"), vector(node, "eye_m"), vector(node, "target_m")};
+    if (!camera.keyframes.empty() && frame.at <= camera.keyframes.back().at)
+      complain(child(node, "at"),
+               fmt::format("keyframe at {} does not come after the one at {}; put them in order", frame.at,
+                           camera.keyframes.back().at));
+    if (frame.eye_m == frame.target_m)
+      complain(child(node, "target_m"), "the camera looks at the place where it is; move target_m or eye_m");
+    camera.keyframes.push_back(frame);
+  }
+  return camera;
+}
+
+FilmSpec read_film(const Node& table) {
+  const Eigen::Vector2i size = vector2(table, "size_px").cast<int>(),
+                        sheet = vector2(table, "sheet").cast<int>();
+  return {size[0],
+          size[1],
+          integer(table, "frames_per_second"),
+          as_color(text(table, "background")),
+          flag(table, "bounds_lines"),
+          sheet[0],
+          sheet[1]};
+}
+
+}  // namespace
+
+Scene read_scene(const std::string& toml, const std::string& name_for_messages,
+                 const std::vector<std::string>& sets) {
+  Node root = parse_document(toml, name_for_messages);
+  if (root.table()->empty())
+    throw InputError(
+        fmt::format("{}:1:1: the scene is empty; start from one that comes with limber (`limber scenes` "
+                    "lists them)",
+                    name_for_messages));
+  for (const std::string& set : sets) edit(root, set);
+  check_and_complete(root);
+
+  Scene scene;
+  scene.name = text(root, "name");
+  scene.description = text(root, "description");
+  const Node& world = child(root, "world");
+  scene.bounds_m = box(world, "bounds_m");
+  scene.walls = flag(world, "walls");
+  scene.gravity_m_s2 = vector(world, "gravity_m_s2");
+  scene.max_dt_s = maybe_number(world, "max_dt_s");
+  read_bodies(root, scene);
+  scene.goal = read_goal(child(root, "goal"), scene.bounds_m);
+  scene.planner = read_planner(child(root, "planner"));
+  scene.camera = read_camera(child(root, "camera"));
+  scene.film = read_film(child(root, "film"));
+  scene.text = toml;
+  scene.sets = sets;
+  return scene;
+}
+
+Scene read_scene_file(const fs::path& file, const std::vector<std::string>& sets) {
+  Scene scene = read_scene(read_file(file), file.string(), sets);
+  scene.folder = fs::absolute(file).parent_path();
+  return scene;
+}
+
+}  // namespace limber::scenes

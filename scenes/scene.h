@@ -1,0 +1,158 @@
+// The scene that the user wrote (TOML), as plain numbers in SI units, checked: who reads a Scene need not
+// check again. Every key with its unit, default and range: docs/scene.md, which is generated from the
+// reader's own table.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "core/file.h"
+#include "core/mesh.h"
+
+namespace limber::scenes {
+
+enum class Role { robot, obstacle, free };
+enum class Kind { deformable, rigid };  // rigid things do not move; robots and free bodies are deformable
+
+// A model file, brought to our axes (z up, x to the front) and to metres; its own origin is kept.
+struct FileModel {
+  std::string file;                // looked for as find_model() says
+  std::string made;                // fall-back where the file cannot be had, as MadeModel::made; empty: none
+  double scale = 1;                // metres a file unit, > 0; not used when height_m is given
+  std::optional<double> height_m;  // > 0: scaled so that the turned model is this high
+  Vec3 up = Vec3::UnitZ();         // the file's axis that points up, and the one that points to the front
+  Vec3 front = Vec3::UnitX();
+};
+struct MadeModel {   // its origin is the middle of its bounding box
+  std::string made;  // "bunny"
+  double height_m = 1;
+};
+struct BoxModel {  // its origin is its middle
+  Vec3 size_m = Vec3::Ones();
+  double bevel_m = 0;     // radius of the rounded edges; at most half the smallest size
+  double triangle_m = 0;  // longest edge of a triangle on a flat face, > 0
+};
+struct Hole {
+  bool round = true;  // else square
+  double size_m = 0;  // diameter, or side of the square
+  Eigen::Vector2d center_m =
+      Eigen::Vector2d::Zero();  // from the plate's middle, along its two longer axes in x y z order
+};
+struct PlateModel {  // a box with a hole along its thinnest axis; its origin is its middle
+  BoxModel box;
+  std::optional<Hole> hole;
+};
+struct SphereModel {  // its origin is its centre
+  double diameter_m = 1;
+  double triangle_m = 0;
+};
+using Model = std::variant<FileModel, MadeModel, BoxModel, PlateModel, SphereModel>;
+
+struct CageSpec {
+  int tets = 0;  // budget of the enclosing cage; 0 when cells are given
+  Eigen::Vector3i cells{0, 0,
+                        0};  // boxes and plates without a hole: cut into nx × ny × nz cells of five tets each
+  std::string mode;          // "lattice", "fast" or "paper": how the enclosing cage is made
+  int shells = 0;            // at most so many convex shells
+};
+
+struct MaterialSpec {
+  double youngs_modulus_pa = 0, poisson_ratio = 0, density_kg_m3 = 0, damping_ratio = 0, friction = 0;
+};
+
+struct Pose {
+  Vec3 position_m = Vec3::Zero();  // where the anchor of the turned model goes
+  Vec3 axis = Vec3::UnitZ();       // unit
+  double angle_deg = 0;
+  std::string anchor;  // "origin", "center" of the bounding box, or "bottom": the middle of its lower face
+};
+
+// Which nodes of the cage are held where they are.
+struct FixedSpec {
+  bool walls = false;        // all that lie on a wall of the bounds
+  std::vector<Box> boxes_m;  // all that lie in one of these boxes, in world coordinates at the start
+};
+
+struct BodySpec {
+  std::string name;  // letters, digits, _ and -: it names a folder
+  Role role = Role::obstacle;
+  Kind kind = Kind::deformable;
+  Model model;
+  CageSpec cage;
+  MaterialSpec material;  // of a rigid body only friction counts
+  Pose pose;
+  FixedSpec fixed;
+  Vec3 color_srgb = Vec3::Zero();  // 0 … 1
+};
+
+struct Goal {
+  Vec3 center_of_mass_m = Vec3::Zero();
+  double radius_m = 0;
+};
+
+struct PlannerSpec {
+  std::string preset;  // "paper" or "fast"; decides the defaults of the others
+  std::int64_t seed = 0;
+  int iterations = 0;
+  double goal_bias = 0;  // share of the iterations that aim at the goal
+  double weight_body = 0, weight_control_point = 0,
+         weight_interpolation = 0;                  // of the three manipulations; ≥ 0, some > 0
+  double max_force_n = 0;                           // on the whole robot
+  double min_force_share = 0, max_force_share = 0;  // of max_force_n, drawn evenly between
+  double min_duration_s = 0, max_duration_s = 0;    // one manipulation is held so long, drawn evenly between
+  double control_point_radius_m = 0;
+  double settle_time_s = 0;       // the robot gets at most so long to come to rest at the goal,
+  double settle_speed_m_s = 0;    // which it does when its mean speed is below this
+  double settle_force_share = 0;  // of max_force_n: the largest force of the settle
+};
+
+struct Keyframe {
+  double at = 0;  // share of the film, 0 … 1, ascending
+  Vec3 eye_m = Vec3::Zero(), target_m = Vec3::Zero();
+};
+struct CameraSpec {
+  Vec3 direction = Vec3::UnitX();  // unit; from the scene to the camera, which is framed automatically when
+                                   // there are no keyframes
+  double fov_deg = 0;              // vertical
+  std::vector<Keyframe> keyframes;
+};
+
+struct FilmSpec {
+  int width_px = 0, height_px = 0;
+  int frames_per_second = 0;
+  Vec3 background_srgb = Vec3::Zero();
+  bool bounds_lines = true;  // draw the edges of the bounds as pale lines
+  int sheet_columns = 0, sheet_rows = 0;
+};
+
+struct Scene {
+  std::string name, description;
+  Box bounds_m;
+  bool walls = true;  // the bounds are closed by rigid walls
+  Vec3 gravity_m_s2 = Vec3::Zero();
+  std::optional<double> max_dt_s;  // only ever lowers the automatic time step
+  std::vector<BodySpec> bodies;
+  int robot = -1;  // index of the one body whose role is robot
+  Goal goal;
+  PlannerSpec planner;
+  CameraSpec camera;
+  FilmSpec film;
+
+  fs::path folder;                // where the scene file lies; empty when the text came from elsewhere
+  std::string text;               // as the user wrote it
+  std::vector<std::string> sets;  // the edits made to it; read_scene(text, …, sets) gives this scene again
+};
+
+// `sets` are edits "a.b.c=value" made before the text is checked; bodies.robot.x addresses a body by its
+// name, and bodies.robot.friction is short for bodies.robot.material.friction. A value that is not TOML is
+// taken as a text. Throws InputError "NAME:line:column: what; what to try" with the first complaint.
+Scene read_scene(const std::string& text, const std::string& name_for_messages,
+                 const std::vector<std::string>& sets = {});
+Scene read_scene_file(const fs::path&, const std::vector<std::string>& sets = {});
+
+// The reference of all keys, in Markdown: what docs/scene.md holds.
+std::string scene_reference();
+
+}  // namespace limber::scenes

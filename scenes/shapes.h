@@ -1,0 +1,29 @@
+// Models that limber makes itself. All are closed, face outward, and are the same bytes every time. Their
+// middle is the origin, z is up. Sizes in metres; triangle_m > 0 is the longest edge on a flat face (the true
+// edges may be shorter). Method and figures: docs/scene.md.
+#pragma once
+
+#include "core/mesh.h"
+#include "scenes/scene.h"
+
+namespace limber::scenes {
+
+// Faces cut in squares, and each square in two triangles; edges and corners rounded with radius bevel_m (0:
+// sharp).
+SurfaceMesh make_box(const BoxModel&);
+
+// With a hole: rings of points round the hole from its wall over one face, the rim, and the other face.
+SurfaceMesh make_plate(const PlateModel&);
+
+// A geodesic sphere: an icosahedron whose faces are cut in four until no edge is longer than triangle_m.
+SurfaceMesh make_sphere(const SphereModel&);
+
+// Something like a sitting rabbit that looks along +x, out of ellipsoids that flow into one another; 1 m
+// high, about 1 m long and 0.7 m wide, 20,000 to 40,000 triangles.
+SurfaceMesh make_bunny();
+
+// nx × ny × nz cells of five tets each, cut in alternate ways so that neighbours share their faces: 3 × 3 × 3
+// cells are 64 nodes and 135 tets. Nodes in x-fastest order.
+TetMesh make_box_cage(const Vec3& size_m, const Eigen::Vector3i& cells);
+
+}  // namespace limber::scenes

@@ -1,0 +1,165 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+
+#include "core/error.h"
+#include "scenes/library.h"
+#include "scenes/models.h"
+#include "scenes/scene.h"
+#include "tests/core/temporary_folder.h"
+
+namespace limber::scenes {
+namespace {
+
+using testing::HasSubstr;
+
+// An environment variable that has a value as long as the test lives.
+class Environment {
+ public:
+  Environment(const char* name, const std::string& value) : name_(name) { ::setenv(name, value.c_str(), 1); }
+  ~Environment() { ::unsetenv(name_); }
+  Environment(const Environment&) = delete;
+  Environment& operator=(const Environment&) = delete;
+
+ private:
+  const char* name_;
+};
+
+void put(const fs::path& file, const std::string& text) {
+  make_folder(file.parent_path());
+  write_file(file, text);
+}
+
+TEST(Library, ScenesThatComeWithLimberAreGood) {
+  for (const KnownScene& known : known_scenes()) {
+    SCOPED_TRACE(known.name);
+    const Scene scene = read_scene_file(known.file);
+    EXPECT_EQ(scene.name, known.name);
+    EXPECT_FALSE(scene.description.empty());
+    EXPECT_EQ(scene.folder, known.file.parent_path());
+    for (const BodySpec& body : scene.bodies) {
+      SCOPED_TRACE(body.name);
+      auto surface = made_surface(body);
+      ASSERT_TRUE(surface);
+      const auto map = world_from_model(body, surface->positions, true);
+      transform(map, surface->positions);
+      const Box box = bounding_box(surface->positions);
+      EXPECT_TRUE((box.lower.array() >= scene.bounds_m.lower.array()).all());
+      EXPECT_TRUE((box.upper.array() <= scene.bounds_m.upper.array()).all());
+      if (auto cage = made_cage(body)) {
+        transform(map, cage->positions);
+        EXPECT_NO_THROW(fixed_nodes(body, scene.bounds_m, cage->positions));
+      }
+    }
+  }
+}
+
+TEST(Library, Barriers1IsTheTableOfThePaper) {
+  const Scene scene = read_scene_file(find_scene("barriers1"));
+  EXPECT_EQ(scene.bounds_m.size(), Vec3(10, 3, 3));
+  EXPECT_EQ(scene.gravity_m_s2, Vec3::Zero());
+  EXPECT_EQ(scene.planner.preset, "paper");
+  EXPECT_EQ(scene.planner.iterations, 1000);
+  EXPECT_EQ(scene.planner.min_duration_s, 0.2);
+  EXPECT_EQ(scene.planner.max_duration_s, 1);
+  int tets = 0;
+  for (const BodySpec& body : scene.bodies) {
+    tets += int(made_cage(body)->tets.rows());
+    EXPECT_EQ(body.material.youngs_modulus_pa, 5e3);
+    EXPECT_EQ(body.material.poisson_ratio, 0.45);
+    EXPECT_EQ(body.material.density_kg_m3, 100);
+  }
+  EXPECT_EQ(tets, 675);
+  // The gap over the lower plate and under the upper one is 0.8, less than the robot's 1.
+  EXPECT_NEAR(scene.bounds_m.upper.z() - start_box(scene.bodies[1])->upper.z(), 0.8, 1e-12);
+  EXPECT_NEAR(start_box(scene.bodies[2])->lower.z() - scene.bounds_m.lower.z(), 0.8, 1e-12);
+}
+
+TEST(Library, BunnyGateIsNarrowerThanEitherBunny) {
+  const Scene scene = read_scene_file(find_scene("bunny_gate"));
+  const double gap_m = start_box(scene.bodies[2])->lower.y() - start_box(scene.bodies[1])->upper.y();
+  EXPECT_NEAR(gap_m, 0.5, 1e-12);
+  const auto& bunny = scene.bodies[std::size_t(scene.robot)];
+  SurfaceMesh made = *made_surface(bunny);
+  transform(world_from_model(bunny, made.positions, true), made.positions);
+  const Box box = bounding_box(made.positions);
+  EXPECT_GT(box.size().y(), 1.2 * gap_m);
+  EXPECT_NEAR(box.size().z(), 1, 1e-12);
+  EXPECT_NEAR(box.lower.z(), bunny.pose.position_m.z(), 1e-12);
+}
+
+TEST(Library, FindsByFileFolderAndName) {
+  TemporaryFolder folder;
+  put(folder / "mine/scene.toml", "x");
+  put(folder / "barriers1/scene.toml", "x");
+  EXPECT_EQ(find_scene((folder / "mine/scene.toml").string()), folder / "mine/scene.toml");
+  EXPECT_EQ(find_scene((folder / "mine").string()), folder / "mine/scene.toml");
+  const Environment environment("LIMBER_SCENES", "/no/such/folder:" + folder.path().string());
+  EXPECT_EQ(find_scene("mine"), folder / "mine/scene.toml");
+  EXPECT_EQ(find_scene("barriers1"), folder / "barriers1/scene.toml") << "LIMBER_SCENES comes first";
+}
+
+TEST(Library, UnknownSceneNamesTheNearest) {
+  try {
+    find_scene("bariers1");
+    FAIL();
+  } catch (const InputError& error) {
+    EXPECT_THAT(error.what(), HasSubstr("did you mean \"barriers1\"? known scenes: barriers1, bunny_gate"));
+  }
+}
+
+TEST(Library, ModelsAreLookedForBesideTheSceneThenInTheCache) {
+  TemporaryFolder folder;
+  const Environment environment("LIMBER_MODELS", (folder / "cache").string());
+  const std::vector<fs::path> folders{folder / "scene", folder / "data"};
+  EXPECT_FALSE(find_model("a.off", folders));
+  put(folder / "cache/a.off", "cache");
+  EXPECT_EQ(find_model("a.off", folders), folder / "cache/a.off");
+  put(folder / "data/a.off", "data");
+  EXPECT_EQ(find_model("a.off", folders), folder / "data/a.off");
+  put(folder / "scene/a.off", "scene");
+  EXPECT_EQ(find_model("a.off", folders), folder / "scene/a.off");
+  EXPECT_EQ(find_model((folder / "data/a.off").string(), {}), folder / "data/a.off");
+  EXPECT_FALSE(find_model((folder / "none.off").string(), folders));
+  EXPECT_FALSE(find_model("cache", folders)) << "a folder is not a model";
+  EXPECT_THAT(how_to_get_model("b.off", folders), HasSubstr("put it into one of these folders"));
+  put(folder / "scene/setup", "");
+  EXPECT_THAT(how_to_get_model("b.off", folders), HasSubstr("scene/setup to fetch it"));
+}
+
+// The set-up step with a made-up apt-get before the real one.
+int run_setup(const TemporaryFolder& folder, const std::string& apt_get) {
+  put(folder / "bin/apt-get", "#!/bin/sh\n" + apt_get + "\n");
+  fs::permissions(folder / "bin/apt-get", fs::perms::owner_all);
+  return std::system(fmt::format("PATH={}:$PATH LIMBER_MODELS={} {}/scenes/bunny_gate/setup > {} 2>&1",
+                                 (folder / "bin").string(), (folder / "models").string(), LIMBER_SOURCE_DIR,
+                                 (folder / "said").string())
+                         .c_str());
+}
+
+TEST(BunnyGateSetup, EndsWellAndSaysSoWithoutThePackage) {
+  TemporaryFolder folder;
+  for (const char* apt_get : {"exit 100", "exit 0", "echo junk > libcgal-demo_1_all.deb"}) {
+    EXPECT_EQ(run_setup(folder, apt_get), 0);
+    EXPECT_THAT(read_file(folder / "said"), HasSubstr("the scene will use the made rabbit instead"));
+    EXPECT_TRUE(fs::is_empty(folder / "models")) << "left something behind";
+  }
+}
+
+TEST(BunnyGateSetup, IsDoneWhenTheModelIsThere) {
+  TemporaryFolder folder;
+  put(folder / "models/bunny00.off", "OFF\n37706 75408 0\n");
+  EXPECT_EQ(run_setup(folder, "exit 100"), 0);
+  EXPECT_THAT(read_file(folder / "said"), HasSubstr("bunny00.off is there"));
+}
+
+TEST(Library, CacheFollowsTheEnvironment) {
+  const Environment cache("XDG_CACHE_HOME", "/x");
+  EXPECT_EQ(model_cache(), "/x/limber/models");
+  const Environment models("LIMBER_MODELS", "/m");
+  EXPECT_EQ(model_cache(), "/m");
+}
+
+}  // namespace
+}  // namespace limber::scenes

@@ -1,0 +1,435 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <map>
+
+#include "core/error.h"
+#include "core/random.h"
+#include "scenes/detail/schema.h"
+#include "scenes/library.h"
+#include "scenes/models.h"
+#include "scenes/scene.h"
+
+namespace limber::scenes {
+namespace {
+
+using testing::HasSubstr;
+using testing::StartsWith;
+
+const std::string good = R"(name = "good"
+[world]
+bounds_m = [[0, 0, 0], [10, 3, 3]]
+[[bodies]]
+name = "robot"
+role = "robot"
+model = { box = { size_m = [1, 1, 1], bevel_m = 0.1 } }
+cage = { cells = [3, 3, 3] }
+material = { youngs_modulus_pa = 5e3, density_kg_m3 = 100 }
+pose = { position_m = [1, 1.5, 1.5] }
+[[bodies]]
+name = "gate"
+role = "obstacle"
+model = { plate = { size_m = [0.4, 3, 3], hole = { size_m = 1.0 } } }
+cage = { tets = 200 }
+material = { youngs_modulus_pa = 5e3, density_kg_m3 = 100 }
+pose = { position_m = [3, 1.5, 1.5] }
+fixed = ["walls", { box_m = [[2, 0, 0], [4, 1, 1]] }]
+[goal]
+center_of_mass_m = [9, 1.5, 1.5]
+radius_m = 0.25
+[planner]
+max_force_n = 500
+[camera]
+keyframes = [{ at = 0, eye_m = [0, -9, 1], target_m = [0, 0, 1] }, { at = 1, eye_m = [9, -9, 1], target_m = [9, 0, 1] }]
+)";
+
+std::string replaced(std::string text, const std::string& from, const std::string& to) {
+  const auto at = text.find(from);
+  LIMBER_CHECK(at != text.npos, from);
+  return text.replace(at, from.size(), to);
+}
+
+std::string complaint(const std::string& text, const std::vector<std::string>& sets = {}) {
+  try {
+    read_scene(text, "s.toml", sets);
+  } catch (const InputError& error) {
+    return error.what();
+  }
+  return "no complaint";
+}
+
+// "s.toml:LINE:COLUMN: " of the place where `what` starts in `text`.
+std::string place(const std::string& text, const std::string& what) {
+  const auto at = text.find(what);
+  LIMBER_CHECK(at != text.npos, what);
+  const auto line_start = text.rfind('\n', at) + 1;
+  return fmt::format("s.toml:{}:{}: ", std::count(text.begin(), text.begin() + std::ptrdiff_t(at), '\n') + 1,
+                     at - line_start + 1);
+}
+
+TEST(ReadScene, ReadsWhatIsWritten) {
+  const Scene s = read_scene(good, "s.toml");
+  EXPECT_EQ(s.name, "good");
+  EXPECT_EQ(s.bounds_m.upper, Vec3(10, 3, 3));
+  ASSERT_EQ(s.bodies.size(), 2U);
+  EXPECT_EQ(s.robot, 0);
+  EXPECT_EQ(std::get<BoxModel>(s.bodies[0].model).bevel_m, 0.1);
+  EXPECT_EQ(std::get<BoxModel>(s.bodies[0].model).triangle_m, 1.0 / 32);
+  EXPECT_EQ(s.bodies[0].cage.cells, Eigen::Vector3i(3, 3, 3));
+  EXPECT_EQ(s.bodies[0].material.youngs_modulus_pa, 5000);
+  EXPECT_EQ(s.bodies[0].material.poisson_ratio, 0.45);
+  EXPECT_TRUE(s.bodies[1].fixed.walls);
+  ASSERT_EQ(s.bodies[1].fixed.boxes_m.size(), 1U);
+  EXPECT_EQ(s.bodies[1].fixed.boxes_m[0].upper, Vec3(4, 1, 1));
+  EXPECT_EQ(s.goal.center_of_mass_m, Vec3(9, 1.5, 1.5));
+  EXPECT_EQ(s.planner.max_force_n, 500);
+  EXPECT_EQ(s.camera.keyframes[1].eye_m, Vec3(9, -9, 1));
+  EXPECT_EQ(s.text, good);
+}
+
+TEST(ReadScene, PresetDecidesOnlyWhatIsNotWritten) {
+  EXPECT_EQ(read_scene(good, "").planner.max_duration_s, 1);
+  EXPECT_EQ(read_scene(good, "", {"planner.preset=fast"}).planner.max_duration_s, 3);
+  EXPECT_EQ(read_scene(good, "", {"planner.preset=fast"}).planner.min_force_share, 0.8);
+  EXPECT_EQ(
+      read_scene(good, "", {"planner.preset=fast", "planner.duration_s=[0.1, 2]"}).planner.max_duration_s, 2);
+}
+
+// Replacing one text in the good scene by another brings a complaint at the place where `at` stands, with
+// these words.
+struct Slip {
+  const char *from, *to, *at, *words;
+};
+
+TEST(ReadScene, ComplainsWithLineAndColumn) {
+  const Slip slips[] = {
+      {"radius_m = 0.25", "radius = 0.25", "radius = 0.25", "did you mean \"radius_m\"?"},
+      {"max_force_n", "max_force",
+       "max_force =", "unknown key \"max_force\" in planner; did you mean \"max_force_n\"?"},
+      {"role = \"robot\"\n", "role = \"robot\"\nfriction = 1\n", "friction",
+       "friction belongs into bodies[].material"},
+      {"[goal]", "[goals]", "goals]", "did you mean \"goal\"?"},
+      {"radius_m = 0.25", "radius_m = \"0.25\"", "\"0.25\"",
+       "goal.radius_m must be a number > 0, not a text; write for example radius_m = 1.0"},
+      {"name = \"gate\"", "name = 3", "3\nrole", "must be a name, not a whole number"},
+      {"[1, 1.5, 1.5]", "[1, true, 1.5]", "true", "bodies.robot.pose.position_m[1] must be"},
+      {"[1, 1.5, 1.5]", "[1, 1.5]", "[1, 1.5]", "has 2 elements; it must be a list of 3 numbers"},
+      {"pose = { position_m = [1, 1.5, 1.5] }", "pose = 1", "1\n[[bodies]]\nname = \"gate",
+       "must be a table"},
+      {"density_kg_m3 = 100", "density_kg_m3 = -1", "-1 }",
+       "is -1, out of its range; it must be > 0 and ≤ 100000"},
+      {"density_kg_m3 = 100", "density_kg_m3 = nan", "nan", "write a finite number"},
+      {"density_kg_m3 = 100", "density_kg_m3 = inf", "inf", "write a finite number"},
+      {"density_kg_m3 = 100", "density_kg_m3 = 100, poisson_ratio = 0.5", "0.5 }",
+       "must be ≥ 0.25 and ≤ 0.495"},
+      {"cells = [3, 3, 3]", "cells = [3, 3.5, 3]", "3.5", "must be a whole number"},
+      {"cells = [3, 3, 3]", "cells = [3, 3, 3], tets = 9", "{ cells", "both tets and cells"},
+      {"cage = { cells = [3, 3, 3] }", "cage = {}", "{}", "neither tets nor cells"},
+      {"tets = 200", "cells = [1, 1, 1]", "[1, 1, 1] }\nmaterial", "needs a box"},
+      {"size_m = [1, 1, 1]", "size_m = [1, 0, 1]", "0, 1], bevel", "bodies.robot.model.box.size_m[1] is 0"},
+      {"bevel_m = 0.1", "bevel_m = 0.6", "0.6", "it must be ≤ 0.5"},
+      {"bevel_m = 0.1", "triangle_m = 1e-5", "1e-5", "triangles"},
+      {"size_m = 1.0", "size_m = 3.5", "3.5", "does not fit"},
+      {"{ box = { size_m = [1, 1, 1], bevel_m = 0.1 } }", "{}", "{}",
+       "none of file, made, box, plate, sphere"},
+      {", bevel_m = 0.1 } }", " }, sphere = { diameter_m = 1 } }", "{ box", "more than one of"},
+      {", bevel_m = 0.1 } }", " }, scale = 2 }", "2 }\ncage", "goes with file only"},
+      {"{ box = { size_m = [1, 1, 1], bevel_m = 0.1 } }", "{ file = \"a\", up = \"+x\" }", "\"+x\"",
+       "same axis"},
+      {"{ box = { size_m = [1, 1, 1], bevel_m = 0.1 } }", "{ file = \"a\", scale = 1, height_m = 1 }",
+       "1, height", "both scale and height_m"},
+      {"role = \"obstacle\"", "role = \"robot\"", "\"robot\"\nmodel = { plate", "two robots, robot and gate"},
+      {"role = \"robot\"", "role = \"free\"", "[[bodies]]", "there is no robot"},
+      {"role = \"robot\"", "role = \"robt\"", "\"robt\"", "did you mean \"robot\"?"},
+      {"role = \"robot\"", "role = \"robot\"\nkind = \"rigid\"", "\"rigid\"", "rigid bodies do not move"},
+      {"material = { youngs_modulus_pa = 5e3, density_kg_m3 = 100 }\n", "", "[[bodies]]", "lacks a material"},
+      {"youngs_modulus_pa = 5e3, ", "", "{ density", "bodies.robot.material lacks \"youngs_modulus_pa\""},
+      {"radius_m = 0.25\n", "", "[goal]", "goal lacks \"radius_m\""},
+      {"[goal]\ncenter_of_mass_m = [9, 1.5, 1.5]\nradius_m = 0.25\n", "", "name", "add [goal]"},
+      {"name = \"gate\"", "name = \"robot\"", "\"robot\"\nrole = \"obst", "two bodies are called \"robot\""},
+      {"name = \"gate\"", "name = \"../gate\"", "\"../gate\"", "letters, digits"},
+      {"[9, 1.5, 1.5]", "[11, 1.5, 1.5]", "[11,",
+       "goal is outside the bounds: x = 11 is not between 0 and 10"},
+      {"[1, 1.5, 1.5]", "[1, 1.5, 2.6]", "[1, 1.5, 2.6]", "it reaches z = 3.1, they end at 3"},
+      {"[1, 1.5, 1.5]", "[1, 1.5, 1.5], angle_deg = 45", "[1, 1.5, 1.5], angle", "no complaint"},
+      {"[1, 1.5, 1.5] }", "[1, 2.4, 1.5], angle_deg = 45 }", "[1, 2.4", "reaches y = 3.10711"},
+      {"[1, 1.5, 1.5] }", "[1, 1.5, 1.5], axis = [0, 0, 0] }", "[0, 0, 0] }", "points nowhere"},
+      {"[[0, 0, 0], [10, 3, 3]]", "[[0, 0, 0], [10, -3, 3]]", "[10, -3",
+       "upper y = -3, which is not above lower y = 0"},
+      {"[[0, 0, 0], [10, 3, 3]]", "[[0, 0, 0], [10, 0, 3]]", "[10, 0", "upper y = 0"},
+      {"[[0, 0, 0], [10, 3, 3]]", "[0, 0, 0, 10, 3, 3]", "[0, 0, 0, 10", "two corners"},
+      {"max_force_n = 500", "max_force_n = 500\nduration_s = [2, 1]", "[2, 1]",
+       "write the smaller one first"},
+      {"max_force_n = 500", "max_force_n = 500\nforce_share = [0, 1.5]", "1.5]\n[camera",
+       "force_share[1] is 1.5"},
+      {"max_force_n = 500", "max_force_n = 500\nweights = { body = 0, control_point = 0 }", "{ body",
+       "both 0"},
+      {"at = 1,", "at = 0,", "0, eye_m = [9", "put them in order"},
+      {"target_m = [0, 0, 1]", "target_m = [0, -9, 1]", "[0, -9, 1] }", "looks at the place where it is"},
+      {"fixed = [\"walls\"", "fixed = [\"wall\"", "\"wall\"", "must be \"walls\", or a list"},
+      {"fixed = [\"walls\"", "fixed = [\"walls\", { boxm = 1 }", "boxm", "did you mean \"box_m\"?"},
+      {"name = \"good\"", "name = \"good\"\nname = \"twice\"", "\"twice\"", "not TOML"},
+      {"name = \"good\"", "name = 1979-05-27", "1979", "dates"},
+      {"radius_m = 0.25", "radius_m = 1e10", "1e10", "between"},
+  };
+  for (const Slip& slip : slips) {
+    SCOPED_TRACE(fmt::format("{} → {}", slip.from, slip.to));
+    const std::string text = replaced(good, slip.from, slip.to), said = complaint(text);
+    EXPECT_THAT(said, HasSubstr(slip.words));
+    if (said == "no complaint") continue;
+    EXPECT_THAT(said, StartsWith(place(text, slip.at)));
+    EXPECT_THAT(said, HasSubstr(";")) << "says nothing of what to try";
+  }
+}
+
+TEST(ReadScene, EmptyTextsSayWhereToStart) {
+  for (const char* text : {"", "\n\n", "# only a comment\n"})
+    EXPECT_THAT(complaint(text), StartsWith("s.toml:1:1: the scene is empty; start from"));
+}
+
+TEST(ReadScene, MissingFile) { EXPECT_THROW(read_scene_file("/no/such/scene.toml"), InputError); }
+
+TEST(Sets, EditBeforeReading) {
+  const auto modulus = [](const std::string& set) {
+    return read_scene(good, "s", {set}).bodies[0].material.youngs_modulus_pa;
+  };
+  EXPECT_EQ(modulus("bodies.robot.material.youngs_modulus_pa=7e4"), 7e4);
+  EXPECT_EQ(modulus("bodies.robot.youngs_modulus_pa=7e4"), 7e4);
+  EXPECT_EQ(modulus("bodies.0.youngs_modulus_pa=7e4"), 7e4);
+  EXPECT_EQ(read_scene(good, "s", {"bodies.gate.hole.size_m=0.5"}).bodies.size(), 2U);
+  EXPECT_EQ(std::get<BoxModel>(read_scene(good, "s", {"bodies.robot.bevel_m=0.2"}).bodies[0].model).bevel_m,
+            0.2);
+  EXPECT_EQ(read_scene(good, "s", {"film.frames_per_second=60"}).film.frames_per_second, 60);
+  EXPECT_EQ(read_scene(good, "s", {"description=two words"}).description, "two words");
+  EXPECT_EQ(read_scene(good, "s", {"planner.seed=1", "planner.seed=2"}).planner.seed, 2);
+  EXPECT_EQ(read_scene(good, "s", {"camera.keyframes.0.eye_m=[1,2,3]"}).camera.keyframes[0].eye_m,
+            Vec3(1, 2, 3));
+}
+
+TEST(Sets, ComplaintsNameTheEdit) {
+  EXPECT_THAT(complaint(good, {"bodies.robt.color=#000000"}),
+              StartsWith("--set bodies.robt.color=#000000: bodies has no \"robt\"; did you mean \"robot\"?"));
+  EXPECT_THAT(
+      complaint(good, {"planner.goal_bais=1"}),
+      StartsWith(
+          "--set planner.goal_bais=1: unknown key \"goal_bais\" in planner; did you mean \"goal_bias\"?"));
+  EXPECT_THAT(complaint(good, {"planner.goal_bias=2"}),
+              StartsWith("--set planner.goal_bias=2: planner.goal_bias is 2, out of"));
+  EXPECT_THAT(complaint(good, {"planner.goal_bias=[1, \"x\"]"}),
+              StartsWith("--set planner.goal_bias=[1, \"x\"]: planner.goal_bias must be a number"));
+  for (const char* set : {"planner", "=3", "", "planner.=3", ".=1", "goal.radius_m.x=1", "bodies..x=1",
+                          "bodies.robot.=1", "name.x.y=1", "bodies.robot=1", "bodies=1"})
+    EXPECT_THAT(complaint(good, {set}),
+                testing::AllOf(StartsWith(fmt::format("--set {}: ", set)), HasSubstr(";")))
+        << set;
+}
+
+TEST(Sets, SceneIsReadAgainFromItsTextAndSets) {
+  const Scene once = read_scene(good, "s", {"planner.seed=5", "bodies.robot.friction=0.7"});
+  const Scene twice = read_scene(once.text, "s", once.sets);
+  EXPECT_EQ(twice.planner.seed, 5);
+  EXPECT_EQ(twice.bodies[0].material.friction, 0.7);
+}
+
+bool reads_or_complains(const std::string& text) {
+  try {
+    read_scene(text, "s.toml");
+  } catch (const InputError&) {
+  }
+  return true;  // anything else flies on and fails the test
+}
+
+TEST(ReadScene, EveryTruncatedPrefixIsReadOrRefused) {
+  for (std::size_t n = 0; n < good.size(); ++n) ASSERT_TRUE(reads_or_complains(good.substr(0, n))) << n;
+}
+
+TEST(ReadScene, EveryDeletedOrChangedCharacterIsReadOrRefused) {
+  Rng rng(7, 0);
+  for (std::size_t n = 0; n < good.size(); ++n) {
+    std::string text = good;
+    ASSERT_TRUE(reads_or_complains(text.erase(n, 1))) << n;
+    text = good;
+    text[n] = char(rng.below(256));
+    ASSERT_TRUE(reads_or_complains(text)) << n << " " << int(text[n]);
+  }
+}
+
+TEST(ReadScene, DeepNestingIsRefused) {
+  EXPECT_THAT(complaint("a = " + std::string(100000, '[')), HasSubstr("not TOML"));
+}
+
+// ---- the reader's table of keys and docs/scene.md ----
+
+// A legal value that differs from what `good` holds, so that reading it must change the scene.
+std::string another_value(const Key& key) {
+  static const std::map<std::string_view, std::string> particular = {
+      {"name", "\"other\""},
+      {"bodies[].name", "\"other\""},
+      {"world.bounds_m", "[[-1, -1, -1], [11, 4, 4]]"},
+      {"goal.center_of_mass_m", "[8, 1, 1]"},
+      {"bodies[].pose.position_m", "[2, 1.5, 1.5]"},
+      {"bodies[].pose.axis", "[1, 0, 0]"},
+      {"bodies[].model.box.size_m", "[0.9, 0.8, 0.7]"},
+      {"bodies[].model.box.bevel_m", "0.2"},
+      {"bodies[].model.box.triangle_m", "0.2"},
+      {"bodies[].model.plate.size_m", "[0.3, 2.9, 2.9]"},
+      {"bodies[].model.plate.bevel_m", "0.02"},
+      {"bodies[].model.plate.triangle_m", "0.2"},
+      {"bodies[].model.plate.hole.size_m", "0.7"},
+      {"bodies[].model.plate.hole.center_m", "[0.1, 0.2]"},
+      {"bodies[].model.sphere.diameter_m", "0.8"},
+      {"bodies[].model.sphere.triangle_m", "0.2"},
+      {"bodies[].fixed", "[]"},
+      {"bodies[].fixed[].box_m", "[[2, 0, 0], [4, 2, 2]]"},
+      {"bodies[].cage.cells", "[2, 2, 2]"},
+      {"bodies[].model.up", "\"+y\""},
+      {"bodies[].model.front", "\"-y\""},
+      {"camera.keyframes[].at", "0.5"},
+      {"camera.keyframes[].eye_m", "[0, -8, 1]"},
+      {"camera.keyframes[].target_m", "[0, 0.5, 1]"},
+      {"camera.keyframes", "[]"},
+      {"planner.duration_s", "[0.3, 0.4]"},
+  };
+  if (const auto at = particular.find(key.path); at != particular.end()) return at->second;
+  switch (key.type) {
+    case Type::text:
+      return "\"other\"";
+    case Type::choice:
+      return fmt::format(
+          "\"{}\"",
+          key.choices.substr(key.choices.rfind(", ") == key.choices.npos ? 0 : key.choices.rfind(", ") + 2));
+    case Type::number:
+      return fmt::format("{}", std::max(0.4321, key.interval.lower));
+    case Type::integer:
+      return "77";
+    case Type::boolean:
+      return "false";
+    case Type::vector:
+      return key.count == 2 ? "[0.5, 0.25]" : "[0.5, 0.25, 0.125]";
+    case Type::integers:
+      return "[17, 19]";
+    case Type::range:
+      return "[0.25, 0.5]";
+    case Type::color:
+      return "\"#123456\"";
+    default:
+      return "";
+  }
+}
+
+// All that a scene says, but for its text.
+std::string all_of(const Scene& s);
+
+TEST(Keys, EveryKeyChangesTheScene) {
+  const std::string file_robot = "bodies.robot.model={ file = \"a.off\" }",
+                    tets_robot = "bodies.robot.cage={ tets = 50 }";
+  const std::string sphere_robot = "bodies.robot.model={ sphere = { diameter_m = 1.0 } }";
+  int leaves = 0;
+  for (const Key& key : keys()) {
+    if (key.type == Type::table || key.type == Type::tables) continue;
+    SCOPED_TRACE(std::string(key.path));
+    const bool plate = key.path.find(".plate") != key.path.npos,
+               fixed = key.path.find(".fixed") != key.path.npos;
+    std::vector<std::string> sets;
+    if (key.parent() == "bodies[].model" && key.path != "bodies[].model.made")
+      sets = {file_robot, tets_robot};
+    if (key.path == "bodies[].model.made") sets = {file_robot, tets_robot};
+    if (key.path.find(".sphere") != key.path.npos) sets = {sphere_robot, tets_robot};
+    if (key.path == "bodies[].cage.tets" || key.path == "bodies[].cage.mode" ||
+        key.path == "bodies[].cage.shells")
+      sets = {tets_robot};
+    if (key.path == "bodies[].pose.axis") sets = {"bodies.robot.pose.angle_deg=90"};
+    std::string path = replaced(std::string(key.path) + " ", " ", "");
+    const std::string body = plate || fixed || key.path == "bodies[].kind" || key.path == "bodies[].role"
+                                 ? "bodies.gate"
+                                 : "bodies.robot";
+    if (path.starts_with("bodies[]")) path = replaced(path, "bodies[]", body);
+    if (fixed && path.ends_with(".box_m")) path = replaced(path, "[]", ".1");
+    if (path.find("keyframes[]") != path.npos) path = replaced(path, "keyframes[]", "keyframes.0");
+    const std::string before = all_of(read_scene(good, "s", sets));
+    sets.push_back(path + "=" + another_value(key));
+    SCOPED_TRACE(sets.back());
+    EXPECT_NE(all_of(read_scene(good, "s", sets)), before);
+    ++leaves;
+  }
+  EXPECT_GT(leaves, 60);
+}
+
+TEST(Keys, DefaultsAreInTheirRanges) {
+  for (const Key& key : keys())
+    for (const std::string_view toml : {key.fallback, key.fast})
+      if (toml != required && toml != may_lack && toml != "[]" && toml != "{}") {
+        const std::string path(key.path);
+        SCOPED_TRACE(path);
+        if (path.starts_with("bodies[]") || path.find("[]") != path.npos) continue;  // below, in a body
+        EXPECT_NO_THROW(read_scene(good, "s", {path + "=" + std::string(toml)}));
+      }
+  EXPECT_NO_THROW(read_scene(good, "s"));
+}
+
+// LIMBER_WRITE_DOCS=1 writes the page anew.
+TEST(Keys, ReferencePageIsWhatTheReaderReads) {
+  const fs::path page = fs::path(LIMBER_SOURCE_DIR) / "docs" / "scene.md";
+  const std::string from = "<!-- keys: written by LIMBER_WRITE_DOCS=1 scenes_tests -->\n",
+                    to = "<!-- end of keys -->\n";
+  const std::string text = read_file(page);
+  const auto begin = text.find(from), end = text.find(to);
+  ASSERT_NE(begin, text.npos);
+  ASSERT_NE(end, text.npos);
+  const std::string wanted =
+      text.substr(0, begin + from.size()) + "\n" + scene_reference() + text.substr(end);
+  if (std::getenv("LIMBER_WRITE_DOCS")) write_file(page, wanted);
+  EXPECT_EQ(read_file(page), wanted)
+      << "docs/scene.md is behind the reader: run LIMBER_WRITE_DOCS=1 scenes_tests";
+}
+
+std::string all_of(const Model& model) {
+  const auto v = [](const auto& x) { return fmt::format("{} {} ", x[0], x[1]); };
+  const auto box_text = [&](const BoxModel& m) {
+    return fmt::format("{}{} {} {} ", v(m.size_m), m.size_m[2], m.bevel_m, m.triangle_m);
+  };
+  if (const auto* m = std::get_if<FileModel>(&model))
+    return fmt::format("file {} {} {} {} {}{} {}{}", m->file, m->made, m->scale, m->height_m.value_or(-1),
+                       v(m->up), m->up[2], v(m->front), m->front[2]);
+  if (const auto* m = std::get_if<MadeModel>(&model)) return fmt::format("made {} {}", m->made, m->height_m);
+  if (const auto* m = std::get_if<BoxModel>(&model)) return "box " + box_text(*m);
+  if (const auto* m = std::get_if<SphereModel>(&model))
+    return fmt::format("sphere {} {}", m->diameter_m, m->triangle_m);
+  const auto& plate = std::get<PlateModel>(model);
+  return fmt::format("plate {}", box_text(plate.box)) +
+         (plate.hole ? fmt::format("{} {} {}", plate.hole->round, plate.hole->size_m, v(plate.hole->center_m))
+                     : "");
+}
+
+std::string all_of(const Scene& s) {
+  const auto v = [](const auto& x) { return fmt::format("{} {} {} ", x[0], x[1], x[2]); };
+  const auto b = [&](const Box& x) { return v(x.lower) + v(x.upper); };
+  std::string t = fmt::format("{} {} {} {} {} {}\n", s.name, s.description, b(s.bounds_m), s.walls,
+                              v(s.gravity_m_s2), s.max_dt_s.value_or(-1));
+  for (const BodySpec& body : s.bodies) {
+    const MaterialSpec& m = body.material;
+    t += fmt::format("{} {} {} {} | {} {} {} {} | {} {} {} {} {} | {} {} {} {} | {}", body.name,
+                     int(body.role), int(body.kind), all_of(body.model), body.cage.tets, v(body.cage.cells),
+                     body.cage.mode, body.cage.shells, m.youngs_modulus_pa, m.poisson_ratio, m.density_kg_m3,
+                     m.damping_ratio, m.friction, v(body.pose.position_m), v(body.pose.axis),
+                     body.pose.angle_deg, body.pose.anchor, v(body.color_srgb));
+    t += fmt::format(" {}", body.fixed.walls);
+    for (const Box& box : body.fixed.boxes_m) t += b(box);
+    t += "\n";
+  }
+  const PlannerSpec& p = s.planner;
+  t += fmt::format("{} {} {}\n", s.robot, v(s.goal.center_of_mass_m), s.goal.radius_m);
+  t += fmt::format("{} {} {} {} {} {} {} {} {} {} {} {} {} {} {} {}\n", p.preset, p.seed, p.iterations,
+                   p.goal_bias, p.weight_body, p.weight_control_point, p.weight_interpolation, p.max_force_n,
+                   p.min_force_share, p.max_force_share, p.min_duration_s, p.max_duration_s,
+                   p.control_point_radius_m, p.settle_time_s, p.settle_speed_m_s, p.settle_force_share);
+  t += fmt::format("{} {}", v(s.camera.direction), s.camera.fov_deg);
+  for (const Keyframe& k : s.camera.keyframes) t += fmt::format(" {} {} {}", k.at, v(k.eye_m), v(k.target_m));
+  const FilmSpec& f = s.film;
+  return t + fmt::format("\n{} {} {} {} {} {} {}", f.width_px, f.height_px, f.frames_per_second,
+                         v(f.background_srgb), f.bounds_lines, f.sheet_columns, f.sheet_rows);
+}
+
+}  // namespace
+}  // namespace limber::scenes
