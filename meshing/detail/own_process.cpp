@@ -1,0 +1,101 @@
+#include "meshing/detail/own_process.h"
+
+#include <fcntl.h>
+#include <sys/mman.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <csignal>
+#include <cstring>
+#include <new>
+
+#include "core/error.h"
+#include "core/progress.h"
+
+namespace limber::meshing::detail {
+
+namespace {
+
+constexpr int exit_returned = 0, exit_threw = 3, exit_no_memory = 4;
+
+struct Descriptor {
+  int fd;
+  ~Descriptor() { close(fd); }
+};
+
+bool write_all(int fd, const std::string& bytes) {
+  for (std::size_t done = 0; done < bytes.size();) {
+    const ssize_t n = write(fd, bytes.data() + done, bytes.size() - done);
+    if (n < 0 && errno == EINTR) continue;
+    if (n <= 0) return false;
+    done += std::size_t(n);
+  }
+  return true;
+}
+
+std::string read_all(int fd) {
+  const off_t size = lseek(fd, 0, SEEK_END);
+  std::string bytes(std::size_t(std::max<off_t>(size, 0)), '\0');
+  for (std::size_t done = 0; done < bytes.size();) {
+    const ssize_t n = pread(fd, bytes.data() + done, bytes.size() - done, off_t(done));
+    if (n < 0 && errno == EINTR) continue;
+    LIMBER_CHECK(n > 0, errno, done, bytes.size());
+    done += std::size_t(n);
+  }
+  return bytes;
+}
+
+[[noreturn]] void be_the_child(const std::function<std::string()>& work, int cpu_seconds, int fd) {
+  std::signal(SIGINT, SIG_DFL);
+  std::signal(SIGTERM, SIG_DFL);
+  const rlimit no_core{0, 0}, cpu{rlim_t(cpu_seconds), rlim_t(cpu_seconds) + 1};
+  setrlimit(RLIMIT_CORE, &no_core);
+  setrlimit(RLIMIT_CPU, &cpu);
+  int code = exit_returned;
+  std::string bytes;
+  try {
+    bytes = work();
+  } catch (const std::bad_alloc&) {
+    code = exit_no_memory;
+  } catch (const std::exception& e) {
+    code = exit_threw;
+    bytes = e.what();
+  }
+  if (!write_all(fd, bytes)) code = exit_no_memory;
+  _exit(code);  // no destructor, no exit handler: they belong to the parent
+}
+
+}  // namespace
+
+OwnProcessResult run_in_own_process(const std::function<std::string()>& work, int cpu_seconds) {
+  const Descriptor answer{memfd_create("limber", MFD_CLOEXEC)};
+  LIMBER_CHECK(answer.fd >= 0, errno);
+  const pid_t child = fork();
+  LIMBER_CHECK(child >= 0, errno);
+  if (child == 0) be_the_child(work, cpu_seconds, answer.fd);
+
+  int status = 0;
+  while (waitpid(child, &status, 0) < 0) LIMBER_CHECK(errno == EINTR, errno);
+  throw_if_stopped();
+  if (WIFSIGNALED(status)) {
+    const int number = WTERMSIG(status);
+    if (number == SIGXCPU || number == SIGKILL)
+      return {false, fmt::format("was stopped after {} s or for want of memory", cpu_seconds)};
+    return {false, fmt::format("crashed ({})", strsignal(number))};
+  }
+  switch (WEXITSTATUS(status)) {
+    case exit_returned:
+      return {true, read_all(answer.fd)};
+    case exit_threw:
+      return {false, read_all(answer.fd)};
+    case exit_no_memory:
+      return {false, "ran out of memory"};
+    default:
+      return {false, fmt::format("crashed (exit {})", WEXITSTATUS(status))};
+  }
+}
+
+}  // namespace limber::meshing::detail

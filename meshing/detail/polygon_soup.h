@@ -1,0 +1,39 @@
+// What a file says, before anything is mended: points, and polygons that name them.
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "core/file.h"
+#include "core/types.h"
+
+namespace limber::meshing::detail {
+
+struct PolygonSoup {
+  std::vector<Vec3> positions;  // file units; may be infinite or not a number
+  std::vector<int> corners;  // polygon i has corners[first_corner[i]] … corners[first_corner[i + 1] − 1]
+  std::vector<int> first_corner{0};
+  std::vector<std::string> warnings;  // what the reader left out, as sentences
+
+  int polygon_count() const { return int(first_corner.size()) - 1; }
+  // Each throws InputError when there are more than an int can number.
+  int add_position(const Vec3&);
+  void add_corner(int vertex);
+  void end_polygon();  // the corners added since the last one
+  // Throws InputError naming the first polygon that names a vertex that is not there.
+  void require_indices(const std::string& file) const;
+};
+
+// Each reads the whole text of a file; `file` is its name for messages. Throws InputError with the place:
+// "bunny.off:17: …".
+PolygonSoup read_obj(std::string_view text, const std::string& file);
+PolygonSoup read_off(std::string_view text, const std::string& file);
+PolygonSoup read_ply(std::string_view bytes, const std::string& file);
+PolygonSoup read_stl_text(std::string_view text, const std::string& file);
+PolygonSoup read_stl_binary(std::string_view bytes, const std::string& file);
+
+// Everything else, by assimp, in a process of its own: a crash or a hang there is an InputError here.
+PolygonSoup read_by_assimp(const fs::path&);
+
+}  // namespace limber::meshing::detail
