@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <map>
+#include <set>
 
 #include "core/error.h"
 #include "fem/detail/overlap.h"
@@ -188,13 +190,12 @@ detail::Tables<To> converted(const detail::Tables<double>& t) {
   return out;
 }
 
-void append_topology(const Body& body, int index, Topology& topology) {
-  const Tets& tets = body.cage.tets;
+// Each tet's faces, and through each face the next tet.
+void append_tets(const Body& body, Topology& topology) {
   std::map<std::array<int, 3>, std::pair<int, int>> faces;  // nodes → the tet and face that wait; −1: matched
-  std::vector<std::vector<int>> neighbors(std::size_t(body.node_count()));
-  for (int t = 0; t < tets.rows(); ++t) {
+  for (int t = 0; t < body.cage.tets.rows(); ++t) {
     Topology::Tet tet;
-    for (int i = 0; i < 4; ++i) tet.node[i] = tets(t, i) + body.first_node;
+    for (int i = 0; i < 4; ++i) tet.node[i] = body.cage.tets(t, i) + body.first_node;
     for (int i = 0; i < 4; ++i) {
       std::array<int, 3> face;
       for (int k = 0, m = 0; k < 4; ++k)
@@ -220,23 +221,49 @@ void append_topology(const Body& body, int index, Topology& topology) {
       other_tet = -1;
     }
     topology.tets.push_back(tet);
-    for (const auto& [i, j] : tet_edges) {
-      neighbors[tets(t, i)].push_back(tet.node[j]);
-      neighbors[tets(t, j)].push_back(tet.node[i]);
+  }
+}
+
+// The body's contact points: surface vertices, then middles of surface edges, each ascending.
+void append_points(const Body& body, Topology& topology) {
+  std::map<std::pair<int, int>, std::set<int>> around;  // body's own numbers; a vertex is the pair of itself
+  for (int v : body.surface_nodes) around[{v, v}];
+  std::map<std::pair<int, int>, std::set<int>> edges;
+  for (int f = 0; f < body.surface.rows(); ++f)
+    for (int i = 0; i < 3; ++i) edges[std::minmax(body.surface(f, i), body.surface(f, (i + 1) % 3))];
+  for (int t = 0; t < body.cage.tets.rows(); ++t) {
+    const auto q = body.cage.tets.row(t);
+    for (int i = 0; i < 4; ++i)
+      for (int j = i; j < 4; ++j) {
+        auto& list = i == j ? around : edges;
+        if (const auto found = list.find(std::minmax(q[i], q[j])); found != list.end())
+          found->second.insert(q.begin(), q.end());
+      }
+  }
+  for (const auto* list : {&around, &edges})
+    for (const auto& [pair, nodes] : *list) {
+      const auto [a, b] = pair;
+      const int begin = int(topology.neighbors.size());
+      for (int n : nodes)
+        if (a != b || n != a) topology.neighbors.push_back(body.first_node + n);
+      const float share = a == b ? 1.f : 0.5f;
+      topology.points.push_back({{body.first_node + a, body.first_node + b},
+                                 {share, 1 - share},
+                                 begin,
+                                 int(topology.neighbors.size())});
     }
-  }
-  for (auto& list : neighbors) {
-    std::sort(list.begin(), list.end());
-    list.erase(std::unique(list.begin(), list.end()), list.end());
-    topology.neighbors.insert(topology.neighbors.end(), list.begin(), list.end());
-    topology.neighbor_begin.push_back(int(topology.neighbors.size()));
-    topology.body_of_node.push_back(index);
-  }
+}
+
+void append_topology(const Body& body, int index, Topology& topology) {
   Topology::Body& range = topology.bodies[index];
-  range = {body.first_node, body.first_node + body.node_count(),
-           body.first_tet,  body.first_tet + int(tets.rows()),
-           body.moving,     {}};
+  range.first_node = body.first_node, range.last_node = body.first_node + body.node_count();
+  range.first_tet = body.first_tet, range.last_tet = body.first_tet + int(body.cage.tets.rows());
+  range.moving = body.moving;
   for (int n : body.surface_nodes) range.surface_nodes.push_back(body.first_node + n);
+  append_tets(body, topology);
+  range.first_point = int(topology.points.size());
+  append_points(body, topology);
+  range.last_point = int(topology.points.size());
 }
 
 void check_places(const World& world) {
@@ -307,7 +334,6 @@ World build_world(const WorldSpec& spec) {
         fmt::format("body {}: the robot has no node that can move", world.bodies[spec.robot].name));
 
   auto& tables = world.tables64;
-  world.topology.neighbor_begin = {0};
   world.topology.bodies.resize(world.bodies.size());
   world.nodes = 0;
   int tets = 0;

@@ -9,6 +9,8 @@
 namespace limber::fem::detail {
 namespace {
 
+constexpr float kept = 0.9f;  // share of a distance that movement may use up; the rest is for rounding
+
 template <class Real>
 Real dot(const Real a[3], const Real b[3]) {
   return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
@@ -28,14 +30,30 @@ void fetch(const LaneView<Real>& view, int node, Real out[3]) {
   for (int c = 0; c < 3; ++c) out[c] = view.x[(3 * node + c) * view.stride];
 }
 
+// Inward normals of a tet's faces, each twice as long as the face is large: 6V of (face, p) gains normal·δ
+// when p moves by δ.
+template <class Real>
+void face_normals(const Real* const place[4], Real normal[4][3]) {
+  Real edge[3][3];
+  for (int i = 0; i < 3; ++i)
+    for (int c = 0; c < 3; ++c) edge[i][c] = place[i + 1][c] - place[0][c];
+  for (int i = 0; i < 3; ++i) {
+    const Real *s = edge[(i + 1) % 3], *t = edge[(i + 2) % 3];
+    normal[i + 1][0] = s[1] * t[2] - s[2] * t[1];
+    normal[i + 1][1] = s[2] * t[0] - s[0] * t[2];
+    normal[i + 1][2] = s[0] * t[1] - s[1] * t[0];
+  }
+  for (int c = 0; c < 3; ++c) normal[0][c] = -(normal[1][c] + normal[2][c] + normal[3][c]);
+}
+
 // Normal force k d − c ṙ·n, never pulling; friction against the slip, at most μ times that, and at most what
 // takes a share of the slip away in one step. False: no force.
 template <class Real>
-bool penalty_force(Real depth, const Real normal[3], const Real relative_velocity[3], Real mass, Real step,
-                   Real friction, Real force[3]) {
-  constexpr Real damping = Real(2 * contact_damping_ratio * __builtin_sqrt(contact_beta));
+bool penalty_force(Real beta, Real depth, const Real normal[3], const Real relative_velocity[3], Real mass,
+                   Real step, Real friction, Real force[3]) {
+  const Real damping = Real(2 * contact_damping_ratio) * std::sqrt(beta);
   const Real speed = dot(relative_velocity, normal);
-  const Real push = mass / step * (Real(contact_beta) * depth / step - damping * speed);
+  const Real push = mass / step * (beta * depth / step - damping * speed);
   if (!(push > 0)) return false;
   Real slip[3];
   for (int c = 0; c < 3; ++c) slip[c] = relative_velocity[c] - speed * normal[c];
@@ -48,24 +66,15 @@ bool penalty_force(Real depth, const Real normal[3], const Real relative_velocit
 
 }  // namespace
 
-// A tet where it is now. Inward normals, each twice its face's area: 6V of (face, p) gains normal·δ when p
-// moves by δ.
+// A tet where it is now.
 template <class Real>
 struct Contacts<Real>::Cell {
   Real place[4][3], normal[4][3];
 
   Cell(const LaneView<Real>& view, const Topology::Tet& tet) {
     for (int i = 0; i < 4; ++i) fetch(view, tet.node[i], place[i]);
-    Real edge[3][3];
-    for (int i = 0; i < 3; ++i)
-      for (int c = 0; c < 3; ++c) edge[i][c] = place[i + 1][c] - place[0][c];
-    for (int i = 0; i < 3; ++i) {
-      const Real *s = edge[(i + 1) % 3], *t = edge[(i + 2) % 3];
-      normal[i + 1][0] = s[1] * t[2] - s[2] * t[1];
-      normal[i + 1][1] = s[2] * t[0] - s[0] * t[2];
-      normal[i + 1][2] = s[0] * t[1] - s[1] * t[0];
-    }
-    for (int c = 0; c < 3; ++c) normal[0][c] = -(normal[1][c] + normal[2][c] + normal[3][c]);
+    const Real* const places[4] = {place[0], place[1], place[2], place[3]};
+    face_normals(places, normal);
   }
 };
 
@@ -90,7 +99,15 @@ Contacts<Real>::Contacts(const World& world, int lanes)
       if (world.bodies[a].moving || world.bodies[b].moving) pairs_.emplace_back(a, b);
   lists_.resize(std::size_t(lanes) * pairs_.size());
   packed_.resize(std::size_t(world.nodes));
+  listed_.assign(std::size_t(world.nodes), false);
   touch_of_node_.assign(std::size_t(world.nodes), -1);
+}
+
+template <class Real>
+void Contacts<Real>::place_of(int point, Real out[3]) const {
+  const Topology::Point& p = topology_.points[point];
+  for (int c = 0; c < 3; ++c)
+    out[c] = Real(p.share[0]) * packed_[p.node[0]].at[c] + Real(p.share[1]) * packed_[p.node[1]].at[c];
 }
 
 template <class Real>
@@ -119,9 +136,10 @@ const std::vector<Touch<Real>>& Contacts<Real>::find(int lane, const LaneView<Re
   List& list = lists_[lane * pairs_.size() + std::size_t(pair - pairs_.begin())];
   refresh(view, a, b, list);
   for (int node : list.nodes) fetch(view, node, packed_[node].at);
-  find_touches(view, b, list, 0);
+  const Real travel = view.travel[a * view.stride] + view.travel[b * view.stride];
+  find_touches(view, b, travel, list, 0);
   const std::size_t second = touches_.size();
-  find_touches(view, a, list, 1);
+  find_touches(view, a, travel, list, 1);
   measure_depths(view, a, b, 0, second);
   measure_depths(view, b, a, second, touches_.size());
   return touches_;
@@ -133,102 +151,155 @@ template <class Real>
 void Contacts<Real>::refresh(const LaneView<Real>& view, int a, int b, List& list) {
   const Real reach = (tables_.skin[a] + tables_.skin[b]) / 2;
   const Real travel = view.travel[a * view.stride] + view.travel[b * view.stride];
-  if (list.built && travel - list.travel_at_build <= Real(0.9) * reach) return;
+  if (list.built && travel - list.travel_at_build <= kept * reach) return;
   list.built = true;
   list.travel_at_build = travel;
   list.nodes.clear();
   build_direction(view, a, b, reach, list, 0);
   build_direction(view, b, a, reach, list, 1);
-  std::sort(list.nodes.begin(), list.nodes.end());
-  list.nodes.erase(std::unique(list.nodes.begin(), list.nodes.end()), list.nodes.end());
+  for (int node : list.nodes) listed_[node] = false;
 }
 
+// Tet by tet, the points that a grid finds in its box; then by point, which keeps the tets of each ascending.
 template <class Real>
 void Contacts<Real>::build_direction(const LaneView<Real>& view, int from, int into, Real reach, List& list,
                                      int direction) {
   auto& records = list.records[direction];
   auto& candidates = list.candidates[direction];
   records.clear(), candidates.clear();
+  if (!sort_points(view, from, into, reach)) return;
 
-  // The vertices near the other body's box, and their own box.
-  Real lower[3], upper[3], box_lower[3], box_upper[3];
-  for (int c = 0; c < 3; ++c) {
-    lower[c] = std::numeric_limits<Real>::max(), upper[c] = -lower[c];
-    box_lower[c] = view.lower[(3 * into + c) * view.stride] - reach;
-    box_upper[c] = view.upper[(3 * into + c) * view.stride] + reach;
-  }
-  for (int node : topology_.bodies[from].surface_nodes) {
-    Real p[3];
-    fetch(view, node, p);
-    bool near = true;
-    for (int c = 0; c < 3; ++c) near = near && p[c] >= box_lower[c] && p[c] <= box_upper[c];
-    if (!near) continue;
-    for (int c = 0; c < 3; ++c) lower[c] = std::min(lower[c], p[c]), upper[c] = std::max(upper[c], p[c]);
-    records.push_back({node, 0, 0});
-    std::copy_n(p, 3, packed_[node].at);
-  }
-  if (records.empty()) return;
+  const Topology::Body& body = topology_.bodies[into];
+  for (int n = body.first_node; n < body.last_node; ++n) fetch(view, n, packed_[n].at);
+  found_.clear();
+  for (int t = body.first_tet; t < body.last_tet; ++t) collect_near(t, reach);
 
-  // The tets near that box. A point now in a tet was within `reach` of it at build, so it was on the inner
-  // side of each of its planes moved out by `reach`.
-  for (int n = topology_.bodies[into].first_node; n < topology_.bodies[into].last_node; ++n)
-    fetch(view, n, packed_[n].at);
-  near_.clear();
-  for (int t = topology_.bodies[into].first_tet; t < topology_.bodies[into].last_tet; ++t) {
-    const Topology::Tet& tet = topology_.tets[t];
-    NearTet q;
-    bool meets = true;
-    for (int c = 0; c < 3; ++c) {
-      const Real i = packed_[tet.node[0]].at[c], j = packed_[tet.node[1]].at[c],
-                 k = packed_[tet.node[2]].at[c], l = packed_[tet.node[3]].at[c];
-      q.lower[c] = std::min(std::min(i, j), std::min(k, l)) - reach;
-      q.upper[c] = std::max(std::max(i, j), std::max(k, l)) + reach;
-      meets = meets && q.lower[c] <= upper[c] && q.upper[c] >= lower[c];
-    }
-    if (!meets) continue;
-    q.tet = t;
-    const Cell cell(view, tet);
-    Real volume6 = 0;
-    for (int c = 0; c < 3; ++c) volume6 += cell.normal[1][c] * (cell.place[1][c] - cell.place[0][c]);
-    for (int i = 0; i < 4; ++i) {
-      const Real length = std::sqrt(dot(cell.normal[i], cell.normal[i]));
-      // A flat tet has no planes to speak of: its box alone decides.
-      const bool flat = std::abs(volume6) <= Real(1e-2) * length * reach;
-      const Real scale = flat ? Real(0) : (volume6 < 0 ? -1 : 1) / length;
-      for (int c = 0; c < 3; ++c) q.plane[i][c] = scale * cell.normal[i][c];
-      q.plane[i][3] = reach - dot(q.plane[i], cell.place[(i + 1) % 4]);
-    }
-    near_.push_back(q);
-  }
+  // Counting sort by point.
+  counts_.assign(points_.size() + 1, 0);
+  for (const Found& f : found_) ++counts_[f.point + 1];
+  for (std::size_t k = 1; k < counts_.size(); ++k) counts_[k] += counts_[k - 1];
+  for (int k = 0; k < int(points_.size()); ++k)
+    if (counts_[k] < counts_[k + 1]) records.push_back({first_point_ + k, counts_[k], counts_[k + 1]});
+  candidates.resize(found_.size());
+  for (const Found& f : found_)
+    candidates[counts_[f.point]++] = {f.tet, f.face, list.travel_at_build + kept * f.distance};
 
-  for (Record& record : records) {
-    record.begin = int(candidates.size());
-    const Real* p = packed_[record.vertex].at;
-    for (const NearTet& q : near_) {
-      if (p[0] < q.lower[0] || p[0] > q.upper[0] || p[1] < q.lower[1] || p[1] > q.upper[1] ||
-          p[2] < q.lower[2] || p[2] > q.upper[2])
-        continue;
-      int worst = 0;
-      Real least = std::numeric_limits<Real>::max();
-      for (int i = 0; i < 4; ++i) {
-        const Real distance = dot(q.plane[i], p) + q.plane[i][3];
-        if (distance < least) least = distance, worst = i;
-      }
-      if (least >= 0) candidates.push_back({q.tet, worst});
-    }
-    record.end = int(candidates.size());
-  }
-  std::erase_if(records, [](const Record& r) { return r.begin == r.end; });
-  for (const Record& r : records) list.nodes.push_back(r.vertex);
-  for (const Candidate& k : candidates) {
-    const int* node = topology_.tets[k.tet].node;
-    list.nodes.insert(list.nodes.end(), node, node + 4);
-  }
+  const auto name = [&](const int* node, int count) {
+    for (int i = 0; i < count; ++i)
+      if (!listed_[node[i]]) listed_[node[i]] = true, list.nodes.push_back(node[i]);
+  };
+  for (const Record& r : records) name(topology_.points[r.point].node, 2);
+  for (const Candidate& k : candidates) name(topology_.tets[k.tet].node, 4);
 }
 
-// The first tet that contains the vertex, in ascending order, has it: a point on a shared face has one owner.
+// Puts the points of a body that are near the other's box into grid cells; false when there are none.
 template <class Real>
-void Contacts<Real>::find_touches(const LaneView<Real>& view, int into, List& list, int direction) {
+bool Contacts<Real>::sort_points(const LaneView<Real>& view, int from, int into, Real reach) {
+  const Topology::Body& body = topology_.bodies[from];
+  for (int n = body.first_node; n < body.last_node; ++n) fetch(view, n, packed_[n].at);
+  Real lower[3], upper[3];
+  for (int c = 0; c < 3; ++c) {
+    lower[c] = view.lower[(3 * into + c) * view.stride] - reach;
+    upper[c] = view.upper[(3 * into + c) * view.stride] + reach;
+    grid_.lower[c] = std::numeric_limits<Real>::max(), grid_.upper[c] = -grid_.lower[c];
+  }
+  first_point_ = body.first_point;
+  points_.resize(std::size_t(body.last_point - body.first_point));
+  near_.clear();
+  for (int k = 0; k < int(points_.size()); ++k) {
+    Real* p = points_[k].at;
+    place_of(first_point_ + k, p);
+    if (p[0] < lower[0] || p[0] > upper[0] || p[1] < lower[1] || p[1] > upper[1] || p[2] < lower[2] ||
+        p[2] > upper[2])
+      continue;
+    near_.push_back(k);
+    for (int c = 0; c < 3; ++c) {
+      grid_.lower[c] = std::min(grid_.lower[c], p[c]);
+      grid_.upper[c] = std::max(grid_.upper[c], p[c]);
+    }
+  }
+  if (near_.empty()) return false;
+  for (int c = 0; c < 3; ++c) {
+    const Real size = grid_.upper[c] - grid_.lower[c];
+    grid_.cells[c] = 1 + int(std::min(size / (2 * reach), Real(most_cells - 1)));
+    grid_.inverse_cell[c] = Real(grid_.cells[c]) / (size + reach);
+  }
+  counts_.assign(std::size_t(grid_.cells[0] * grid_.cells[1] * grid_.cells[2] + 1), 0);
+  const auto cell_of = [&](int k) {
+    const Real* p = points_[k].at;
+    return (grid_.row(2, p[2]) * grid_.cells[1] + grid_.row(1, p[1])) * grid_.cells[0] + grid_.row(0, p[0]);
+  };
+  for (int k : near_) ++counts_[cell_of(k) + 1];
+  for (std::size_t k = 1; k < counts_.size(); ++k) counts_[k] += counts_[k - 1];
+  grid_.begin = counts_;
+  grid_.points.resize(near_.size());
+  for (int k : near_) grid_.points[counts_[cell_of(k)]++] = k;
+  return true;
+}
+
+// A point that is in the tet now was within `reach` of it at build, so it was in its box and on the inner
+// side of each of its planes, all moved out by `reach`.
+template <class Real>
+void Contacts<Real>::collect_near(int t, Real reach) {
+  const int* node = topology_.tets[t].node;
+  Real lower[3], upper[3];
+  for (int c = 0; c < 3; ++c) {
+    const Real i = packed_[node[0]].at[c], j = packed_[node[1]].at[c], k = packed_[node[2]].at[c],
+               l = packed_[node[3]].at[c];
+    lower[c] = std::min(std::min(i, j), std::min(k, l)) - reach;
+    upper[c] = std::max(std::max(i, j), std::max(k, l)) + reach;
+    if (lower[c] > grid_.upper[c] || upper[c] < grid_.lower[c]) return;
+  }
+  Real normal[4][3], length2[4];
+  bool flat[4], prepared = false;
+  int first[3], last[3];
+  for (int c = 0; c < 3; ++c) first[c] = grid_.row(c, lower[c]), last[c] = grid_.row(c, upper[c]);
+  for (int z = first[2]; z <= last[2]; ++z)
+    for (int y = first[1]; y <= last[1]; ++y) {
+      const int row = (z * grid_.cells[1] + y) * grid_.cells[0];
+      for (int at = grid_.begin[row + first[0]]; at < grid_.begin[row + last[0] + 1]; ++at) {
+        const int k = grid_.points[at];
+        const Real* p = points_[k].at;
+        if (p[0] < lower[0] || p[0] > upper[0] || p[1] < lower[1] || p[1] > upper[1] || p[2] < lower[2] ||
+            p[2] > upper[2])
+          continue;
+        if (!prepared) {
+          prepared = true;
+          const Real* const place[4] = {packed_[node[0]].at, packed_[node[1]].at, packed_[node[2]].at,
+                                        packed_[node[3]].at};
+          face_normals(place, normal);
+          Real volume6 = 0;
+          for (int c = 0; c < 3; ++c) volume6 += normal[1][c] * (place[1][c] - place[0][c]);
+          for (int i = 0; i < 4; ++i) {
+            length2[i] = dot(normal[i], normal[i]);
+            // A flat tet has no planes to speak of: its box alone decides. An inverted one may have turned
+            // back by then.
+            flat[i] = volume6 * volume6 <= Real(1e-4) * length2[i] * reach * reach;
+            for (int c = 0; c < 3 && volume6 < 0; ++c) normal[i][c] = -normal[i][c];
+          }
+        }
+        int face = 0;
+        Real distance2 = 0;  // from the plane that it is farthest outside of
+        bool outside = false;
+        for (int i = 0; i < 4 && !outside; ++i) {
+          const Real* on_face = packed_[node[(i + 1) % 4]].at;
+          const Real from_face[3] = {p[0] - on_face[0], p[1] - on_face[1], p[2] - on_face[2]};
+          const Real side = dot(normal[i], from_face);
+          if (flat[i] || side >= 0) continue;
+          outside = side * side > reach * reach * length2[i];
+          if (side * side <= distance2 * length2[i]) continue;
+          face = i;
+          distance2 = side * side / length2[i];
+        }
+        if (!outside) found_.push_back({k, t, face, std::sqrt(distance2)});
+      }
+    }
+}
+
+// The first tet that contains the point, in ascending order, has it: a point on a shared face has one owner.
+template <class Real>
+void Contacts<Real>::find_touches(const LaneView<Real>& view, int into, Real travel, List& list,
+                                  int direction) {
   Real lower[3], upper[3];
   for (int c = 0; c < 3; ++c) {
     lower[c] = view.lower[(3 * into + c) * view.stride];
@@ -236,18 +307,20 @@ void Contacts<Real>::find_touches(const LaneView<Real>& view, int into, List& li
   }
   Candidate* const candidates = list.candidates[direction].data();
   for (const Record& record : list.records[direction]) {
-    const Real* p = packed_[record.vertex].at;
+    Real p[3];
+    place_of(record.point, p);
     if (p[0] < lower[0] || p[0] > upper[0] || p[1] < lower[1] || p[1] > upper[1] || p[2] < lower[2] ||
         p[2] > upper[2])
       continue;
     for (Candidate* k = candidates + record.begin; k != candidates + record.end; ++k) {
+      if (k->asleep_until > travel) continue;
       const Topology::Tet& tet = topology_.tets[k->tet];
       const auto side = [&](int i) {
         const int* face = tet.face[i];
         return Real(tet.sign[i]) * det_from(p, packed_[face[0]].at, packed_[face[1]].at, packed_[face[2]].at);
       };
       if (side(k->face) < 0) continue;
-      Touch<Real> touch{record.vertex, k->tet, {}, 0, {0, 0, 0}, false};
+      Touch<Real> touch{record.point, k->tet, {}, 0, {0, 0, 0}, false};
       Real sum = 0;
       bool inside = true;
       for (int i = 0; i < 4 && inside; ++i) {
@@ -275,12 +348,12 @@ void Contacts<Real>::measure_depths(const LaneView<Real>& view, int from, int in
   std::size_t unknown = 0;
   for (std::size_t i = first; i < last; ++i) {
     Touch<Real>& touch = touches_[i];
-    touch_of_node_[touch.vertex] = int(i);
+    const Topology::Point& point = topology_.points[touch.point];
+    if (point.node[0] == point.node[1]) touch_of_node_[point.node[0]] = int(i);
     const Cell start(view, topology_.tets[touch.tet]);
     Real p[3], sum = 0;
-    fetch(view, touch.vertex, p);
-    for (int k = topology_.neighbor_begin[touch.vertex]; k < topology_.neighbor_begin[touch.vertex + 1];
-         ++k) {
+    place_of(touch.point, p);
+    for (int k = point.neighbor_begin; k < point.neighbor_end; ++k) {
       Real q[3], way[3], normal[3];
       fetch(view, topology_.neighbors[k], q);
       if (!walk_out(view, start, touch.tet, p, q, way, normal)) continue;
@@ -298,10 +371,10 @@ void Contacts<Real>::measure_depths(const LaneView<Real>& view, int from, int in
     for (std::size_t i = first; i < last; ++i) {
       Touch<Real>& touch = touches_[i];
       if (touch.known) continue;
+      const Topology::Point& point = topology_.points[touch.point];
       Real p[3], sum = 0;
-      fetch(view, touch.vertex, p);
-      for (int k = topology_.neighbor_begin[touch.vertex]; k < topology_.neighbor_begin[touch.vertex + 1];
-           ++k) {
+      place_of(touch.point, p);
+      for (int k = point.neighbor_begin; k < point.neighbor_end; ++k) {
         const int other = touch_of_node_[topology_.neighbors[k]];
         if (other < 0 || !touches_[other].known) continue;
         Real way[3];
@@ -319,7 +392,7 @@ void Contacts<Real>::measure_depths(const LaneView<Real>& view, int from, int in
     if (layer.empty()) break;
   }
   if (unknown > 0) leave_along_centers(view, from, into, first, last);
-  for (std::size_t i = first; i < last; ++i) touch_of_node_[touches_[i].vertex] = -1;
+  for (std::size_t i = first; i < last; ++i) touch_of_node_[topology_.points[touches_[i].point].node[0]] = -1;
 }
 
 // Divides the weighted sums; false when there was nothing to sum, or the directions cancelled.
@@ -336,7 +409,7 @@ bool Contacts<Real>::finish(Touch<Real>& touch, Real sum) {
   return false;
 }
 
-// A patch of vertices none of which is next to the outside: the whole body is inside. It leaves along the
+// A patch of points none of which is next to the outside: the whole body is inside. It leaves along the
 // line of the two boxes' centres.
 template <class Real>
 void Contacts<Real>::leave_along_centers(const LaneView<Real>& view, int from, int into, std::size_t first,
@@ -354,7 +427,7 @@ void Contacts<Real>::leave_along_centers(const LaneView<Real>& view, int from, i
     if (touch.known) continue;
     const Cell start(view, topology_.tets[touch.tet]);
     Real p[3], far[3], way[3], normal[3];
-    fetch(view, touch.vertex, p);
+    place_of(touch.point, p);
     for (int c = 0; c < 3; ++c) far[c] = p[c] + scale * line[c];
     touch.known = walk_out(view, start, touch.tet, p, far, way, normal);
     if (!touch.known) continue;
@@ -402,25 +475,24 @@ bool Contacts<Real>::walk_out(const LaneView<Real>& view, const Cell& start, int
 template <class Real>
 void Contacts<Real>::respond(const LaneView<Real>& view, Real friction, const Touch<Real>& touch) const {
   if (!(touch.depth > 0)) return;
-  const int* node = topology_.tets[touch.tet].node;
-  Real inverse_mass = tables_.inverse_mass[touch.vertex];
-  for (int i = 0; i < 4; ++i)
-    inverse_mass += touch.weight[i] * touch.weight[i] * tables_.inverse_mass[node[i]];
-  if (!(inverse_mass > 0)) return;
-  Real relative[3];
-  for (int c = 0; c < 3; ++c) {
-    relative[c] = view.v[(3 * touch.vertex + c) * view.stride];
-    for (int i = 0; i < 4; ++i) relative[c] -= touch.weight[i] * view.v[(3 * node[i] + c) * view.stride];
+  const Topology::Point& point = topology_.points[touch.point];
+  const int* corner = topology_.tets[touch.tet].node;
+  const int node[6] = {point.node[0], point.node[1], corner[0], corner[1], corner[2], corner[3]};
+  const Real share[6] = {Real(point.share[0]), Real(point.share[1]), -touch.weight[0],
+                         -touch.weight[1],     -touch.weight[2],     -touch.weight[3]};
+  Real inverse_mass = 0, relative[3] = {0, 0, 0};
+  for (int i = 0; i < 6; ++i) {
+    inverse_mass += share[i] * share[i] * tables_.inverse_mass[node[i]];
+    for (int c = 0; c < 3; ++c) relative[c] += share[i] * view.v[(3 * node[i] + c) * view.stride];
   }
+  if (!(inverse_mass > 0)) return;
+  const Real beta = Real(point.share[1] > 0 ? contact_edge_beta : contact_beta);
   Real force[3];
-  if (!penalty_force(touch.depth, touch.direction, relative, 1 / inverse_mass, step_, friction, force))
+  if (!penalty_force(beta, touch.depth, touch.direction, relative, 1 / inverse_mass, step_, friction, force))
     return;
-  const auto add = [&](int n, Real share) {
-    if (tables_.inverse_mass[n] > 0)
-      for (int c = 0; c < 3; ++c) view.f[(3 * n + c) * view.stride] += share * force[c];
-  };
-  add(touch.vertex, 1);
-  for (int i = 0; i < 4; ++i) add(node[i], -touch.weight[i]);
+  for (int i = 0; i < 6; ++i)
+    if (tables_.inverse_mass[node[i]] > 0)
+      for (int c = 0; c < 3; ++c) view.f[(3 * node[i] + c) * view.stride] += share[i] * force[c];
 }
 
 template <class Real>
@@ -439,7 +511,7 @@ void Contacts<Real>::add_wall_forces(const LaneView<Real>& view, int body) const
         const Real velocity[3] = {view.v[3 * n * view.stride], view.v[(3 * n + 1) * view.stride],
                                   view.v[(3 * n + 2) * view.stride]};
         Real force[3];
-        if (!penalty_force(depth, normal, velocity, tables_.node_mass[n], step_,
+        if (!penalty_force(Real(contact_beta), depth, normal, velocity, tables_.node_mass[n], step_,
                            tables_.pair_friction[body * bodies_ + body], force))
           continue;
         for (int c = 0; c < 3; ++c) view.f[(3 * n + c) * view.stride] += force[c];

@@ -15,7 +15,8 @@ namespace limber::fem::detail {
 
 // Penalty stiffness β m_eff/h², damping 2 ζ √(k m_eff), and the share of a slip that friction may stop in one
 // step.
-inline constexpr double contact_beta = 0.4;
+inline constexpr double contact_beta = 0.4;       // vertices
+inline constexpr double contact_edge_beta = 0.2;  // middles of edges: a vertex has six of them
 inline constexpr double contact_damping_ratio = 0.3;
 inline constexpr double contact_slip_stop = 0.5;
 
@@ -30,11 +31,11 @@ struct LaneView {
   const Real *lower, *upper, *travel;
 };
 
-// A vertex inside a tet of another body. Everything follows from the present positions.
+// A contact point inside a tet of another body. Everything follows from the present positions.
 template <class Real>
 struct Touch {
-  int vertex, tet;    // world node, world tet
-  Real weight[4];     // barycentric coordinates of the vertex in the tet
+  int point, tet;     // of the world's points and tets
+  Real weight[4];     // barycentric coordinates of the point in the tet
   Real depth;         // metres along `direction` to the surface; ≤ 0: no force
   Real direction[3];  // unit, out of the tet's body
   bool known;         // depth and direction are set
@@ -47,17 +48,18 @@ class Contacts {
   void forget(int lane);  // the lane holds another state now
   // Adds the forces of all contacts and walls to view.f.
   void add_forces(int lane, const LaneView<Real>& view);
-  // The touches of bodies a and b, a < b: vertices of a in b, then those of b in a, each ascending. For tests
+  // The touches of bodies a and b, a < b: points of a in b, then those of b in a, each ascending. For tests
   // and observables; valid until the next call.
   const std::vector<Touch<Real>>& find(int lane, const LaneView<Real>& view, int a, int b);
 
  private:
   struct Record {
-    int vertex, begin, end;  // candidates [begin, end)
+    int point, begin, end;  // candidates [begin, end)
   };
   struct Candidate {
     int tet;
-    int face;  // the face that refused last time, tried first: changes cost, never results
+    int face;           // the face that refused last time, tried first: changes cost, never results
+    Real asleep_until;  // travel of the two bodies before which the point cannot have come into the tet
   };
   // Candidates of one pair in one lane, [0] a in b, [1] b in a: derived data, a superset of what can touch.
   struct List {
@@ -65,21 +67,34 @@ class Contacts {
     Real travel_at_build = 0;
     std::vector<Record> records[2];
     std::vector<Candidate> candidates[2];
-    std::vector<int> nodes;  // every node they name, ascending
+    std::vector<int> nodes;  // every node they name
   };
   struct Place {
     Real at[4];
   };
-  struct NearTet {
-    int tet;
-    Real lower[3], upper[3];
-    Real plane[4][4];  // n·p + w ≥ 0 within reach of the inside
+  struct Found {
+    int point;  // from first_point_
+    int tet, face;
+    Real distance;  // to the tet at least
+  };
+  static constexpr int most_cells = 32;  // a side
+  struct Grid {
+    Real lower[3], upper[3], inverse_cell[3];
+    int cells[3];
+    std::vector<int> begin, points;
+    int row(int axis, Real x) const {  // never falls as x grows, so a box finds all that is in it
+      const Real r = (x - lower[axis]) * inverse_cell[axis];
+      return r > 0 ? (r < Real(cells[axis]) ? int(r) : cells[axis] - 1) : 0;
+    }
   };
   struct Cell;
 
+  void place_of(int point, Real out[3]) const;  // from packed_
   void refresh(const LaneView<Real>&, int a, int b, List&);
   void build_direction(const LaneView<Real>&, int from, int into, Real reach, List&, int direction);
-  void find_touches(const LaneView<Real>&, int into, List&, int direction);
+  bool sort_points(const LaneView<Real>&, int from, int into, Real reach);
+  void collect_near(int tet, Real reach);
+  void find_touches(const LaneView<Real>&, int into, Real travel, List&, int direction);
   void measure_depths(const LaneView<Real>&, int from, int into, std::size_t first, std::size_t last);
   void leave_along_centers(const LaneView<Real>&, int from, int into, std::size_t first, std::size_t last);
   static bool finish(Touch<Real>&, Real sum);
@@ -98,7 +113,13 @@ class Contacts {
   std::vector<Touch<Real>> touches_;
   std::vector<Place> packed_;       // by world node; valid for the nodes of the list at hand
   std::vector<int> touch_of_node_;  // index into touches_ while depths are measured, else −1
-  std::vector<NearTet> near_;
+  // Scratch of a list's building.
+  int first_point_ = 0;
+  std::vector<Place> points_;  // of the body at hand, from first_point_
+  std::vector<int> near_, counts_;
+  Grid grid_;
+  std::vector<Found> found_;
+  std::vector<bool> listed_;  // by world node
 };
 
 template <class Real>
