@@ -1,0 +1,56 @@
+#include "render/detail/gl_context.h"
+
+#include <GL/osmesa.h>
+
+#include <cstdlib>
+#include <mutex>
+
+#include "core/error.h"
+
+namespace limber::render::detail {
+
+namespace {
+
+// Read by llvmpipe when the first context is made. LP_NATIVE_VECTOR_WIDTH=512 crashes Mesa 22.3. Without
+// LP_NUM_THREADS every process would start as many threads as the machine has, though frames are already
+// shared out among our own.
+void prepare_environment() {
+  static std::once_flag once;
+  std::call_once(once, [] {
+    ::unsetenv("LP_NATIVE_VECTOR_WIDTH");
+    ::setenv("LP_NUM_THREADS", "0", 0);
+  });
+}
+
+}  // namespace
+
+GlContext::GlContext() {
+  prepare_environment();
+  const int attributes[] = {OSMESA_FORMAT,
+                            OSMESA_RGBA,
+                            OSMESA_DEPTH_BITS,
+                            0,
+                            OSMESA_STENCIL_BITS,
+                            0,
+                            OSMESA_PROFILE,
+                            OSMESA_CORE_PROFILE,
+                            OSMESA_CONTEXT_MAJOR_VERSION,
+                            3,
+                            OSMESA_CONTEXT_MINOR_VERSION,
+                            3,
+                            0};
+  context_ = OSMesaCreateContextAttribs(attributes, nullptr);
+  if (!context_) throw InputError("OSMesa gives no OpenGL 3.3 context; is libosmesa6 of Mesa 22 installed?");
+  make_current();
+}
+
+GlContext::~GlContext() { OSMesaDestroyContext(static_cast<OSMesaContext>(context_)); }
+
+void GlContext::make_current() {
+  const auto context = static_cast<OSMesaContext>(context_);
+  if (OSMesaGetCurrentContext() == context) return;
+  if (!OSMesaMakeCurrent(context, unused_pixels_, GL_UNSIGNED_BYTE, 16, 16))
+    throw InputError("OSMesa refuses to make its context current; is libosmesa6 of Mesa 22 installed?");
+}
+
+}  // namespace limber::render::detail

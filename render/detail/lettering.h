@@ -1,0 +1,16 @@
+// Captions: a small built-in alphabet of strokes, drawn soft-edged at any size.
+#pragma once
+
+#include <string_view>
+
+#include "render/image.h"
+
+namespace limber::render::detail {
+
+// Printable ASCII; other letters come out as a box. Height is that of a capital letter; the text's box is
+// (2/3 height) wide a letter.
+double text_width(std::string_view, double height_px);
+void draw_text(Image8&, std::string_view, double left_px, double baseline_px, double height_px,
+               const Vec3& color_srgb);
+
+}  // namespace limber::render::detail

@@ -1,0 +1,87 @@
+#include "render/detail/process.h"
+
+#include <fcntl.h>
+#include <signal.h>
+#include <spawn.h>
+#include <sys/mman.h>
+#include <sys/socket.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+
+#include "core/error.h"
+
+extern char** environ;
+
+namespace limber::render::detail {
+
+Process::Process(const std::vector<std::string>& argv) {
+  // A socket, because send() can be told not to raise SIGPIPE when the other side is gone; a memory file,
+  // because a pipe for the errors could fill up and block both.
+  int ends[2];
+  LIMBER_CHECK(::socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends) == 0, std::strerror(errno));
+  input_ = ends[0];
+  errors_ = ::memfd_create("stderr", MFD_CLOEXEC);
+  LIMBER_CHECK(errors_ >= 0, std::strerror(errno));
+
+  posix_spawn_file_actions_t files;
+  posix_spawn_file_actions_init(&files);
+  posix_spawn_file_actions_adddup2(&files, ends[1], 0);
+  posix_spawn_file_actions_addopen(&files, 1, "/dev/null", O_WRONLY, 0);
+  posix_spawn_file_actions_adddup2(&files, errors_, 2);
+  std::vector<char*> arguments;
+  for (const std::string& a : argv) arguments.push_back(const_cast<char*>(a.c_str()));
+  arguments.push_back(nullptr);
+  pid_t pid = -1;
+  const int error = ::posix_spawnp(&pid, arguments[0], &files, nullptr, arguments.data(), environ);
+  posix_spawn_file_actions_destroy(&files);
+  ::close(ends[1]);
+  if (error != 0) {
+    ::close(input_), ::close(errors_);
+    throw InputError(
+        fmt::format("{} cannot be started: {}; is it installed and in PATH?", argv[0], std::strerror(error)));
+  }
+  pid_ = pid;
+}
+
+Process::~Process() {
+  if (pid_ > 0) {
+    ::kill(pid_, SIGTERM);
+    finish();
+  }
+  if (input_ >= 0) ::close(input_);
+  ::close(errors_);
+}
+
+bool Process::write(const void* bytes, std::size_t size) {
+  for (auto* at = static_cast<const char*>(bytes); size > 0;) {
+    const ssize_t sent = ::send(input_, at, size, MSG_NOSIGNAL);
+    if (sent < 0 && errno == EINTR) continue;
+    if (sent < 0) return false;
+    at += sent, size -= std::size_t(sent);
+  }
+  return true;
+}
+
+int Process::finish() {
+  LIMBER_CHECK(pid_ > 0, pid_);
+  ::close(input_);
+  input_ = -1;
+  int status = 0;
+  while (::waitpid(pid_, &status, 0) < 0 && errno == EINTR) {
+  }
+  pid_ = -1;
+  return WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
+}
+
+std::string Process::said() const {
+  std::string text;
+  char buffer[4096];
+  for (ssize_t got; (got = ::pread(errors_, buffer, sizeof buffer, off_t(text.size()))) > 0;)
+    text.append(buffer, std::size_t(got));
+  return text;
+}
+
+}  // namespace limber::render::detail

@@ -1,0 +1,166 @@
+#include "render/detail/shaders.h"
+
+namespace limber::render::detail {
+
+const char* const mesh_vertex_shader = R"(#version 330 core
+layout(location = 0) in vec3 position_in;
+layout(location = 1) in vec3 normal_in;
+uniform mat4 clip_from_world;
+uniform mat4 shadow_from_world;
+uniform vec3 toward_key;
+uniform float shadow_offset_m;   // along the normal: about a texel of the shadow map, or surfaces shade themselves
+uniform vec4 ground;             // up, -height: what is below is cut off where clipping is on
+uniform vec3 ground_x, ground_y;
+uniform vec2 ground_lower, ground_scale;
+out vec3 position, normal, shadow_place;
+out vec2 ground_place;
+void main() {
+  position = position_in;
+  normal = normal_in;
+  // Towards the light's side, whichever way the mesh is wound.
+  vec3 offset = shadow_offset_m * (dot(normal_in, toward_key) < 0.0 ? -normal_in : normal_in);
+  shadow_place = (shadow_from_world * vec4(position_in + offset, 1.0)).xyz;
+  ground_place = (vec2(dot(ground_x, position_in), dot(ground_y, position_in)) - ground_lower) * ground_scale;
+  gl_Position = clip_from_world * vec4(position_in, 1.0);
+  gl_ClipDistance[0] = dot(ground, vec4(position_in, 1.0));
+}
+)";
+
+// Key: Lambert and GGX with Schlick's approximations (Karis, SIGGRAPH 2013 course). Ambient: a sky above, the
+// ground below.
+const char* const mesh_fragment_shader = R"(#version 330 core
+in vec3 position, normal, shadow_place;
+in vec2 ground_place;
+uniform vec3 eye, up, toward_key;
+uniform vec3 key_light, sky_light, ground_color;  // ground_color is black without a ground
+uniform float ground_key;        // share of the key light that a level surface gets
+uniform vec3 albedo;
+uniform float roughness, metallic, opacity;
+uniform float shadow_step;       // between taps, in units of the map
+uniform sampler2DShadow shadow_map;
+uniform sampler2D ground_sky_map;
+out vec4 color;
+
+float key_visibility() {
+  float sum = 0.0;
+  for (int y = -1; y <= 1; ++y)
+    for (int x = -1; x <= 1; ++x)
+      sum += texture(shadow_map, vec3(shadow_place.xy + shadow_step * vec2(x, y), shadow_place.z));
+  return sum * (1.0 / 9.0);
+}
+
+void main() {
+  vec3 n = normalize(normal) * (gl_FrontFacing ? 1.0 : -1.0);
+  vec3 v = normalize(eye - position);
+  vec3 h = normalize(toward_key + v);
+  float n_key = max(dot(n, toward_key), 0.0);
+  float n_v = max(dot(n, v), 1e-3);
+  float n_h = max(dot(n, h), 0.0);
+  float v_h = max(dot(v, h), 0.0);
+
+  vec3 diffuse = albedo * (1.0 - metallic);
+  vec3 f0 = mix(vec3(0.04), albedo, metallic);
+  float a2 = roughness * roughness * roughness * roughness;
+  float d = n_h * n_h * (a2 - 1.0) + 1.0;
+  float k = (roughness + 1.0) * (roughness + 1.0) / 8.0;
+  float visibility = 0.25 / ((n_key * (1.0 - k) + k) * (n_v * (1.0 - k) + k));
+  float grazing = 1.0 - v_h;
+  float grazing2 = grazing * grazing;
+  vec3 fresnel = f0 + (1.0 - f0) * (grazing2 * grazing2 * grazing);
+  vec3 key = (diffuse + fresnel * (a2 / (d * d) * visibility)) * (n_key * key_visibility()) * key_light;
+
+  float n_up = dot(n, up);
+  float open = 1.0 - texture(ground_sky_map, ground_place).r;  // the ground under a body is dark, and lights it less
+  vec3 bounce = ground_color * (0.6 * ground_key * key_light + 0.6 * sky_light) * open;
+  vec3 ambient = diffuse * mix(bounce, sky_light, 0.5 + 0.5 * n_up);
+  float r_up = 2.0 * dot(n, v) * n_up - dot(v, up);
+  vec3 mirrored = mix(bounce, 1.3 * sky_light, smoothstep(-0.35, 0.6, r_up));
+  // Split sum of the environment's reflection, fitted by Karis.
+  vec4 r = roughness * vec4(-1.0, -0.0275, -0.572, 0.022) + vec4(1.0, 0.0425, 1.04, -0.04);
+  float a = min(r.x * r.x, exp2(-9.28 * n_v)) * r.x + r.y;
+  vec2 ab = vec2(-1.04, 1.04) * a + r.zw;
+  ambient += mirrored * (f0 * ab.x + ab.y);
+
+  float edge = 1.0 - n_v;
+  vec3 rim = sky_light * (0.55 * edge * edge * edge * (0.5 + 0.5 * n_up)) * (0.4 + 0.6 * albedo);
+  color = vec4((key + ambient + rim) * opacity, opacity);
+}
+)";
+
+const char* const shadow_vertex_shader = R"(#version 330 core
+layout(location = 0) in vec3 position_in;
+uniform mat4 clip_from_world;
+void main() { gl_Position = clip_from_world * vec4(position_in, 1.0); }
+)";
+const char* const shadow_fragment_shader = R"(#version 330 core
+void main() {}
+)";
+
+const char* const line_vertex_shader = R"(#version 330 core
+layout(location = 0) in vec4 clip_in;
+layout(location = 1) in float across_in;  // distance from the middle, in samples; not bent by perspective
+noperspective out float across;
+void main() { across = across_in; gl_Position = clip_in; }
+)";
+const char* const line_fragment_shader = R"(#version 330 core
+noperspective in float across;
+uniform vec4 line_color;    // straight
+uniform float half_width;   // samples
+out vec4 color;
+void main() {
+  float cover = line_color.a * clamp(half_width + 0.5 - abs(across), 0.0, 1.0);
+  color = vec4(line_color.rgb * cover, cover);
+}
+)";
+
+const char* const picture_vertex_shader = R"(#version 330 core
+uniform mat3 ray_from_screen;   // columns: right, up, forward; scaled so that (x, y, 1) of the screen gives the ray
+out vec3 ray;
+out float height;               // 0 at the bottom, 1 at the top
+void main() {
+  vec2 place = vec2(gl_VertexID == 1 ? 3.0 : -1.0, gl_VertexID == 2 ? 3.0 : -1.0);
+  // Upside down: rows are read from the top.
+  ray = ray_from_screen * vec3(place.x, -place.y, 1.0);
+  height = 0.5 - 0.5 * place.y;
+  gl_Position = vec4(place, 0.0, 1.0);
+}
+)";
+const char* const picture_fragment_shader = R"(#version 330 core
+in vec3 ray;
+in float height;
+uniform sampler2D samples;
+uniform int per_side, last_row;
+uniform vec3 background_bottom, background_top;
+uniform vec3 eye;
+uniform vec4 ground;
+uniform vec3 ground_x, ground_y, ground_color;
+uniform float ground_shown;      // 1, or 0: no ground, or the eye is below it
+uniform float key_share;         // of the light on open ground
+uniform float sky_darkening;     // 1: as much as the map says
+uniform vec2 fade_middle;        // ground coordinates
+uniform float fade_begin, fade_end;
+uniform sampler2D ground_key_map, ground_sky_map;
+uniform vec2 key_lower, key_scale, sky_lower, sky_scale;
+out vec4 color;
+void main() {
+  ivec2 corner = ivec2(gl_FragCoord.x, last_row - int(gl_FragCoord.y)) * per_side;
+  vec4 sum = vec4(0.0);
+  for (int y = 0; y < per_side; ++y)
+    for (int x = 0; x < per_side; ++x) sum += texelFetch(samples, corner + ivec2(x, y), 0);
+  sum *= 1.0 / float(per_side * per_side);
+
+  vec3 background = mix(background_bottom, background_top, height);
+  float down = -dot(ground.xyz, ray);
+  float distance = dot(ground, vec4(eye, 1.0)) / max(down, 1e-6);
+  vec3 place = eye + distance * ray;
+  vec2 uv = vec2(dot(ground_x, place), dot(ground_y, place));
+  float key = 1.0 - texture(ground_key_map, (uv - key_lower) * key_scale).r;
+  float sky = 1.0 - sky_darkening * texture(ground_sky_map, (uv - sky_lower) * sky_scale).r;
+  float light = key_share * key + (1.0 - key_share) * sky;
+  float shown = ground_shown * step(1e-6, down) * (1.0 - smoothstep(fade_begin, fade_end, length(uv - fade_middle)));
+  background = mix(background, ground_color * light, shown);
+  color = vec4(sum.rgb + (1.0 - sum.a) * background, sum.a);
+}
+)";
+
+}  // namespace limber::render::detail

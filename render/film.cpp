@@ -1,0 +1,207 @@
+#include "render/film.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/error.h"
+#include "core/progress.h"
+#include "render/detail/lettering.h"
+#include "render/detail/process.h"
+#include "render/png_file.h"
+
+namespace limber::render {
+
+namespace {
+
+void require_all_good(const std::vector<fs::path>& frames) {
+  if (frames.empty()) throw InputError("there is no frame to make a film of; render first");
+  int width = 0, height = 0;
+  for (const fs::path& frame : frames) {
+    const auto info = inspect_png(frame);
+    if (!info)
+      throw InputError(
+          fmt::format("{}: is missing, cut short or damaged, so no film was made; render this frame again",
+                      frame.string()));
+    if (width == 0) width = info->width, height = info->height;
+    if (info->width != width || info->height != height)
+      throw InputError(fmt::format("{}: has {}×{} pixels, but {} has {}×{}; render them alike",
+                                   frame.string(), info->width, info->height, frames[0].string(), width,
+                                   height));
+  }
+}
+
+// H.264 with yuv420p wants even sides.
+Image8 with_even_sides(Image8 image) {
+  const int width = image.width + image.width % 2, height = image.height + image.height % 2;
+  if (width == image.width && height == image.height) return image;
+  Image8 even{width, height, std::vector<std::uint8_t>(std::size_t(width) * height * 3)};
+  for (int y = 0; y < height; ++y)
+    for (int x = 0; x < width; ++x)
+      for (int c = 0; c < 3; ++c)
+        even.rgb[3 * (std::size_t(y) * width + x) + c] =
+            image.rgb[3 * (std::size_t(std::min(y, image.height - 1)) * image.width +
+                           std::min(x, image.width - 1)) +
+                      c];
+  return even;
+}
+
+std::string last_lines(std::string text, int count) {
+  while (!text.empty() && text.back() == '\n') text.pop_back();
+  std::size_t begin = text.size();
+  while (begin > 0 && count > 0)
+    if (text[--begin] == '\n' && --count == 0) ++begin;
+  return text.empty() ? "it said nothing" : text.substr(begin);
+}
+
+// An mp4 is a row of boxes: 4 bytes of size, 4 of kind; size 1 puts the real one in the next 8. ffmpeg has
+// been seen to end with 0 on a file it could not finish.
+bool is_whole_mp4(const std::string& file) {
+  const auto number = [&](std::size_t at, int bytes) {
+    std::uint64_t n = 0;
+    for (int i = 0; i < bytes; ++i) n = n << 8 | static_cast<unsigned char>(file[at + std::size_t(i)]);
+    return n;
+  };
+  bool has_index = false, has_pictures = false;
+  std::size_t at = 0;
+  while (file.size() - at >= 16) {
+    const std::uint64_t size = number(at, 4) == 1 ? number(at + 8, 8) : number(at, 4);
+    if (size < 8 || size > file.size() - at) return false;
+    has_index |= file.compare(at + 4, 4, "moov") == 0;
+    has_pictures |= file.compare(at + 4, 4, "mdat") == 0;
+    at += std::size_t(size);
+  }
+  return has_index && has_pictures;
+}
+
+}  // namespace
+
+void make_film(const std::vector<fs::path>& frames, double frames_per_second, const fs::path& film) {
+  if (!(frames_per_second >= 0.1 && frames_per_second <= 240))
+    throw InputError(fmt::format("{} frames a second: must lie between 0.1 and 240", frames_per_second));
+  require_all_good(frames);
+  Image8 image = with_even_sides(read_png(frames[0]));
+  const int width = image.width, height = image.height;
+
+  PendingFile pending(film);
+  write_file(pending.temporary(), "");  // our own complaint if the folder is missing or not writable
+  // Decoded pixels go in, so no damaged PNG and no odd file name can reach ffmpeg. A fixed number of threads:
+  // x264's output depends on it.
+  detail::Process ffmpeg({"ffmpeg",
+                          "-hide_banner",
+                          "-loglevel",
+                          "error",
+                          "-nostats",
+                          "-xerror",
+                          "-y",
+                          "-f",
+                          "rawvideo",
+                          "-pix_fmt",
+                          "rgb24",
+                          "-video_size",
+                          fmt::format("{}x{}", width, height),
+                          "-framerate",
+                          fmt::format("{}", frames_per_second),
+                          "-i",
+                          "pipe:0",
+                          "-vf",
+                          "scale=out_color_matrix=bt709:out_range=tv",
+                          "-pix_fmt",
+                          "yuv420p",
+                          "-color_primaries",
+                          "bt709",
+                          "-color_trc",
+                          "bt709",
+                          "-colorspace",
+                          "bt709",
+                          "-color_range",
+                          "tv",
+                          "-c:v",
+                          "libx264",
+                          "-preset",
+                          "medium",
+                          "-crf",
+                          "18",
+                          "-threads",
+                          "2",
+                          "-fflags",
+                          "+bitexact",
+                          "-flags:v",
+                          "+bitexact",
+                          "-map_metadata",
+                          "-1",
+                          "-movflags",
+                          "+faststart",
+                          "-f",
+                          "mp4",
+                          pending.temporary().string()});
+  Progress progress("film", std::int64_t(frames.size()));
+  bool taken = true;
+  for (std::size_t f = 0; f < frames.size() && taken; ++f) {
+    throw_if_stopped();
+    if (f > 0) image = with_even_sides(read_png(frames[f]));
+    taken = ffmpeg.write(image.rgb.data(), image.rgb.size());
+    progress.update(std::int64_t(f) + 1);
+  }
+  const int code = ffmpeg.finish();
+  throw_if_stopped();
+  const std::string words = ffmpeg.said();
+  const bool disk_full = words.find("No space left") != words.npos;
+  const std::string what =
+      fmt::format("{}: ffmpeg failed (exit code {}): {}", film.string(), code, last_lines(words, 4));
+  if (disk_full) throw DiskError(what);
+  if (code != 0 || !taken) throw InputError(what);
+  if (!is_whole_mp4(read_file(pending.temporary())))
+    throw DiskError(
+        fmt::format("{}: ffmpeg ended well but its file is not whole; is the disk full?", film.string()));
+  pending.commit();
+}
+
+Image8 contact_sheet(const std::vector<fs::path>& frames, const std::vector<std::string>& captions,
+                     const SheetLook& look) {
+  if (frames.empty()) throw InputError("there is no frame to put on a contact sheet; render first");
+  LIMBER_CHECK(captions.empty() || captions.size() == frames.size(), captions.size(), frames.size());
+  LIMBER_CHECK(look.tile_width_px > 0 && look.margin_px >= 0 && look.columns >= 0, look.tile_width_px,
+               look.margin_px, look.columns);
+  const int count = int(frames.size());
+  const int columns = look.columns > 0 ? std::min(look.columns, count) : int(std::ceil(std::sqrt(count)));
+  const int rows = (count + columns - 1) / columns;
+  const int caption_px =
+      captions.empty() ? 0 : std::clamp(look.tile_width_px / 40, 7, 24);  // height of a capital
+  const int caption_band = captions.empty() ? 0 : 3 * caption_px;
+
+  Image8 sheet;
+  int tile_width = 0, tile_height = 0;
+  for (int f = 0; f < count; ++f) {
+    Image8 frame = read_png(frames[f]);
+    if (f == 0) {
+      tile_width = std::min(look.tile_width_px, frame.width);
+      tile_height = std::max(1, int(std::lround(double(frame.height) * tile_width / frame.width)));
+      sheet =
+          filled(columns * (tile_width + look.margin_px) + look.margin_px,
+                 rows * (tile_height + caption_band + look.margin_px) + look.margin_px, look.background_srgb);
+    }
+    if (frame.width < tile_width || frame.height < tile_height)
+      throw InputError(
+          fmt::format("{}: is smaller than {}; render them alike", frames[f].string(), frames[0].string()));
+    frame = shrunk(frame, tile_width, tile_height);
+    const int left = look.margin_px + f % columns * (tile_width + look.margin_px);
+    const int top = look.margin_px + f / columns * (tile_height + caption_band + look.margin_px);
+    for (int y = 0; y < tile_height; ++y)
+      std::copy_n(&frame.rgb[std::size_t(3) * y * tile_width], 3 * tile_width,
+                  &sheet.rgb[3 * (std::size_t(top + y) * sheet.width + left)]);
+    if (!captions.empty())
+      detail::draw_text(sheet, captions[f], left, top + tile_height + 1.9 * caption_px, caption_px,
+                        look.caption_srgb);
+  }
+  return sheet;
+}
+
+std::vector<int> spread_over(int frames, int count) {
+  std::vector<int> picked;
+  const int n = std::min(frames, count);
+  for (int i = 0; i < n; ++i)
+    picked.push_back(n == 1 ? 0 : int(std::lround(double(i) * (frames - 1) / (n - 1))));
+  return picked;
+}
+
+}  // namespace limber::render

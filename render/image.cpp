@@ -1,0 +1,99 @@
+#include "render/image.h"
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+
+#include "core/error.h"
+
+namespace limber::render {
+
+namespace {
+
+constexpr double knee = 0.7;
+
+std::uint8_t level(double srgb) { return std::uint8_t(std::lround(255 * std::clamp(srgb, 0.0, 1.0))); }
+
+// Sign, exponent and the upper 10 bits of the mantissa pick the entry, so its value is right to 1/2048.
+constexpr int dropped_bits = 13;
+constexpr std::uint32_t first_key = std::bit_cast<std::uint32_t>(0x1p-13f) >> dropped_bits;
+constexpr std::uint32_t last_key = std::bit_cast<std::uint32_t>(16.0f) >> dropped_bits;
+
+const std::array<std::uint8_t, last_key - first_key + 1>& level_table() {
+  static const auto table = [] {
+    std::array<std::uint8_t, last_key - first_key + 1> t;
+    for (std::uint32_t k = 0; k < t.size(); ++k) {
+      const std::uint32_t middle = ((first_key + k) << dropped_bits) | (1u << (dropped_bits - 1));
+      t[k] = level(srgb_from_linear(tone_mapped(double(std::bit_cast<float>(middle)))));
+    }
+    return t;
+  }();
+  return table;
+}
+
+}  // namespace
+
+Image8 filled(int width, int height, const Vec3& color_srgb) {
+  Image8 image{width, height, std::vector<std::uint8_t>(std::size_t(width) * height * 3)};
+  for (std::size_t i = 0; i < image.rgb.size(); ++i) image.rgb[i] = level(color_srgb[int(i % 3)]);
+  return image;
+}
+
+double srgb_from_linear(double x) {
+  return x <= 0.0031308 ? 12.92 * x : 1.055 * std::pow(x, 1 / 2.4) - 0.055;
+}
+double linear_from_srgb(double x) { return x <= 0.04045 ? x / 12.92 : std::pow((x + 0.055) / 1.055, 2.4); }
+Vec3 linear_from_srgb(const Vec3& color) {
+  return color.unaryExpr([](double x) { return linear_from_srgb(x); });
+}
+
+double tone_mapped(double linear) {
+  return linear <= knee ? linear : 1 - (1 - knee) * std::exp((knee - linear) / (1 - knee));
+}
+double tone_unmapped(double shown) {
+  return shown <= knee ? shown : knee - (1 - knee) * std::log((1 - std::min(shown, 0.9999)) / (1 - knee));
+}
+
+Image8 tone_mapped(const Image& image) {
+  const auto& table = level_table();
+  Image8 shown{image.width, image.height,
+               std::vector<std::uint8_t>(std::size_t(image.width) * image.height * 3)};
+  const auto lookup = [&](float x) {
+    // Not (x > first) also catches NaN, which a shader may leave but must not spread.
+    if (!(x > 0x1p-13f)) return table[0];
+    return table[std::min(std::bit_cast<std::uint32_t>(x) >> dropped_bits, last_key) - first_key];
+  };
+  for (std::size_t p = 0; p < std::size_t(image.width) * image.height; ++p)
+    for (int c = 0; c < 3; ++c) shown.rgb[3 * p + c] = lookup(image.rgba[4 * p + c]);
+  return shown;
+}
+
+Image8 shrunk(const Image8& image, int width, int height) {
+  LIMBER_CHECK(0 < width && width <= image.width && 0 < height && height <= image.height, width, height,
+               image.width, image.height);
+  std::array<double, 256> linear;
+  for (int i = 0; i < 256; ++i) linear[i] = linear_from_srgb(i / 255.0);
+
+  Image8 small{width, height, std::vector<std::uint8_t>(std::size_t(width) * height * 3)};
+  const double step_x = double(image.width) / width, step_y = double(image.height) / height;
+  for (int y = 0; y < height; ++y)
+    for (int x = 0; x < width; ++x) {
+      const double left = x * step_x, right = (x + 1) * step_x, top = y * step_y, bottom = (y + 1) * step_y;
+      Vec3 sum = Vec3::Zero();
+      double area = 0;
+      for (int v = int(top); v < std::min(image.height, int(std::ceil(bottom))); ++v)
+        for (int u = int(left); u < std::min(image.width, int(std::ceil(right))); ++u) {
+          const double part = (std::min(right, u + 1.0) - std::max(left, double(u))) *
+                              (std::min(bottom, v + 1.0) - std::max(top, double(v)));
+          const std::uint8_t* p = &image.rgb[3 * (std::size_t(v) * image.width + u)];
+          sum += part * Vec3(linear[p[0]], linear[p[1]], linear[p[2]]);
+          area += part;
+        }
+      for (int c = 0; c < 3; ++c)
+        small.rgb[3 * (std::size_t(y) * width + x) + c] = level(srgb_from_linear(sum[c] / area));
+    }
+  return small;
+}
+
+}  // namespace limber::render

@@ -1,0 +1,40 @@
+// Pictures in memory, and the road from linear light to what a screen shows. Method: docs/rendering.md.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "core/types.h"
+
+namespace limber::render {
+
+// Linear light, as the renderer leaves it. Row 0 is the top.
+struct Image {
+  int width = 0, height = 0;
+  std::vector<float> rgba;  // (height × width × 4); alpha: the share of the pixel that meshes and lines cover
+};
+
+// What a PNG holds: sRGB, 8 bit. Row 0 is the top.
+struct Image8 {
+  int width = 0, height = 0;
+  std::vector<std::uint8_t> rgb;  // (height × width × 3)
+  bool operator==(const Image8&) const = default;
+};
+Image8 filled(int width, int height, const Vec3& color_srgb);
+
+// The sRGB transfer curve (IEC 61966-2-1), a channel at a time, 0 … 1.
+double srgb_from_linear(double);
+double linear_from_srgb(double);
+Vec3 linear_from_srgb(const Vec3&);
+
+// Identity up to 0.7, so that a body under full light keeps its colour; above, an exponential shoulder to 1.
+double tone_mapped(double linear);
+double tone_unmapped(double shown);  // inverse, for colours that must come out as they were asked for; < 1
+
+// Tone map, then sRGB; within one level of the formulas (a table over the bits of the float).
+Image8 tone_mapped(const Image&);
+
+// Average of the covered area, in linear light. The new size is at most the old one.
+Image8 shrunk(const Image8&, int width, int height);
+
+}  // namespace limber::render

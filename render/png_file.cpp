@@ -1,0 +1,138 @@
+#include "render/png_file.h"
+
+#include <png.h>
+#include <zlib.h>
+
+#include <csetjmp>
+#include <cstring>
+
+#include "core/error.h"
+
+namespace limber::render {
+
+namespace {
+
+void append(png_structp png, png_bytep bytes, png_size_t size) {
+  static_cast<std::string*>(png_get_io_ptr(png))->append(reinterpret_cast<const char*>(bytes), size);
+}
+void nothing(png_structp) {}
+
+// libpng leaves an error by longjmp, so nothing with a destructor may live in here.
+bool encode(png_structp png, png_infop info, const Image8& image, png_text* texts, int text_count,
+            std::string* out) {
+  if (setjmp(png_jmpbuf(png))) return false;
+  png_set_write_fn(png, out, append, nothing);
+  png_set_IHDR(png, info, png_uint_32(image.width), png_uint_32(image.height), 8, PNG_COLOR_TYPE_RGB,
+               PNG_INTERLACE_NONE, PNG_COMPRESSION_TYPE_BASE, PNG_FILTER_TYPE_BASE);
+  png_set_compression_level(png, 1);
+  png_set_compression_strategy(png, Z_RLE);
+  png_set_filter(png, PNG_FILTER_TYPE_BASE, PNG_FILTER_SUB);
+  png_set_sRGB(png, info, PNG_sRGB_INTENT_PERCEPTUAL);
+  png_set_text(png, info, texts, text_count);
+  png_write_info(png, info);
+  for (int y = 0; y < image.height; ++y) png_write_row(png, &image.rgb[std::size_t(y) * image.width * 3]);
+  png_write_end(png, info);
+  return true;
+}
+
+std::uint32_t big_endian(const char* p) {
+  const auto* b = reinterpret_cast<const unsigned char*>(p);
+  return std::uint32_t(b[0]) << 24 | std::uint32_t(b[1]) << 16 | std::uint32_t(b[2]) << 8 | b[3];
+}
+
+std::optional<PngInfo> inspect(std::string_view file) {
+  constexpr std::string_view signature = "\x89PNG\r\n\x1a\n";
+  if (!file.starts_with(signature)) return std::nullopt;
+  PngInfo info{0, 0, {}};
+  bool has_pixels = false;
+  for (std::size_t at = signature.size(); file.size() - at >= 12;) {
+    const std::size_t length = big_endian(&file[at]);
+    if (length > file.size() - at - 12) return std::nullopt;
+    const std::string_view type = file.substr(at + 4, 4), data = file.substr(at + 8, length);
+    const auto checksum = crc32(0, reinterpret_cast<const Bytef*>(type.data()), uInt(length + 4));
+    if (checksum != big_endian(&file[at + 8 + length])) return std::nullopt;
+    if (type == "IHDR" && length == 13) {
+      info.width = int(big_endian(data.data())), info.height = int(big_endian(data.data() + 4));
+    } else if (type == "tEXt") {
+      if (const std::size_t end = data.find('\0'); end != data.npos)
+        info.texts[std::string(data.substr(0, end))] = std::string(data.substr(end + 1));
+    } else if (type == "IDAT") {
+      has_pixels = true;
+    } else if (type == "IEND") {
+      if (!has_pixels || info.width <= 0 || info.height <= 0) return std::nullopt;
+      return info;
+    }
+    at += 12 + length;
+  }
+  return std::nullopt;
+}
+
+}  // namespace
+
+std::string png_bytes(const Image8& image, const Texts& texts) {
+  LIMBER_CHECK(image.width > 0 && image.height > 0, image.width, image.height);
+  LIMBER_CHECK(image.rgb.size() == std::size_t(image.width) * image.height * 3, image.rgb.size(), image.width,
+               image.height);
+  std::vector<png_text> chunks;
+  for (const auto& [key, text] : texts) {
+    LIMBER_CHECK(!key.empty() && key.size() < 80 && text.find('\0') == text.npos, key, text);
+    png_text chunk{};
+    chunk.compression = PNG_TEXT_COMPRESSION_NONE;
+    chunk.key = const_cast<char*>(key.c_str());
+    chunk.text = const_cast<char*>(text.c_str());
+    chunk.text_length = text.size();
+    chunks.push_back(chunk);
+  }
+  std::string out;
+  png_structp png = png_create_write_struct(PNG_LIBPNG_VER_STRING, nullptr, nullptr, nullptr);
+  png_infop info = png ? png_create_info_struct(png) : nullptr;
+  const bool done = info && encode(png, info, image, chunks.data(), int(chunks.size()), &out);
+  png_destroy_write_struct(&png, &info);
+  LIMBER_CHECK(done, image.width, image.height);
+  return out;
+}
+
+void write_png(const fs::path& path, const Image8& image, const Texts& texts) {
+  write_file(path, png_bytes(image, texts));
+}
+
+Image8 read_png(const fs::path& path, Texts* texts) {
+  const std::string file = read_file(path);
+  const auto info = inspect(file);
+  if (!info)
+    throw InputError(fmt::format("{}: is not a PNG, is cut short or damaged; make it again", path.string()));
+  if (std::int64_t(info->width) * info->height > (1 << 28))
+    throw InputError(
+        fmt::format("{}: {} × {} pixels are too many", path.string(), info->width, info->height));
+  png_image reader{};
+  reader.version = PNG_IMAGE_VERSION;
+  Image8 image;
+  const png_color white{255, 255, 255};
+  bool done = png_image_begin_read_from_memory(&reader, file.data(), file.size()) != 0;
+  if (done) {
+    reader.format = PNG_FORMAT_RGB;
+    image = {int(reader.width), int(reader.height), std::vector<std::uint8_t>(PNG_IMAGE_SIZE(reader))};
+    done = png_image_finish_read(&reader, &white, image.rgb.data(), 0, nullptr) != 0;
+  }
+  const std::string message = reader.message;
+  png_image_free(&reader);
+  if (!done) throw InputError(fmt::format("{}: {}; make it again", path.string(), message));
+  if (texts) *texts = info->texts;
+  return image;
+}
+
+std::optional<PngInfo> inspect_png(const fs::path& path) {
+  try {
+    return inspect(read_file(path));
+  } catch (const InputError&) {
+    return std::nullopt;
+  }
+}
+
+std::optional<std::string> frame_hash(const fs::path& path) {
+  const auto info = inspect_png(path);
+  if (!info || !info->texts.contains("limber-hash")) return std::nullopt;
+  return info->texts.at("limber-hash");
+}
+
+}  // namespace limber::render

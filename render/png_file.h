@@ -1,0 +1,33 @@
+// PNG files: 8-bit sRGB, quick to write (zlib level 1, run lengths, SUB filter), never half written.
+#pragma once
+
+#include <map>
+#include <optional>
+#include <string>
+
+#include "core/file.h"
+#include "render/image.h"
+
+namespace limber::render {
+
+using Texts = std::map<std::string, std::string>;  // tEXt chunks: keyword (1 … 79 Latin-1 letters) → text
+
+std::string png_bytes(const Image8&, const Texts& = {});
+void write_png(const fs::path&, const Image8&, const Texts& = {});  // throws DiskError
+
+// Any PNG, brought to 8-bit sRGB; transparency over white. Throws InputError when the file is missing, is not
+// a PNG or is cut short.
+Image8 read_png(const fs::path&, Texts* texts = nullptr);
+
+struct PngInfo {
+  int width, height;
+  Texts texts;
+};
+// Walks all chunks and their checksums without decoding. nullopt: missing, not a PNG, cut short, or damaged.
+std::optional<PngInfo> inspect_png(const fs::path&);
+
+// What the frame shows, as text "limber-hash" says: how a resumed run knows a good frame. nullopt also when
+// it does not say.
+std::optional<std::string> frame_hash(const fs::path&);
+
+}  // namespace limber::render

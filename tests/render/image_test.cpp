@@ -1,0 +1,56 @@
+#include "render/image.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "core/random.h"
+
+namespace limber::render {
+namespace {
+
+TEST(Image, TransferCurvesAreInverse) {
+  for (double x = 0; x <= 1; x += 1.0 / 1024) {
+    EXPECT_NEAR(srgb_from_linear(linear_from_srgb(x)), x, 1e-6);
+    EXPECT_NEAR(tone_mapped(tone_unmapped(std::min(x, 0.999))), std::min(x, 0.999), 1e-12);
+  }
+  EXPECT_NEAR(linear_from_srgb(0.5), 0.21404114, 1e-7);  // IEC 61966-2-1
+}
+
+TEST(Image, ToneMapRisesWithoutAKinkAndStaysBelowOne) {
+  for (double x = 0.01; x < 8; x += 0.01) {
+    EXPECT_GT(tone_mapped(x), tone_mapped(x - 0.01));
+    EXPECT_LT(tone_mapped(x), 1);
+    EXPECT_LE(tone_mapped(x) - tone_mapped(x - 0.01), 0.01 + 1e-12);  // never steeper than the identity
+  }
+}
+
+TEST(Image, TheTableIsWithinOneLevelOfTheFormula) {
+  Rng rng(1, 0);
+  Image image{100, 50, {}};
+  for (int i = 0; i < 100 * 50 * 4; ++i) image.rgba.push_back(float(std::exp(rng.uniform(-10, 3))));
+  const Image8 shown = tone_mapped(image);
+  for (int p = 0; p < 100 * 50; ++p)
+    for (int c = 0; c < 3; ++c) {
+      const double exact = 255 * srgb_from_linear(tone_mapped(double(image.rgba[4 * p + c])));
+      EXPECT_NEAR(shown.rgb[3 * p + c], exact, 0.75);
+    }
+}
+
+TEST(Image, WhatIsNoNumberComesOutBlack) {
+  const Image image{1, 1, {std::nanf(""), -1.0f, INFINITY, 1.0f}};
+  EXPECT_EQ(tone_mapped(image).rgb, (std::vector<std::uint8_t>{0, 0, 255}));
+}
+
+TEST(Image, ShrinkingAveragesLight) {
+  Image8 board{4, 4, {}};  // black and white by turns: half the light, which is 188 in sRGB, not 128
+  for (int y = 0; y < 4; ++y)
+    for (int x = 0; x < 4; ++x) board.rgb.insert(board.rgb.end(), 3, (x + y) % 2 ? 255 : 0);
+  EXPECT_EQ(shrunk(board, 2, 2), filled(2, 2, Vec3::Constant(188.0 / 255)));
+  EXPECT_EQ(shrunk(board, 4, 4), board);
+  const Image8 plain = filled(37, 23, {0.2, 0.4, 0.9});
+  EXPECT_EQ(shrunk(plain, 10, 7), filled(10, 7, {0.2, 0.4, 0.9}));
+}
+
+}  // namespace
+}  // namespace limber::render

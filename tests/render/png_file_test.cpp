@@ -1,0 +1,74 @@
+#include "render/png_file.h"
+
+#include <gtest/gtest.h>
+
+#include <fstream>
+
+#include "core/error.h"
+#include "core/random.h"
+#include "tests/render/shapes.h"
+
+namespace limber::render {
+namespace {
+
+Image8 noise(int width, int height) {
+  Rng rng(21, 0);
+  Image8 image{width, height, {}};
+  for (int i = 0; i < width * height * 3; ++i) image.rgb.push_back(std::uint8_t(rng.below(256)));
+  return image;
+}
+
+TEST(PngFile, RoundTrip) {
+  const Folder folder;
+  for (const auto& [width, height] : {std::pair{1, 1}, std::pair{7, 5}, std::pair{64, 33}}) {
+    const Image8 image = noise(width, height);
+    const Texts texts{{"limber-hash", "00ff00ff00ff00ff"}, {"Title", "a robot, squeezed"}};
+    write_png(folder / "a.png", image, texts);
+    Texts back;
+    EXPECT_EQ(read_png(folder / "a.png", &back), image);
+    EXPECT_EQ(back, texts);
+    EXPECT_EQ(frame_hash(folder / "a.png"), "00ff00ff00ff00ff");
+  }
+  EXPECT_EQ(png_bytes(noise(9, 9)), png_bytes(noise(9, 9)));
+}
+
+// core's write_file waits for the disk each time.
+void write_quickly(const fs::path& path, const std::string& content) {
+  std::ofstream(path, std::ios::binary) << content;
+}
+
+TEST(PngFile, EveryPrefixAndEveryChangedByteIsRecognised) {
+  const Folder folder;
+  const std::string good = png_bytes(noise(8, 6), {{"limber-hash", "0123456789abcdef"}});
+  for (std::size_t size = 0; size < good.size(); ++size) {
+    write_quickly(folder / "a.png", good.substr(0, size));
+    EXPECT_EQ(frame_hash(folder / "a.png"), std::nullopt) << size;
+    EXPECT_THROW(read_png(folder / "a.png"), InputError) << size;
+  }
+  for (std::size_t at = 0; at < good.size(); ++at) {
+    std::string bad = good;
+    bad[at] = char(bad[at] ^ 0x10);
+    write_quickly(folder / "a.png", bad);
+    EXPECT_EQ(frame_hash(folder / "a.png"), std::nullopt) << at;
+  }
+}
+
+TEST(PngFile, AFrameWithoutHashOrFileHasNone) {
+  const Folder folder;
+  write_png(folder / "a.png", noise(3, 3));
+  EXPECT_EQ(frame_hash(folder / "a.png"), std::nullopt);
+  EXPECT_TRUE(inspect_png(folder / "a.png"));
+  EXPECT_EQ(frame_hash(folder / "none.png"), std::nullopt);
+  EXPECT_EQ(frame_hash(folder.path), std::nullopt);
+  EXPECT_THROW(read_png(folder / "none.png"), InputError);
+}
+
+TEST(PngFile, AnUnwritableFolderIsADiskError) {
+  const Folder folder;
+  write_file(folder / "file", "");
+  EXPECT_THROW(write_png(folder / "file" / "a.png", noise(3, 3)), DiskError);
+  EXPECT_THROW(write_png(folder / "missing" / "a.png", noise(3, 3)), DiskError);
+}
+
+}  // namespace
+}  // namespace limber::render
