@@ -56,8 +56,9 @@ class Search {
   Search(const System& system, const Settings& settings, Plan& plan)
       : system_(system), settings_(settings), plan_(plan), progress_("plan", settings.max_iterations) {
     const int lanes = std::max(1, system.lanes()), threads = std::max(1, thread_count());
-    // Two batches a thread: one runs while the other waits for its turn to be committed.
-    window_ = settings.in_flight > 0 ? settings.in_flight : lanes * (threads > 1 ? 2 * threads : 1);
+    // With single lanes a thread that waits to be committed needs a second expansion; a batch holds enough.
+    const int automatic = threads == 1 ? lanes : threads * std::max(lanes, 2);
+    window_ = settings.in_flight > 0 ? settings.in_flight : automatic;
     threads_ = std::min(threads, window_);
     share_ = std::min(lanes, (window_ + threads_ - 1) / threads_);
     next_iteration_ = plan.statistics.iterations;

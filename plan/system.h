@@ -21,8 +21,9 @@ struct Rollout {
 class Propagator {
  public:
   virtual ~Propagator() = default;
-  // Fills `to` and `ok` of each; lengths may differ. A result depends on (from, control) alone, not on its
-  // neighbours in the span, and 40 steps followed by 60 of the same control give the bits of 100.
+  // Fills `to` and `ok` of each; lengths may differ, one alone is common. A result depends on (from, control)
+  // alone, not on its neighbours in the span, and 40 steps followed by 60 of the same control give the bits
+  // of 100.
   virtual void propagate(std::span<Rollout>) = 0;
 };
 
