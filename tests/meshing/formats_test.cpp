@@ -13,7 +13,7 @@
 #include "core/hash.h"
 #include "meshing/detail/own_process.h"
 #include "meshing/import.h"
-#include "tests/meshing/made_meshes.h"
+#include "tests/meshing/import_meshes.h"
 
 namespace limber::meshing {
 namespace {

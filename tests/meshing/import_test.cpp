@@ -14,7 +14,7 @@
 #include "core/hash.h"
 #include "core/random.h"
 #include "meshing/repair.h"
-#include "tests/meshing/made_meshes.h"
+#include "tests/meshing/import_meshes.h"
 
 namespace limber::meshing {
 namespace {
