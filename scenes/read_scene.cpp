@@ -265,9 +265,10 @@ MaterialSpec read_material(const Node& body_table, Kind kind, const std::string&
     complain(body_table, fmt::format("{} is deformable and lacks a material; add for example material = "
                                      "{{ youngs_modulus_pa = 5e3, density_kg_m3 = 100 }}",
                                      body));
-  if (!table)
-    return {.friction = as_number(
-                parse_set_value(std::string(find_key("bodies[].material.friction")->fallback), ""))};
+  if (!table) {  // it never deforms: any sound material does
+    const Key& friction = *find_key("bodies[].material.friction");
+    return {1e6, 0.45, 1000, 0.05, as_number(parse_set_value(std::string(friction.fallback), ""))};
+  }
   return {number(*table, "youngs_modulus_pa"), number(*table, "poisson_ratio"),
           number(*table, "density_kg_m3"), number(*table, "damping_ratio"), number(*table, "friction")};
 }
@@ -378,8 +379,8 @@ PlannerSpec read_planner(const Node& table) {
   if (!(planner.weight_body + planner.weight_control_point > 0))
     complain(
         weights,
-        "planner.weights of body and control_point are both 0, so nothing could move the robot away from the "
-        "goal's direction; make one of them > 0");
+        "planner.weights of body and control_point are both 0, so nothing could drive the robot anywhere but "
+        "to the goal; make one of them > 0");
   planner.max_force_n = number(table, "max_force_n");
   const Eigen::Vector2d share = vector2(table, "force_share"), duration = vector2(table, "duration_s");
   planner.min_force_share = share[0], planner.max_force_share = share[1];

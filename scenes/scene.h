@@ -37,8 +37,8 @@ struct BoxModel {  // its origin is its middle
 struct Hole {
   bool round = true;  // else square
   double size_m = 0;  // diameter, or side of the square
-  Eigen::Vector2d center_m =
-      Eigen::Vector2d::Zero();  // from the plate's middle, along its two longer axes in x y z order
+  // From the plate's middle, along its two longer axes in the order x, y, z.
+  Eigen::Vector2d center_m = Eigen::Vector2d::Zero();
 };
 struct PlateModel {  // a box with a hole along its thinnest axis; its origin is its middle
   BoxModel box;
@@ -51,11 +51,11 @@ struct SphereModel {  // its origin is its centre
 using Model = std::variant<FileModel, MadeModel, BoxModel, PlateModel, SphereModel>;
 
 struct CageSpec {
-  int tets = 0;  // budget of the enclosing cage; 0 when cells are given
-  Eigen::Vector3i cells{0, 0,
-                        0};  // boxes and plates without a hole: cut into nx × ny × nz cells of five tets each
-  std::string mode;          // "lattice", "fast" or "paper": how the enclosing cage is made
-  int shells = 0;            // at most so many convex shells
+  int tets = 0;      // budget of the enclosing cage; 0 when cells are given
+  std::string mode;  // "lattice", "fast" or "paper": how that cage is made
+  int shells = 0;    // at most so many convex shells
+  // Boxes and plates without a hole: cut into nx × ny × nz cells of five tets each.
+  Eigen::Vector3i cells = Eigen::Vector3i::Zero();
 };
 
 struct MaterialSpec {
@@ -81,7 +81,7 @@ struct BodySpec {
   Kind kind = Kind::deformable;
   Model model;
   CageSpec cage;
-  MaterialSpec material;  // of a rigid body only friction counts
+  MaterialSpec material;  // of a rigid body only friction counts; the rest may be filled in
   Pose pose;
   FixedSpec fixed;
   Vec3 color_srgb = Vec3::Zero();  // 0 … 1
@@ -97,8 +97,8 @@ struct PlannerSpec {
   std::int64_t seed = 0;
   int iterations = 0;
   double goal_bias = 0;  // share of the iterations that aim at the goal
-  double weight_body = 0, weight_control_point = 0,
-         weight_interpolation = 0;                  // of the three manipulations; ≥ 0, some > 0
+  // How often each manipulation is chosen, relative to the others; ≥ 0, body or control_point > 0.
+  double weight_body = 0, weight_control_point = 0, weight_interpolation = 0;
   double max_force_n = 0;                           // on the whole robot
   double min_force_share = 0, max_force_share = 0;  // of max_force_n, drawn evenly between
   double min_duration_s = 0, max_duration_s = 0;    // one manipulation is held so long, drawn evenly between
@@ -113,10 +113,9 @@ struct Keyframe {
   Vec3 eye_m = Vec3::Zero(), target_m = Vec3::Zero();
 };
 struct CameraSpec {
-  Vec3 direction = Vec3::UnitX();  // unit; from the scene to the camera, which is framed automatically when
-                                   // there are no keyframes
-  double fov_deg = 0;              // vertical
-  std::vector<Keyframe> keyframes;
+  Vec3 direction = Vec3::UnitX();   // unit; from the scene to the camera
+  double fov_deg = 0;               // vertical
+  std::vector<Keyframe> keyframes;  // none: framed automatically from `direction`
 };
 
 struct FilmSpec {

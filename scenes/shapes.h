@@ -19,7 +19,7 @@ SurfaceMesh make_plate(const PlateModel&);
 SurfaceMesh make_sphere(const SphereModel&);
 
 // Something like a sitting rabbit that looks along +x, out of ellipsoids that flow into one another; 1 m
-// high, about 1 m long and 0.7 m wide, 20,000 to 40,000 triangles.
+// high, about 1 m long and 0.7 m wide, about 35,000 triangles.
 SurfaceMesh make_bunny();
 
 // nx × ny × nz cells of five tets each, cut in alternate ways so that neighbours share their faces: 3 × 3 × 3

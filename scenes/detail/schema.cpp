@@ -160,7 +160,7 @@ constexpr Key all_keys[] = {
      "the coarse tets that are simulated: either tets or cells",
      "",
      ""},
-    {"bodies[].cage.tets", Type::integer, from_to(5, 1'000'000), 0, may_lack,
+    {"bodies[].cage.tets", Type::integer, from_to(24, 200'000), 0, may_lack,
      "budget of a cage made round the model", "", ""},
     {"bodies[].cage.cells", Type::integers, from_to(1, 200), 3, may_lack,
      "boxes, and plates without a hole: cells along x, y, z, five tets each", "", ""},

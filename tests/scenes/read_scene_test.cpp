@@ -124,7 +124,7 @@ TEST(ReadScene, ComplainsWithLineAndColumn) {
       {"density_kg_m3 = 100", "density_kg_m3 = 100, poisson_ratio = 0.5", "0.5 }",
        "must be ≥ 0.25 and ≤ 0.495"},
       {"cells = [3, 3, 3]", "cells = [3, 3.5, 3]", "3.5", "must be a whole number"},
-      {"cells = [3, 3, 3]", "cells = [3, 3, 3], tets = 9", "{ cells", "both tets and cells"},
+      {"cells = [3, 3, 3]", "cells = [3, 3, 3], tets = 90", "{ cells", "both tets and cells"},
       {"cage = { cells = [3, 3, 3] }", "cage = {}", "{}", "neither tets nor cells"},
       {"tets = 200", "cells = [1, 1, 1]", "[1, 1, 1] }\nmaterial", "needs a box"},
       {"size_m = [1, 1, 1]", "size_m = [1, 0, 1]", "0, 1], bevel", "bodies.robot.model.box.size_m[1] is 0"},
