@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <optional>
 
 #include "core/error.h"
 #include "meshing/detail/delaunay.h"
@@ -12,6 +13,7 @@
 #include "meshing/detail/lattice_cage.h"
 #include "meshing/detail/shrink_fit.h"
 #include "meshing/detail/tet_faces.h"
+#include "meshing/quality.h"
 
 namespace limber::meshing {
 namespace {
@@ -47,12 +49,12 @@ SurfaceMesh with_lone_vertices(const SurfaceMesh& surface) {
 
 // The spacing whose count comes nearest to the budget. The count falls with the spacing, but by jumps, and on
 // a model that is aligned with the axes by large ones; then other places of the lattice help.
-Selection fit_budget(const Model& model, int budget) {
+Selection fit_budget(const Model& model, int budget, const std::optional<DihedralRange>& warp_within) {
   // The first place is none where a node, an edge or a face would lie on a plane that users like.
   static const std::array<Vec3, 6> phases{Vec3(0.137, 0.291, 0.413), Vec3(0.613, 0.171, 0.829),
                                           Vec3(0.371, 0.743, 0.059), Vec3(0.887, 0.537, 0.271),
                                           Vec3(0.211, 0.947, 0.671), Vec3(0.463, 0.389, 0.983)};
-  constexpr double near_enough = 0.03;
+  constexpr double near_enough = 0.05;
   constexpr int tries_a_phase = 12;
   Selection best;
   const auto miss = [&](const Selection& s) { return std::abs(double(s.tets.size()) / budget - 1); };
@@ -60,7 +62,7 @@ Selection fit_budget(const Model& model, int budget) {
   for (const Vec3& phase : phases) {
     double too_fine = 0, too_coarse = 0;
     for (int i = 0; i < tries_a_phase; ++i) {
-      Selection s = detail::select_tets(model, spacing, phase);
+      Selection s = detail::select_tets(model, spacing, phase, warp_within);
       const double count = double(s.tets.size());
       // No tets: the lattice would be too large.
       const double ratio = s.tets.empty() ? 4 : count / budget;
@@ -131,7 +133,11 @@ Cage lattice_cage(const SurfaceMesh& surface, const CageOptions& options) {
   SurfaceMesh scaled = with_lone_vertices(surface);
   scaled.positions /= unit;
   const Model model(scaled);
-  const Selection selection = fit_budget(model, options.tets);
+  std::optional<DihedralRange> warp_within;
+  // A warp to the very limits would leave nothing to draw in with.
+  if (options.mode == CageMode::lattice)
+    warp_within = {std::max(20.0, options.min_dihedral_deg), std::min(160.0, options.max_dihedral_deg)};
+  const Selection selection = fit_budget(model, options.tets, warp_within);
   require(!selection.tets.empty(), "the model is too thin for its length; give fewer tets");
 
   Cage cage;

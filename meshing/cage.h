@@ -10,8 +10,8 @@
 namespace limber::meshing {
 
 enum class CageMode {
-  lattice,  // tets of a body-centred cubic lattice, drawn in to the surface: encloses, always
-  fast,     // the same without drawing in: dihedrals of 60 and 90 degrees exactly
+  lattice,  // tets of a body-centred cubic lattice, warped and drawn in to the surface: encloses, always
+  fast,     // the same without warp and drawing in: dihedrals of 60 and 90 degrees exactly
   paper     // Delaunay tets of each shell, welded where shells share a corner: the baseline; promises nothing
 };
 

@@ -243,16 +243,20 @@ std::vector<int> SurfaceTree::triangles_meeting_tet(const Vec3& a, const Vec3& b
   return found;
 }
 
-Vec3 SurfaceTree::closest_point(const Vec3& p) const {
-  Vec3 best = Vec3::Zero();
-  double best_distance = 1e300;
-  tree_.nearest(p, [&](int f) {
+Vec3 SurfaceTree::closest_point(const Vec3& p) const { return *closest_point_within(p, 1e150); }
+
+std::optional<Vec3> SurfaceTree::closest_point_within(const Vec3& p, double distance) const {
+  std::optional<Vec3> best;
+  double best_squared = distance * distance;
+  const auto wins = [&](const Vec3& q, double squared) {
+    if (squared != best_squared) return squared < best_squared;
+    return !best || std::lexicographical_compare(q.begin(), q.end(), best->begin(), best->end());
+  };
+  tree_.nearest(p, best_squared, [&](int f) {
     const Vec3 q = closest_on_triangle(corners(positions_, triangles_, f), p);
-    const double distance = (q - p).squaredNorm();
-    const bool tie_won = distance == best_distance &&
-                         std::lexicographical_compare(q.begin(), q.end(), best.begin(), best.end());
-    if (distance < best_distance || tie_won) best_distance = distance, best = q;
-    return best_distance * (1 + 1e-9) + 1e-300;  // the slack visits every tie, whatever the rounding of a box
+    const double squared = (q - p).squaredNorm();
+    if (wins(q, squared)) best_squared = squared, best = q;
+    return best_squared * (1 + 1e-9);  // the slack visits every tie, whatever the rounding of a box
   });
   return best;
 }

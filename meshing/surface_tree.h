@@ -2,6 +2,7 @@
 // cross one another. Touching counts as meeting. Method: docs/cage.md.
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "meshing/detail/box_tree.h"
@@ -27,6 +28,8 @@ class SurfaceTree {
   std::vector<int> triangles_meeting_tet(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& d) const;
   // The same for any order of the triangles: among equally near points the lexicographically least.
   Vec3 closest_point(const Vec3& p) const;
+  // Nothing when it is farther than `distance`; then it is quick to say so.
+  std::optional<Vec3> closest_point_within(const Vec3& p, double distance) const;
 
  private:
   Points positions_;

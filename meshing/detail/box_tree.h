@@ -36,13 +36,12 @@ class BoxTree {
   // Calls visit(thing), nearest boxes first, while the squared distance from p to the box is not above the
   // bound that visit returned last.
   template <class Visit>
-  void nearest(const Vec3& p, Visit visit) const {
+  void nearest(const Vec3& p, double bound, Visit visit) const {
     struct Pending {
       int node;
       double squared_distance;
     } pending[max_depth];
     int count = 0;
-    double bound = 1e300;
     pending[count++] = {0, squared_distance(nodes_[0].box, p)};
     while (count > 0) {
       const Pending top = pending[--count];

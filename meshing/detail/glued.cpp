@@ -55,9 +55,8 @@ std::vector<Vec3> clip(const std::array<Plane, 4>& planes, std::vector<Vec3> pol
   return polygon;
 }
 
-bool holds_strangers(const Model& model, const SurfaceMesh& surface, const TetCorners& corners) {
-  const std::vector<int> triangles =
-      model.tree.triangles_meeting_tet(corners[0], corners[1], corners[2], corners[3]);
+bool holds_strangers(const Model& model, const SurfaceMesh& surface, const TetCorners& corners,
+                     const std::vector<int>& triangles) {
   const std::array<Plane, 4> planes = planes_of(corners);
   const auto at = [&](int v) { return Vec3(surface.positions.row(v)); };
 
@@ -102,9 +101,10 @@ double glued_share(const Model& model, const SurfaceMesh& surface, const TetMesh
   for (Eigen::Index t = 0; t < mesh.tets.rows(); ++t) {
     TetCorners p;
     for (int k = 0; k < 4; ++k) p[k] = mesh.positions.row(mesh.tets(t, k));
-    if (!model.tree.meets_tet(p[0], p[1], p[2], p[3])) continue;
+    const std::vector<int> triangles = model.tree.triangles_meeting_tet(p[0], p[1], p[2], p[3]);
+    if (triangles.empty()) continue;
     ++meeting;
-    glued += holds_strangers(model, surface, p);
+    glued += holds_strangers(model, surface, p, triangles);
   }
   return meeting > 0 ? double(glued) / meeting : 0;
 }

@@ -39,9 +39,10 @@ const Pattern& pattern();
 
 // A box of cells, and where it lies.
 struct Lattice {
-  Vec3 origin;     // of cell 0
-  double spacing;  // edge of a cell
-  Cell cells;      // how many along each axis
+  Vec3 origin;                   // of cell 0
+  double spacing;                // edge of a cell
+  Cell cells;                    // how many along each axis
+  std::vector<Vec3> moved = {};  // by node_index, where each node went; empty when none did
 
   std::int64_t cell_count() const { return std::int64_t(cells.x()) * cells.y() * cells.z(); }
   bool holds(const Cell& c) const { return (c.array() >= 0).all() && (c.array() < cells.array()).all(); }
@@ -50,8 +51,13 @@ struct Lattice {
     return {index % cells.x(), index / cells.x() % cells.y(), index / cells.x() / cells.y()};
   }
   int tet_index(const LatticeTet& t) const { return index(t.cell) * tets_a_cell + t.which; }
-  Vec3 position(const LatticeNode& n) const {
+  int node_index(const LatticeNode& n) const { return 2 * index(n.cell) + n.kind; }
+  LatticeNode node(int node_index) const { return {cell(node_index / 2), node_index % 2}; }
+  Vec3 place(const LatticeNode& n) const {
     return origin + 0.5 * spacing * (2 * n.cell.array() + n.kind).matrix().cast<double>();
+  }
+  Vec3 position(const LatticeNode& n) const {
+    return moved.empty() || !holds(n.cell) ? place(n) : moved[node_index(n)];
   }
   std::array<Vec3, 4> tet_positions(int tet) const;
   LatticeNode tet_corner(int tet, int corner) const;

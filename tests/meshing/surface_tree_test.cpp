@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "core/random.h"
-#include "tests/meshing/made_meshes.h"
+#include "tests/meshing/cage_models.h"
 
 namespace limber::meshing {
 namespace {
