@@ -165,17 +165,27 @@ Image8 contact_sheet(const std::vector<fs::path>& frames, const std::vector<std:
   const int count = int(frames.size());
   const int columns = look.columns > 0 ? std::min(look.columns, count) : int(std::ceil(std::sqrt(count)));
   const int rows = (count + columns - 1) / columns;
-  const int caption_px =
-      captions.empty() ? 0 : std::clamp(look.tile_width_px / 40, 7, 24);  // height of a capital
-  const int caption_band = captions.empty() ? 0 : 3 * caption_px;
+  std::size_t longest = 1;
+  for (const std::string& caption : captions) longest = std::max(longest, caption.size());
 
   Image8 sheet;
-  int tile_width = 0, tile_height = 0;
+  int tile_width = 0, tile_height = 0, caption_band = 0;
+  double caption_px = 0;  // height of a capital
+  const auto place = [&](const Image8& part, int left, int top) {
+    for (int y = 0; y < part.height; ++y)
+      std::copy_n(&part.rgb[std::size_t(3) * y * part.width], 3 * part.width,
+                  &sheet.rgb[3 * (std::size_t(top + y) * sheet.width + left)]);
+  };
   for (int f = 0; f < count; ++f) {
     Image8 frame = read_png(frames[f]);
     if (f == 0) {
       tile_width = std::min(look.tile_width_px, frame.width);
       tile_height = std::max(1, int(std::lround(double(frame.height) * tile_width / frame.width)));
+      if (!captions.empty()) {  // as large as reads well, and smaller where the longest would not fit
+        caption_px = std::clamp(tile_width / 40.0, 6.0, 24.0);
+        caption_px = std::clamp(tile_width / double(longest), 4.0, caption_px);
+        caption_band = int(std::ceil(3 * caption_px));
+      }
       sheet =
           filled(columns * (tile_width + look.margin_px) + look.margin_px,
                  rows * (tile_height + caption_band + look.margin_px) + look.margin_px, look.background_srgb);
@@ -186,12 +196,11 @@ Image8 contact_sheet(const std::vector<fs::path>& frames, const std::vector<std:
     frame = shrunk(frame, tile_width, tile_height);
     const int left = look.margin_px + f % columns * (tile_width + look.margin_px);
     const int top = look.margin_px + f / columns * (tile_height + caption_band + look.margin_px);
-    for (int y = 0; y < tile_height; ++y)
-      std::copy_n(&frame.rgb[std::size_t(3) * y * tile_width], 3 * tile_width,
-                  &sheet.rgb[3 * (std::size_t(top + y) * sheet.width + left)]);
-    if (!captions.empty())
-      detail::draw_text(sheet, captions[f], left, top + tile_height + 1.9 * caption_px, caption_px,
-                        look.caption_srgb);
+    place(frame, left, top);
+    if (captions.empty()) continue;
+    Image8 band = filled(tile_width, caption_band, look.background_srgb);
+    detail::draw_text(band, captions[f], 0, 1.9 * caption_px, caption_px, look.caption_srgb);
+    place(band, left, top + tile_height);
   }
   return sheet;
 }

@@ -181,7 +181,7 @@ struct Renderer::Impl {
   Box stage() const;
   void draw_shadow_map(const Box& stage);
   void shade_ground_maps(const Box& stage);
-  void draw_meshes(const Camera&, const Mat4& clip_from_world);
+  void draw_meshes(const Camera&, const Mat4& clip_from_world, const Box& stage);
   void draw_lines(const Mat4& clip_from_world);
   Image finish(const Camera&, const Box& stage);
 
@@ -321,7 +321,7 @@ void Renderer::Impl::shade_ground_maps(const Box& stage) {
   }
 }
 
-void Renderer::Impl::draw_meshes(const Camera& camera, const Mat4& clip_from_world) {
+void Renderer::Impl::draw_meshes(const Camera& camera, const Mat4& clip_from_world, const Box& stage) {
   glBindFramebuffer(GL_FRAMEBUFFER, samples_frame);
   glViewport(0, 0, look.width * look.supersampling, look.height * look.supersampling);
   glDepthMask(GL_TRUE);
@@ -337,7 +337,7 @@ void Renderer::Impl::draw_meshes(const Camera& camera, const Mat4& clip_from_wor
   p.set("clip_from_world", clip_from_world);
   p.set("shadow_from_world", shadow_from_world);
   p.set("shadow_offset_m", 2.0 * shadow_texel_m);
-  p.set("shadow_step", 1.3 / shadow_size);
+  p.set("shadow_step", 1.7 / shadow_size);
   p.set("ground_x", Vec3(ground.plane_from_world.row(0)));
   p.set("ground_y", Vec3(ground.plane_from_world.row(1)));
   p.set("ground_lower", sky_shade.lower);
@@ -350,6 +350,8 @@ void Renderer::Impl::draw_meshes(const Camera& camera, const Mat4& clip_from_wor
   p.set("sky_light", sky_light);
   p.set("ground_color", ground_color);
   p.set("ground_key", look.toward_key.dot(look.up));
+  p.set("ground_height", ground.height_m);
+  p.set("faced_m", std::max(0.05 * stage.diagonal(), 1e-6));
   p.set("shadow_map", 0);
   p.set("ground_sky_map", 1);
   bind_texture(0, shadow_map);
@@ -365,7 +367,7 @@ void Renderer::Impl::draw_meshes(const Camera& camera, const Mat4& clip_from_wor
     // A distance that is always positive as well, because Mesa 22.3 clips even where clipping is off.
     const bool cut = ground_hides && below;
     (cut ? glEnable : glDisable)(GL_CLIP_DISTANCE0);
-    p.set("ground", cut ? ground_plane : Eigen::Vector4d(0, 0, 0, 1));
+    p.set("cut", cut ? ground_plane : Eigen::Vector4d(0, 0, 0, 1));
     glBindVertexArray(mesh.array);
     glDrawElements(GL_TRIANGLES, GLsizei(mesh.drawn.corners.size()), GL_UNSIGNED_INT, nullptr);
   };
@@ -574,7 +576,7 @@ Image Renderer::draw(const Camera& camera) {
   const Box stage = r.stage();
   r.draw_shadow_map(stage);
   r.shade_ground_maps(stage);
-  r.draw_meshes(camera, clip_from_world);
+  r.draw_meshes(camera, clip_from_world, stage);
   r.draw_lines(clip_from_world);
   return r.finish(camera, stage);
 }

@@ -16,9 +16,14 @@ constexpr int bands = 8;
 
 using Plane = std::vector<float>;
 
+struct Rectangle {  // of cells, upper bounds included
+  int left = 1 << 30, low = 1 << 30, right = -1, high = -1;
+};
+
 struct Raster {
   int columns, rows;
   std::array<Plane, bands> cover;
+  std::array<Rectangle, bands> covered;
 
   void mark(int column, int row, double height) {  // height: in units of band 0
     const double place = std::clamp(std::log2(std::max(height, 1e-6)), 0.0, bands - 1.0);
@@ -32,6 +37,9 @@ struct Raster {
     if (cover[band].empty()) cover[band].assign(std::size_t(columns) * rows, 0.0f);
     float& cell = cover[band][std::size_t(row) * columns + column];
     cell = std::max(cell, share);
+    Rectangle& r = covered[band];
+    r.left = std::min(r.left, column), r.right = std::max(r.right, column);
+    r.low = std::min(r.low, row), r.high = std::max(r.high, row);
   }
 };
 
@@ -94,13 +102,27 @@ void box_filter_transposed(const Plane& in, int columns, int rows, double width,
   }
 }
 
-// Three box filters come close to a Gaussian; each adds (width² − 1) / 12 to the variance.
-void blur(Plane& plane, int columns, int rows, double deviation, Plane& scratch) {
+// Adds share × the blurred band. Three box filters come close to a Gaussian; each adds (width² − 1) / 12 to
+// the variance. Only where the band is not zero, for most of the ground is empty.
+void add_blurred(const Raster& raster, int band, double deviation, float share, Plane& sum) {
   const double width = std::sqrt(4 * deviation * deviation + 1);
+  const int reach = int(1.5 * width) + 3;
+  const Rectangle& covered = raster.covered[band];
+  const int left = std::max(0, covered.left - reach),
+            columns = std::min(raster.columns, covered.right + reach + 1) - left;
+  const int low = std::max(0, covered.low - reach),
+            rows = std::min(raster.rows, covered.high + reach + 1) - low;
+  Plane plane(std::size_t(columns) * rows), turned(plane.size());
+  for (int r = 0; r < rows; ++r)
+    std::copy_n(&raster.cover[band][std::size_t(low + r) * raster.columns + left], columns,
+                &plane[std::size_t(r) * columns]);
   for (int pass = 0; pass < 3; ++pass) {
-    box_filter_transposed(plane, columns, rows, width, scratch);
-    box_filter_transposed(scratch, rows, columns, width, plane);
+    box_filter_transposed(plane, columns, rows, width, turned);
+    box_filter_transposed(turned, rows, columns, width, plane);
   }
+  for (int r = 0; r < rows; ++r)
+    for (int c = 0; c < columns; ++c)
+      sum[std::size_t(low + r) * raster.columns + left + c] += share * plane[std::size_t(r) * columns + c];
 }
 
 }  // namespace
@@ -140,7 +162,7 @@ ShadeMap shade_ground(std::span<const DrawnMesh* const> casters, const GroundFra
   // Lower than this, the blur is less than a cell and no two heights differ.
   const double band_0_m = 0.7 * map.cell_m / std::max(widest, 1e-3);
 
-  Raster raster{map.columns, map.rows, {}};
+  Raster raster{map.columns, map.rows, {}, {}};
   std::vector<Corner> corners;
   for (const DrawnMesh* mesh : casters) {
     corners.resize(mesh->vertex_from_drawn.size());
@@ -155,14 +177,10 @@ ShadeMap shade_ground(std::span<const DrawnMesh* const> casters, const GroundFra
   }
 
   map.blocked.assign(std::size_t(map.columns) * map.rows, 0.0f);
-  Plane blurred, scratch(map.blocked.size());
   for (int band = 0; band < bands; ++band)
-    for (const double spread : raster.cover[band].empty() ? std::span<const double>() : spreads) {
-      blurred = raster.cover[band];
-      blur(blurred, map.columns, map.rows, std::exp2(band) * band_0_m * spread / map.cell_m, scratch);
-      const float share = 1 / float(spreads.size());
-      for (std::size_t i = 0; i < blurred.size(); ++i) map.blocked[i] += share * blurred[i];
-    }
+    for (const double spread : raster.cover[band].empty() ? std::span<const double>() : spreads)
+      add_blurred(raster, band, std::exp2(band) * band_0_m * spread / map.cell_m, 1 / float(spreads.size()),
+                  map.blocked);
   // A margin that is cut short ends softly.
   const double slope = 3 * widest > 2 ? 8 : 1e9;
   const auto fade = [&](int at, int size) {

@@ -122,10 +122,6 @@ double distance(const Eigen::Vector2d& p, const Stroke& s) {
 
 }  // namespace
 
-double text_width(std::string_view text, double height_px) {
-  return double(text.size()) * advance * height_px / cap_height;
-}
-
 void draw_text(Image8& image, std::string_view text, double left_px, double baseline_px, double height_px,
                const Vec3& color_srgb) {
   const double unit = height_px / cap_height, half = std::max(0.5, 0.5 * stroke_width * unit);

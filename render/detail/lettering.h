@@ -7,9 +7,8 @@
 
 namespace limber::render::detail {
 
-// Printable ASCII; other letters come out as a box. Height is that of a capital letter; the text's box is
-// (2/3 height) wide a letter.
-double text_width(std::string_view, double height_px);
+// Printable ASCII; other letters come out as a box. The height is that of a capital; a letter takes as much
+// width.
 void draw_text(Image8&, std::string_view, double left_px, double baseline_px, double height_px,
                const Vec3& color_srgb);
 

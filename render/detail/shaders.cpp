@@ -9,20 +9,16 @@ uniform mat4 clip_from_world;
 uniform mat4 shadow_from_world;
 uniform vec3 toward_key;
 uniform float shadow_offset_m;   // along the normal: about a texel of the shadow map, or surfaces shade themselves
-uniform vec4 ground;             // up, -height: what is below is cut off where clipping is on
-uniform vec3 ground_x, ground_y;
-uniform vec2 ground_lower, ground_scale;
+uniform vec4 cut;                // a plane: what is below it is cut off
 out vec3 position, normal, shadow_place;
-out vec2 ground_place;
 void main() {
   position = position_in;
   normal = normal_in;
   // Towards the light's side, whichever way the mesh is wound.
   vec3 offset = shadow_offset_m * (dot(normal_in, toward_key) < 0.0 ? -normal_in : normal_in);
   shadow_place = (shadow_from_world * vec4(position_in + offset, 1.0)).xyz;
-  ground_place = (vec2(dot(ground_x, position_in), dot(ground_y, position_in)) - ground_lower) * ground_scale;
   gl_Position = clip_from_world * vec4(position_in, 1.0);
-  gl_ClipDistance[0] = dot(ground, vec4(position_in, 1.0));
+  gl_ClipDistance[0] = dot(cut, vec4(position_in, 1.0));
 }
 )";
 
@@ -30,10 +26,13 @@ void main() {
 // ground below.
 const char* const mesh_fragment_shader = R"(#version 330 core
 in vec3 position, normal, shadow_place;
-in vec2 ground_place;
 uniform vec3 eye, up, toward_key;
 uniform vec3 key_light, sky_light, ground_color;  // ground_color is black without a ground
 uniform float ground_key;        // share of the key light that a level surface gets
+uniform vec3 ground_x, ground_y;
+uniform vec2 ground_lower, ground_scale;
+uniform float ground_height;
+uniform float faced_m;           // how far before a wall lies the ground that lights it
 uniform vec3 albedo;
 uniform float roughness, metallic, opacity;
 uniform float shadow_step;       // between taps, in units of the map
@@ -70,12 +69,17 @@ void main() {
   vec3 key = (diffuse + fresnel * (a2 / (d * d) * visibility)) * (n_key * key_visibility()) * key_light;
 
   float n_up = dot(n, up);
-  float open = 1.0 - texture(ground_sky_map, ground_place).r;  // the ground under a body is dark, and lights it less
+  // The ground that a surface faces lights it less where it is itself in the dark, as under a body; from higher up one sees
+  // more of the ground, and the dark counts less.
+  vec3 faced = position + faced_m * n;
+  vec2 ground_place = (vec2(dot(ground_x, faced), dot(ground_y, faced)) - ground_lower) * ground_scale;
+  float nearness = exp2(-max(dot(up, position) - ground_height, 0.0) / (1.5 * faced_m));
+  float open = 1.0 - nearness * texture(ground_sky_map, ground_place).r;
   vec3 bounce = ground_color * (0.6 * ground_key * key_light + 0.6 * sky_light) * open;
   vec3 ambient = diffuse * mix(bounce, sky_light, 0.5 + 0.5 * n_up);
   float r_up = 2.0 * dot(n, v) * n_up - dot(v, up);
   vec3 mirrored = mix(bounce, 1.3 * sky_light, smoothstep(-0.35, 0.6, r_up));
-  // Split sum of the environment's reflection, fitted by Karis.
+  // Split sum of the environment's reflection, fitted by Karis (Physically based shading on mobile, 2014).
   vec4 r = roughness * vec4(-1.0, -0.0275, -0.572, 0.022) + vec4(1.0, 0.0425, 1.04, -0.04);
   float a = min(r.x * r.x, exp2(-9.28 * n_v)) * r.x + r.y;
   vec2 ab = vec2(-1.04, 1.04) * a + r.zw;

@@ -141,6 +141,22 @@ TEST(Sheet, HoldsEveryFrameInItsPlace) {
   EXPECT_THROW(contact_sheet({folder / "none.png"}, {}), InputError);
 }
 
+TEST(Sheet, ALongCaptionStaysUnderItsOwnFrame) {
+  const Folder folder;
+  const auto frames = write_frames(folder, 2, 60, 30);
+  SheetLook look;
+  look.columns = 2, look.tile_width_px = 60, look.margin_px = 5;
+  const Image8 sheet = contact_sheet(frames, {std::string(200, 'W'), ""}, look);
+  int ink = 0, elsewhere = 0;
+  for (int y = 5 + 30; y < sheet.height; ++y)
+    for (int x = 0; x < sheet.width; ++x) {
+      const bool dark = sheet.rgb[3 * (std::size_t(y) * sheet.width + x)] < 200;
+      (5 <= x && x < 65 ? ink : elsewhere) += dark;
+    }
+  EXPECT_GT(ink, 20);
+  EXPECT_EQ(elsewhere, 0);
+}
+
 TEST(Sheet, CaptionsAreReadable) {
   // Each printable letter leaves ink within its own box, and no two letters look alike.
   std::map<std::vector<std::uint8_t>, char> seen;
