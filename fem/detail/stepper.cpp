@@ -12,7 +12,7 @@ namespace {
 
 // Interpolation draws each node as a critically damped oscillator of this frequency would: rest within about
 // 2 s.
-constexpr double goal_frequency = 4;  // rad/s
+constexpr double goal_frequency = 6;  // rad/s
 
 bool is_pushed(const World& world, const Control& control, int robot_node) {
   if (control.manipulation == Manipulation::body) return true;
@@ -97,11 +97,19 @@ void Stepper<Real>::pull_towards_goal(int lane) {
   const Real most = Real(control.max_force_n) / Real(robot.mass_kg);
   for (int n = 0; n < robot.node_count(); ++n) {
     if (robot.fixed[n]) continue;
+    const int first = 3 * (robot.first_node + n);
+    Real way[3], length2 = 0;
+    for (int c = 0; c < 3; ++c) {
+      way[c] =
+          tables_.rest_from_center[3 * n + c] + Real(control.target_m[c]) - x_[(first + c) * lanes_ + lane];
+      length2 += way[c] * way[c];
+    }
+    // Far away, no faster than half the force can stop within the way left.
+    const Real braking = std::sqrt(most / std::max(std::sqrt(length2), Real(1e-6)));
+    const Real rate = std::min(Real(goal_frequency / 2), braking);
     Real pull[3], square = 0;
     for (int c = 0; c < 3; ++c) {
-      const int k = (3 * (robot.first_node + n) + c) * lanes_ + lane;
-      const Real goal = tables_.rest_from_center[3 * n + c] + Real(control.target_m[c]);
-      pull[c] = Real(goal_frequency) * (Real(goal_frequency) * (goal - x_[k]) - 2 * v_[k]);
+      pull[c] = Real(2 * goal_frequency) * (rate * way[c] - v_[(first + c) * lanes_ + lane]);
       square += pull[c] * pull[c];
     }
     const Real scale = square > most * most ? most / std::sqrt(square) : Real(1);

@@ -44,14 +44,14 @@ inline TetMesh cube(const Vec3& center, double edge, int cells) {
   return grid(center - Vec3::Constant(edge / 2), Vec3::Constant(edge), cells, cells, cells);
 }
 
-// A cube's grid pulled onto a ball.
+// A cube's grid pulled most of the way onto a ball; all the way, its corner tets would be flat.
 inline TetMesh ball(const Vec3& center, double radius, int cells) {
   TetMesh mesh = cube(Vec3::Zero(), 2, cells);
   for (int n = 0; n < mesh.positions.rows(); ++n) {
     const Vec3 p = mesh.positions.row(n);
     const double length = p.norm();
-    const Vec3 q = length > 0 ? Vec3(p * (p.cwiseAbs().maxCoeff() / length)) : p;
-    mesh.positions.row(n) = (center + radius * q).transpose();
+    const double onto_ball = length > 0 ? p.cwiseAbs().maxCoeff() / length : 1;
+    mesh.positions.row(n) = (center + radius * (0.7 * onto_ball + 0.3 * 0.7) * p).transpose();
   }
   return mesh;
 }
@@ -74,9 +74,8 @@ inline WorldSpec alone(BodySpec body) {
 
 // The paper's Barriers: a corridor 10 × 3 × 3, a soft cube of edge 1, and two soft plates that leave a gap of
 // 0.8, one on the floor at x = 3.3, one under the ceiling at x = 6.3, their edges at the walls fixed.
-// Fineness 1: 135 + 2 × 270 tets.
-inline WorldSpec barriers(int fineness = 1) {
-  const Material material;
+// Fineness 1: 135 + 2 × 240 tets.
+inline WorldSpec barriers(int fineness = 1, const Material& material = {}) {
   WorldSpec spec;
   spec.bounds_m = {Vec3(0, 0, 0), Vec3(10, 3, 3)};
   const int n = fineness == 1 ? 3 : 5;

@@ -1,0 +1,345 @@
+// The laws of contact (docs/contact.md).
+#include "fem/detail/contact.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <optional>
+
+#include "core/random.h"
+#include "fem/batch.h"
+#include "fem/observe.h"
+#include "tests/fem/worlds.h"
+
+namespace limber::fem {
+namespace {
+
+using testing::ball;
+using testing::cube;
+using testing::grid;
+
+// One lane of a world, with the boxes and travel that a stepper would keep.
+struct Lane {
+  const World& world;
+  std::vector<float> x, v, f, lower, upper, travel;
+
+  explicit Lane(const World& w)
+      : world(w),
+        x(w.tables.rest_positions),
+        v(x.size()),
+        f(x.size()),
+        lower(3 * w.bodies.size()),
+        upper(lower),
+        travel(w.bodies.size()) {
+    update_boxes();
+  }
+  void update_boxes() {
+    for (std::size_t b = 0; b < world.bodies.size(); ++b)
+      for (int c = 0; c < 3; ++c) {
+        lower[3 * b + c] = 1e30f, upper[3 * b + c] = -1e30f;
+        for (int n = world.topology.bodies[b].first_node; n < world.topology.bodies[b].last_node; ++n) {
+          lower[3 * b + c] = std::min(lower[3 * b + c], x[3 * n + c]);
+          upper[3 * b + c] = std::max(upper[3 * b + c], x[3 * n + c]);
+        }
+      }
+  }
+  // Moves the nodes of a body and counts the way of the fastest.
+  void move(int body, const std::function<Vec3f(const Vec3f&)>& place) {
+    float farthest = 0;
+    for (int n = world.topology.bodies[body].first_node; n < world.topology.bodies[body].last_node; ++n) {
+      Eigen::Map<Vec3f> p(&x[3 * n]);
+      const Vec3f q = place(p);
+      farthest = std::max(farthest, (q - p).norm());
+      p = q;
+    }
+    travel[body] += farthest;
+    update_boxes();
+  }
+  detail::LaneView<float> view() {
+    return {x.data(), v.data(), f.data(), 1, lower.data(), upper.data(), travel.data()};
+  }
+  Vec3 place(int point) const {
+    const auto& p = world.topology.points[point];
+    return p.share[0] * node(p.node[0]) + p.share[1] * node(p.node[1]);
+  }
+  Vec3 node(int n) const { return Eigen::Map<const Vec3f>(&x[3 * n]).cast<double>(); }
+
+  // Barycentric coordinates in double; empty when outside.
+  std::optional<Eigen::Vector4d> weights(const Vec3& p, int tet) const {
+    const int* n = world.topology.tets[tet].node;
+    const Vec3 a = node(n[0]), b = node(n[1]), c = node(n[2]), d = node(n[3]);
+    const double all = signed_volume(a, b, c, d);
+    const Eigen::Vector4d w(signed_volume(p, b, c, d), signed_volume(a, p, c, d), signed_volume(a, b, p, d),
+                            signed_volume(a, b, c, p));
+    if (!(all > 0) || w.minCoeff() < 0) return {};
+    return w / all;
+  }
+};
+
+WorldSpec two_bodies(TetMesh a, TetMesh b, double friction = 0) {
+  Material material;
+  material.friction = friction;
+  WorldSpec spec;
+  spec.bodies = {{"a", std::move(a), material, {}, false}, {"b", std::move(b), material, {}, false}};
+  spec.bounds_m = {Vec3::Constant(-20), Vec3::Constant(20)};
+  spec.walls = false;
+  return spec;
+}
+
+// Two bodies that wander through one another and change shape: at each of 1,000 places, the touches found
+// through lists that are many places old are those of every point against every tet. Points within rounding
+// of a face may go either way.
+TEST(Contact, FindsWhatBruteForceFinds) {
+  Rng rng(41, 0);
+  int touches = 0;
+  for (int scene = 0; scene < 20; ++scene) {
+    SCOPED_TRACE(scene);
+    const World world =
+        build_world(two_bodies(ball({0, 0, 0}, 0.5, 3), grid({0.6, -0.5, -0.5}, {0.5, 1, 1}, 2, 3, 3)));
+    Lane lane(world);
+    detail::Contacts<float> contacts(world, 1);
+    const Vec3f target = (0.3 * rng.direction()).cast<float>() + Vec3f(0.7f, 0, 0);
+    for (int place = 0; place < 50; ++place) {
+      const Vec3f turn = (0.02 * rng.direction()).cast<float>();
+      const float phase = float(rng.uniform(0, 6));
+      lane.move(0, [&](const Vec3f& p) -> Vec3f {
+        return p + target / 50 + turn.cross(p) + Vec3f::Constant(0.002f) * std::sin(20 * p.y() + phase);
+      });
+      lane.move(1, [&](const Vec3f& p) -> Vec3f { return p - turn.cross(p) * 0.5f; });
+      const auto& found = contacts.find(0, lane.view(), 0, 1);
+      touches += int(found.size());
+      std::size_t at = 0;
+      for (const int from : {0, 1}) {
+        const auto& body = world.topology.bodies[from];
+        const auto& into = world.topology.bodies[1 - from];
+        for (int p = body.first_point; p < body.last_point; ++p) {
+          int owner = -1;
+          double clear = 1;  // of the nearest face, as a barycentric coordinate
+          for (int t = into.first_tet; t < into.last_tet && owner < 0; ++t)
+            if (const auto w = lane.weights(lane.place(p), t)) owner = t, clear = w->minCoeff();
+          const bool is_found = at < found.size() && found[at].point == p;
+          if (clear > 1e-4) {
+            EXPECT_EQ(is_found, owner >= 0) << p;
+          }
+          if (!is_found) continue;
+          const detail::Touch<float>& touch = found[at++];
+          if (clear > 1e-4) {
+            EXPECT_EQ(touch.tet, owner);
+          }
+          Vec3 back = Vec3::Zero();
+          for (int i = 0; i < 4; ++i)
+            back += touch.weight[i] * lane.node(world.topology.tets[touch.tet].node[i]);
+          EXPECT_LT((back - lane.place(p)).norm(), 1e-5);
+        }
+      }
+      EXPECT_EQ(at, found.size());
+    }
+  }
+  EXPECT_GT(touches, 10000);
+}
+
+// A cube pressed 4 % into a face: every point measures the distance to that face, and leaves straight out of
+// it.
+TEST(Contact, DepthOfAFlatContactIsTheDistance) {
+  const World world =
+      build_world(two_bodies(cube({0, 0, 1.0}, 1, 3), grid({-1, -1, -0.5}, {2, 2, 1}, 5, 5, 3)));
+  Lane lane(world);
+  lane.move(0, [](const Vec3f& p) -> Vec3f { return p + Vec3f(0.03f, 0.02f, -0.04f); });
+  detail::Contacts<float> contacts(world, 1);
+  int from_cube = 0;
+  for (const auto& touch : contacts.find(0, lane.view(), 0, 1)) {
+    EXPECT_TRUE(touch.known);
+    if (world.topology.points[touch.point].node[0] >= world.topology.bodies[0].last_node) continue;
+    ++from_cube;
+    EXPECT_NEAR(touch.depth, 0.04, 1e-5);
+    EXPECT_NEAR(touch.direction[2], 1, 1e-5);
+  }
+  EXPECT_EQ(from_cube, 16 + 33);  // vertices and edges of a face of 3 × 3 cells
+}
+
+// A small body wholly inside a large one still finds a way out.
+TEST(Contact, ABodyInsideAnotherIsPushedOut) {
+  WorldSpec spec = two_bodies(cube({0, 0, 2}, 0.3, 1), cube({0, 0, 0}, 2, 4));
+  const World world = build_world(spec);
+  State state = rest_state(world);
+  for (int n = 0; n < world.bodies[0].node_count(); ++n) state.positions[3 * n + 2] -= 1.6f;
+  Control coast;
+  coast.steps = int(1.0 / world.dt_s);
+  const Rollout out = propagate(world, state, coast);
+  EXPECT_EQ(out.outcome.status, RunStatus::ok);
+  EXPECT_EQ(deepest_penetration(world, out.end).depth_m, 0);
+}
+
+TEST(Contact, ACollisionKeepsMomentum) {
+  const World world = build_world(two_bodies(ball({0, 0, 0}, 0.5, 3), ball({1.05, 0.2, 0.1}, 0.5, 4), 0.3));
+  State state = rest_state(world);
+  for (int n = 0; n < world.bodies[0].node_count(); ++n) state.velocities[3 * n] = 2;
+  const auto momenta = [&](const State& s) {
+    Eigen::Matrix<double, 6, 1> sum = Eigen::Matrix<double, 6, 1>::Zero();
+    for (int n = 0; n < world.nodes; ++n) {
+      const Vec3 x = Eigen::Map<const Vec3f>(&s.positions[3 * n]).cast<double>();
+      const Vec3 p =
+          world.tables64.node_mass[n] * Eigen::Map<const Vec3f>(&s.velocities[3 * n]).cast<double>();
+      sum.head<3>() += p, sum.tail<3>() += x.cross(p);
+    }
+    return sum;
+  };
+  Control coast;
+  coast.steps = int(0.6 / world.dt_s);
+  const State end = propagate(world, state, coast).end;
+  EXPECT_GT(center_of_mass_m(world, end, 1).x(), 1.2);  // it was hit
+  const auto before = momenta(state), after = momenta(end);
+  EXPECT_LT((after - before).norm(), 1e-5 * before.head<3>().norm());
+}
+
+// A cube at rest on the floor: every bottom node carries its share, so depth = g h²/β · (all mass)/(mass of
+// the bottom nodes).
+TEST(Contact, RestingDepthFollowsTheStiffnessRule) {
+  WorldSpec spec = testing::alone({"cube", cube({0, 0, 0.5}, 1, 2), {}, {}, false});
+  spec.bounds_m = {Vec3(-5, -5, 0), Vec3(5, 5, 10)};
+  spec.walls = true;
+  spec.gravity_m_s2 = {0, 0, -10};
+  spec.bodies[0].material.youngs_modulus_pa = 1e6;
+  spec.bodies[0].material.damping_ratio = 0.3;
+  const World world = build_world(spec);
+  Control coast;
+  coast.steps = int(2 / world.dt_s);
+  const State end = propagate(world, rest_state(world), coast).end;
+  double bottom = 0, mean_depth = 0;
+  for (int n = 0; n < world.nodes; ++n)
+    if (world.bodies[0].cage.positions(n, 2) < 1e-9) {
+      bottom += world.tables64.node_mass[n];
+      mean_depth -= world.tables64.node_mass[n] * end.positions[3 * n + 2];
+    }
+  const double expected =
+      10 * world.contact_dt_s * world.contact_dt_s / detail::contact_beta * world.bodies[0].mass_kg / bottom;
+  EXPECT_NEAR(mean_depth / bottom / expected, 1, 0.05);
+  EXPECT_LT(mean_speed_m_s(world, end, 0), 1e-3);
+}
+
+// On a slope of angle θ a body holds while μ > tan θ and slides, as Coulomb says, while μ < tan θ: on the
+// floor of the bounds and on a static body.
+TEST(Contact, FrictionHoldsAndSlidesOnASlope) {
+  const double tangent = 0.4, angle = std::atan(tangent);
+  for (const bool on_floor : {true, false})
+    for (const double friction : {tangent + 0.01, tangent - 0.01, 0.0}) {
+      SCOPED_TRACE(friction);
+      Material material;
+      material.youngs_modulus_pa = 2e5;
+      material.damping_ratio = 0.3;
+      material.friction = friction;
+      WorldSpec spec;
+      spec.bodies = {{"slider", cube({1, 0, 0.25}, 0.5, 2), material, {}, false}};
+      if (!on_floor)
+        spec.bodies.push_back({"slope", grid({0, -1, -0.5}, {6, 2, 0.5}, 12, 4, 1), material, {}, true});
+      spec.bounds_m = {Vec3(-20, -20, on_floor ? 0 : -20), Vec3(20, 20, 20)};
+      spec.gravity_m_s2 = 10 * Vec3(std::sin(angle), 0, -std::cos(angle));
+      const World world = build_world(spec);
+      Control coast;
+      coast.steps = int(1 / world.dt_s);
+      const State landed = propagate(world, rest_state(world), coast).end;
+      const State end = propagate(world, landed, coast).end;
+      const auto speed = [&](const State& state) {
+        double momentum = 0;
+        for (int n = 0; n < world.bodies[0].node_count(); ++n)
+          momentum += world.tables64.node_mass[n] * state.velocities[3 * n];
+        return momentum / world.bodies[0].mass_kg;
+      };
+      const double gained =
+          10 * std::cos(angle) * std::max(0.0, tangent - friction) * coast.steps * world.dt_s;
+      EXPECT_NEAR(speed(end) - speed(landed), gained, 0.01 + 0.01 * gained);
+      if (friction > tangent) {
+        EXPECT_LT(speed(end), 0.02);
+      }
+    }
+}
+
+// A cube thrown at a wall-like body 0.35 thick comes back and never through, up to 8 m/s; more is not
+// promised.
+TEST(Contact, NothingPassesThroughUpToAStatedSpeed) {
+  for (const double speed : {1.0, 4.0, 8.0}) {
+    SCOPED_TRACE(speed);
+    WorldSpec spec = two_bodies(cube({0, 0, 0}, 1, 3), grid({1, -1.5, -1.1}, {0.35, 3, 2.2}, 2, 6, 4));
+    spec.bodies[1].rigid = true;
+    const World world = build_world(spec);
+    State state = rest_state(world);
+    for (int n = 0; n < world.moving_nodes; ++n) state.velocities[3 * n] = float(speed);
+    Control coast;
+    coast.steps = int(3 / speed / world.dt_s);
+    const Rollout rollout = propagate(world, state, coast);
+    ASSERT_EQ(rollout.outcome.status, RunStatus::ok) << rollout.outcome.reason;
+    EXPECT_LT(bounding_box(body_positions(world, rollout.end, 0)).upper.x(), 1.1);
+    EXPECT_EQ(inverted_tets(world, rollout.end), 0);
+  }
+}
+
+// The scene of the paper: a cube driven over one soft plate and under the next by forces that point the way,
+// and out again.
+TEST(Contact, ACubeGoesOverThePlateAndUnderTheNext) {
+  Material material;
+  material.poisson_ratio = 0.48;
+  const World world = build_world(testing::barriers(1, material));
+  State state = rest_state(world);
+  const auto push = [&](const Vec3& force_n) {
+    Control control;
+    control.manipulation = Manipulation::body;
+    control.force_n = force_n.cast<float>();
+    control.steps = int(0.05 / world.dt_s);
+    const Rollout rollout = propagate(world, state, control);
+    ASSERT_EQ(rollout.outcome.status, RunStatus::ok) << rollout.outcome.reason;
+    state = rollout.end;
+  };
+  double deepest = 0, volume = 0;
+  int inverted = 0;
+  const auto robot = [&] { return center_of_mass_m(world, state, 0); };
+  for (int i = 0; i < 300 && robot().x() < 8; ++i) {
+    const Vec3 c = robot();
+    Vec3 goal(9, 1.5, 0.5);
+    if (c.x() < 2.5 && c.z() < 2.2)
+      goal = {2.2, 1.5, 2.6};
+    else if (c.x() < 4.9)
+      goal = {6, 1.5, 2.5};
+    else if (c.x() < 5.6 && c.z() > 0.9)
+      goal = {5.1, 1.5, 0.5};
+    push(400 * (goal - c).normalized());
+    deepest = std::max(deepest, deepest_penetration(world, state).depth_m);
+    volume = std::max(volume, largest_volume_change(world, state));
+    inverted += inverted_tets(world, state);
+    // Through the gap, never through the plate: while its middle is over the first plate, the cube is above
+    // it.
+    if (c.x() > 3.3 && c.x() < 3.65) {
+      EXPECT_GT(c.z(), 2.1);
+    }
+    if (c.x() > 6.3 && c.x() < 6.65) {
+      EXPECT_LT(c.z(), 0.9);
+    }
+  }
+  EXPECT_GE(robot().x(), 8);
+  EXPECT_LT(deepest, 0.045);
+  EXPECT_LT(volume, 0.03);
+  EXPECT_EQ(inverted, 0);
+  // An interpolation force brings it to rest at the goal, tumbled and fast as it is.
+  Control settle;
+  settle.manipulation = Manipulation::interpolation;
+  settle.target_m = {8.5f, 1.5f, 1.5f};
+  settle.max_force_n = 400;
+  settle.steps = int(5 / world.dt_s);
+  state = propagate(world, state, settle).end;
+  EXPECT_LT((robot() - Vec3(8.5, 1.5, 1.5)).norm(), 0.02);
+  EXPECT_LT(mean_speed_m_s(world, state, 0), 0.02);
+}
+
+// Bodies that touch at rest, and nodes that lie on a wall, feel nothing.
+TEST(Contact, TouchingAtRestIsNoForce) {
+  WorldSpec spec = two_bodies(cube({0.5, 0.5, 0.5}, 1, 2), cube({1.5, 0.5, 0.5}, 1, 2));
+  spec.bounds_m = {Vec3(0, 0, 0), Vec3(2, 1, 1)};
+  spec.walls = true;
+  const World world = build_world(spec);
+  Control coast;
+  coast.steps = 500;
+  const State end = propagate(world, rest_state(world), coast).end;
+  EXPECT_LT(mean_speed_m_s(world, end, 0) + mean_speed_m_s(world, end, 1), 1e-5);
+}
+
+}  // namespace
+}  // namespace limber::fem
