@@ -26,8 +26,7 @@ int drop_collapsed(SurfaceMesh&);
 int drop_duplicates(SurfaceMesh&);
 
 struct Flattened {
-  int flipped =
-      0;  // a flat triangle with its middle corner on its neighbour's side: the two were cut the other way
+  int flipped = 0;  // cut with the neighbour on the longest side by the quad's other diagonal
   int dropped = 0;  // where that was not possible
 };
 // Removes triangles thinner than tolerance_m. A flip keeps the surface where it is and watertight.
@@ -42,8 +41,7 @@ struct Orientation {
 // Triangles joined over edges of two are made to agree, then closed and nearly closed components to face
 // outward. One inside another is turned with it, so that a model that is inside out as a whole comes out
 // right; if it then faces inward, and the winding number of the others round it is at least a half, it is a
-// cavity and stays. Open sheets keep
-// the side they have, unless more than half of the surface is turned.
+// cavity and stays. Open sheets keep the side they have, unless more than half of the surface is turned.
 Orientation orient(SurfaceMesh&);
 
 // Drops vertices in no triangle; the others keep their order. Returns how many.

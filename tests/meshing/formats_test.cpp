@@ -221,6 +221,9 @@ TEST(Formats, ComplaintsNameTheLine) {
                       "ply\nformat ascii 1.0\nelement vertex 4000000000\nproperty float x\nproperty float y\n"
                       "property float z\nend_header\n0 0 0\n"),
       HasSubstr("vertex 1 of 4000000000"));
+  EXPECT_THAT(complaint_about("j.obj", "v 0 0 0\r\n\r\nv 1 0 x\r\n"), HasSubstr("j.obj:3:"));
+  const std::string stl = as_stl_binary(cube());
+  EXPECT_THAT(complaint_about("k.stl", stl.substr(0, stl.size() - 20)), HasSubstr("ends inside triangle 11"));
   EXPECT_THAT(complaint_about("empty.obj", ""), HasSubstr("the file is empty"));
   EXPECT_THAT(complaint_about("noise.xyzzy", std::string(1000, '\7')), HasSubstr("cannot be read"));
   EXPECT_THROW(import_model("no/such/file.obj"), InputError);

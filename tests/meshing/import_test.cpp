@@ -240,6 +240,9 @@ TEST(Orient, NestedShells) {
   EXPECT_NEAR(volume(clean(inverted_kernel).surface), shell + volume(inner), 1e-9);
   const SurfaceMesh solids = merged({outer, inner});
   EXPECT_EQ(hash_of(clean(solids).surface), hash_of(solids));
+  const SurfaceMesh inner_first = merged({inner, turned_inside_out(middle), outer});
+  EXPECT_EQ(hash_of(clean(inner_first).surface), hash_of(inner_first))
+      << "the order in the file does not matter";
   // Inside out as a whole: the same solid again.
   EXPECT_EQ(triangles_as_points(clean(turned_inside_out(kernel)).surface), triangles_as_points(kernel));
 }

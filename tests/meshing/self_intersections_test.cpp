@@ -34,6 +34,9 @@ TEST(SelfIntersections, EachWayToMeetIsFound) {
   const SurfaceMesh through_a_shared_vertex =
       mesh_of({{0, 0, 0}, {2, 0, 0}, {0, 2, 0}, {.5, .5, -1}, {.5, .5, 1}}, {{0, 1, 2}, {0, 3, 4}});
   EXPECT_EQ(self_intersections(through_a_shared_vertex).pairs, first_two);
+  SurfaceMesh other_way_round = through_a_shared_vertex;
+  other_way_round.triangles.row(0).swap(other_way_round.triangles.row(1));
+  EXPECT_EQ(self_intersections(other_way_round).pairs, first_two);
   const SurfaceMesh folded = mesh_of({{0, 0, 0}, {2, 0, 0}, {0, 2, 0}, {1, 1, 0}}, {{0, 1, 2}, {1, 0, 3}});
   EXPECT_EQ(self_intersections(folded).pairs, first_two);
   const SurfaceMesh unfolded = mesh_of({{0, 0, 0}, {2, 0, 0}, {0, 2, 0}, {1, -1, 0}}, {{0, 1, 2}, {1, 0, 3}});
