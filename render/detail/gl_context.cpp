@@ -11,7 +11,7 @@ namespace limber::render::detail {
 
 namespace {
 
-// Read by llvmpipe when the first context is made. LP_NATIVE_VECTOR_WIDTH=512 crashes Mesa 22.3. Without
+// Read by llvmpipe when the first context is made. LP_NATIVE_VECTOR_WIDTH=512 has crashed Mesa 22.3. Without
 // LP_NUM_THREADS every process would start as many threads as the machine has, though frames are already
 // shared out among our own.
 void prepare_environment() {
