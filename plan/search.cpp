@@ -2,7 +2,9 @@
 
 #include <chrono>
 #include <condition_variable>
+#include <exception>
 #include <mutex>
+#include <thread>
 
 #include "core/error.h"
 #include "core/hash.h"
@@ -67,8 +69,14 @@ class Search {
   void run() {
     const double cpu_before = cpu_seconds();
     if (plan_.solved()) end(Ending::goal);
-    parallel_for(threads_, [&](int) { work(); });
-    const std::lock_guard lock(mutex_);
+    {
+      // Threads of our own: they wait for one another, which tasks of a pool must not, and ThreadSanitizer
+      // sees them begin and end.
+      std::vector<std::jthread> others;
+      for (int t = 1; t < threads_; ++t) others.emplace_back([this] { work(); });
+      work();
+    }
+    if (failure_) std::rethrow_exception(failure_);
     plan_.statistics.cpu_s += cpu_seconds() - cpu_before;
     plan_.statistics.wall_s += seconds_since(started_);
   }
@@ -101,9 +109,9 @@ class Search {
     changed_.notify_all();
   } catch (...) {
     const std::lock_guard lock(mutex_);
+    if (!failure_) failure_ = std::current_exception();
     ended_ = true;
     changed_.notify_all();
-    throw;
   }
 
   void draw_ahead() {
@@ -223,6 +231,7 @@ class Search {
       queue_;  // in order of iteration; a deque, so that pointers to the taken ones stay good
   std::int64_t next_iteration_ = 0;
   bool ended_ = false;
+  std::exception_ptr failure_;  // the first
 };
 
 Plan begin(const System& system, const Settings& settings) {

@@ -161,11 +161,15 @@ TEST(Binding, AFlatTetLosesNoDigits) {
   SurfaceMesh surface{Points(3, 3), Triangles(1, 3)};
   surface.positions << 0.2, 0.2, 1e-8, 0.25, 0.3, 1e-8, 0.3, 0.25, 5e-8;
   surface.triangles << 0, 1, 2;
+  const Affine turn{Eigen::AngleAxisd(0.7, Vec3(1, 2, 3).normalized()).toRotationMatrix(),
+                    Vec3(0.1, 0.2, 0.3)};
+  cage.positions = turn * cage.positions;
+  surface.positions = turn * surface.positions;
   const Binding b = bind(surface, cage);
   EXPECT_EQ(b.outside, 0);
   Points back;
   deform(b, cage.tets, cage.positions, back);
-  EXPECT_LT(max_difference(back, surface.positions), 1e-15);
+  EXPECT_LT(max_difference(back, surface.positions), 1e-14);
 }
 
 // The tet that holds a vertex is the one that a search through all tets finds.
@@ -198,10 +202,10 @@ TEST(Binding, AVertexOnACommonFaceStaysWithItsOwnPiece) {
   const TetMesh cage = joined(left, right);
   // Tori whose outermost ring of vertices lies exactly on x = 0.
   SurfaceMesh in_right = torus(Vec3(0.5, 0.5, 0.5), 0.3, 0.2, 16, 8), in_left = in_right;
-  for (SurfaceMesh* m : {&in_left, &in_right})
-    for (Eigen::Index v = 0; v < m->positions.rows(); ++v)
-      m->positions(v, 0) = std::max(0.0, m->positions(v, 0) - 0.05);
-  in_left.positions.col(0) *= -1;
+  // The first vertex is one of them, so that a piece which simply began there could begin on the wrong side.
+  for (Eigen::Index v = 0; v < in_right.positions.rows(); ++v)
+    in_right.positions(v, 0) = std::max(0.0, 0.95 - in_right.positions(v, 0));
+  in_left.positions.col(0) = -in_right.positions.col(0);
   for (const bool left_first : {true, false}) {
     const SurfaceMesh surface = left_first ? joined(in_left, in_right) : joined(in_right, in_left);
     const Binding b = bind(surface, cage);
@@ -234,6 +238,23 @@ TEST(Binding, StrangersAreCountedWithTheirDistance) {
   EXPECT_NEAR(b.weights.row(3).minCoeff(), -1, 1e-12) << "clamped";
   EXPECT_NEAR(b.weights.row(3).sum(), 1, 1e-12);
   EXPECT_GT((back.row(3) - surface.positions.row(3)).norm(), 1);
+}
+
+// The cage fills a box, and the distance to a box has a closed form.
+TEST(Binding, DistancesOfStrangersAreThoseToTheCage) {
+  const Box box{Vec3(0, 0, 0), Vec3(2, 1, 1)};
+  const TetMesh cage = box_cage(box, {4, 2, 2}, 0.2, 11);
+  Rng rng(12, 0);
+  for (int k = 0; k < 300; ++k) {
+    const Vec3 p = box.center() + rng.uniform(0.5, 3) * rng.direction();
+    SurfaceMesh surface{Points(3, 3), Triangles(1, 3)};
+    surface.positions << 0.4, 0.5, 0.6, 0.7, 0.2, 0.3, p.transpose();
+    surface.triangles << 0, 1, 2;
+    const double distance = (p - p.cwiseMax(box.lower).cwiseMin(box.upper)).norm();
+    const Binding b = bind(surface, cage);
+    EXPECT_EQ(b.outside, distance > 0);
+    EXPECT_NEAR(b.max_outside_distance_m, distance, 1e-12);
+  }
 }
 
 TEST(Binding, TurnedInputIsBoundAlike) {

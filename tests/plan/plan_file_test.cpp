@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <fstream>
 
 #include "core/error.h"
@@ -131,6 +132,16 @@ TEST_F(PlanFileTest, AMissingOrReshapedEntryIsAnInputError) {
     bad.texts["meta.json"] = changed.dump();
     expect_refused(bad, key + " of another kind");
   }
+}
+
+TEST_F(PlanFileTest, AParentThatComesLaterIsAnInputError) {
+  Plan p = plan(Toy(), toy_settings());
+  const std::vector<int> path = path_to(p.tree, p.best_node);
+  int off_path = 1;
+  while (std::count(path.begin(), path.end(), off_path) > 0) ++off_path;
+  p.tree.parents[std::size_t(off_path)] = off_path + 1;
+  write_plan(file(), p, {});
+  EXPECT_THROW(read_plan(file()), InputError);
 }
 
 TEST_F(PlanFileTest, AnotherFileIsAnInputError) {

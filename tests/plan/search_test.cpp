@@ -132,8 +132,8 @@ TEST(Search, FirstNodeOfAFreePointHasItsClosedForm) {
   const Vec3 moved = toy.robot_center(p.tree.states[1]) - start;
   EXPECT_LT((moved - h * h * a * n * (n + 1) / 2).norm(), 1e-5);
   EXPECT_NEAR(toy.mean_speed(p.tree.states[1]), n * h * a.norm(), 1e-5);
-  EXPECT_LT(c.force_n.cast<double>().normalized().cross((draw(s, toy, 0).point - start).normalized()).norm(),
-            1e-6);
+  const Vec3 way = (draw(s, toy, 0).point - start).normalized();
+  EXPECT_LT((c.force_n.cast<double>().normalized() - way).norm(), 1e-6);
 }
 
 TEST(Search, WithoutPushingNothingReachesTheGoal) {
@@ -314,8 +314,8 @@ TEST(Trajectory, SettlesAtTheGoalWithinItsForce) {
     EXPECT_LT(toy.mean_speed(t.end), 0.02);
     EXPECT_LT((toy.robot_center(t.end) - s.goal.center_of_mass_m).norm(), 0.05);
 
-    s.settle.max_duration_s = 0.5;
-    EXPECT_EQ(plan(toy, s).trajectory.settle_steps, 50);
+    s.settle.max_duration_s = 0.52;
+    EXPECT_EQ(plan(toy, s).trajectory.settle_steps, 52);
     s.settle.max_duration_s = 0;
     const Plan none = plan(toy, s);
     EXPECT_EQ(none.trajectory.settle_steps, 0);
