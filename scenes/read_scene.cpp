@@ -154,26 +154,25 @@ double triangle_edge(const Node& table, const Vec3& size) {
   return maybe_number(table, "triangle_m").value_or(size.maxCoeff() / 32);
 }
 
-// Triangles of a flat-faced or round model of this area; a few more with bevels.
-void check_fineness(const Node& table, double area, double triangle_m) {
+void check_fineness(const Node& table, const Vec3& size, double triangle_m) {
   constexpr double most = 4e6;
-  const double triangles = 2 * area / (triangle_m * triangle_m);
+  const Vec3 n = (size / triangle_m).array().ceil();
+  const double triangles = 4 * (n.x() * n.y() + n.y() * n.z() + n.z() * n.x());  // a few more with bevels
   if (triangles > most)
-    complain(child(table, "triangle_m"),
-             fmt::format(
-                 "triangle_m = {} would make about {:.0f} triangles, more than {:.0f}; write at least {:.2g}",
-                 triangle_m, triangles, most, triangle_m * std::sqrt(triangles / most)));
+    complain(
+        child(table, "triangle_m"),
+        fmt::format("triangle_m = {} would make about {:.0f} triangles, more than {:.0f}; write a larger one",
+                    triangle_m, triangles, most));
 }
 
 BoxModel read_box(const Node& table, const std::string& what) {
   BoxModel model{vector(table, "size_m"), number(table, "bevel_m"), 0};
   model.triangle_m = triangle_edge(table, model.size_m);
-  const Vec3& s = model.size_m;
-  check_fineness(table, 2 * (s.x() * s.y() + s.y() * s.z() + s.z() * s.x()), model.triangle_m);
-  if (model.bevel_m > s.minCoeff() / 2)
+  check_fineness(table, model.size_m, model.triangle_m);
+  if (const double most = model.size_m.minCoeff() / 2; model.bevel_m > most)
     complain(child(table, "bevel_m"),
              fmt::format("{}.bevel_m is {}, more than half the smallest size; it must be ≤ {}", what,
-                         model.bevel_m, s.minCoeff() / 2));
+                         model.bevel_m, most));
   return model;
 }
 
@@ -234,7 +233,7 @@ Model read_model(const Node& table, const std::string& body) {
   const Node& sphere = child(table, "sphere");
   const double d = number(sphere, "diameter_m");
   const SphereModel model{d, triangle_edge(sphere, Vec3::Constant(d))};
-  check_fineness(sphere, 3.15 * d * d, model.triangle_m);
+  check_fineness(sphere, Vec3::Constant(d), model.triangle_m);
   return model;
 }
 
@@ -256,6 +255,9 @@ CageSpec read_cage(const Node& table, const Model& model, const std::string& bod
         *cells,
         fmt::format("{}.cage.cells needs a box, or a plate without a hole; write tets = N instead", body));
   cage.cells = as_vector(*cells).cast<int>();
+  if (const int tets = 5 * cage.cells.prod(), most = 200'000; tets > most)
+    complain(*cells,
+             fmt::format("{}.cage.cells make {} tets; write fewer cells, at most {} tets", body, tets, most));
   return cage;
 }
 
