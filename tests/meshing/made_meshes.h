@@ -49,4 +49,55 @@ inline SurfaceMesh made_hemisphere(int rings) {
   return mesh;
 }
 
+inline SurfaceMesh made_box(const Vec3& size) {
+  SurfaceMesh mesh;
+  mesh.positions.resize(8, 3);
+  for (int v = 0; v < 8; ++v)
+    mesh.positions.row(v) << (v & 1) * size.x(), (v >> 1 & 1) * size.y(), (v >> 2) * size.z();
+  mesh.triangles.resize(12, 3);
+  mesh.triangles << 0, 2, 3, 0, 3, 1, 4, 5, 7, 4, 7, 6, 0, 1, 5, 0, 5, 4, 2, 6, 7, 2, 7, 3, 0, 4, 6, 0, 6, 2,
+      1, 3, 7, 1, 7, 5;
+  return mesh;
+}
+
+// An L of arms 3 and 2 long and 1 wide, and 1.5 high: volume 6.
+inline SurfaceMesh made_l_prism() {
+  const double outline[6][2] = {{0, 0}, {3, 0}, {3, 1}, {1, 1}, {1, 2}, {0, 2}};
+  const int cap[4][3] = {{0, 1, 2}, {0, 2, 3}, {0, 3, 4}, {0, 4, 5}};
+  SurfaceMesh mesh;
+  mesh.positions.resize(12, 3);
+  mesh.triangles.resize(20, 3);
+  int t = 0;
+  for (int i = 0; i < 6; ++i) {
+    const int next = (i + 1) % 6;
+    mesh.positions.row(i) << outline[i][0], outline[i][1], 0;
+    mesh.positions.row(i + 6) << outline[i][0], outline[i][1], 1.5;
+    mesh.triangles.row(t++) << i, next, next + 6;
+    mesh.triangles.row(t++) << i, next + 6, i + 6;
+  }
+  for (const auto& c : cap) {
+    mesh.triangles.row(t++) << c[0], c[2], c[1];
+    mesh.triangles.row(t++) << c[0] + 6, c[1] + 6, c[2] + 6;
+  }
+  return mesh;
+}
+
+// About the z axis, the middle of the tube 1 from it.
+inline SurfaceMesh made_torus(double tube_radius, int around, int across) {
+  SurfaceMesh mesh;
+  mesh.positions.resize(around * across, 3);
+  mesh.triangles.resize(2 * around * across, 3);
+  const auto at = [&](int i, int j) { return i % around * across + j % across; };
+  int t = 0;
+  for (int i = 0; i < around; ++i)
+    for (int j = 0; j < across; ++j) {
+      const double a = 2 * std::numbers::pi * i / around, b = 2 * std::numbers::pi * j / across;
+      const double radius = 1 + tube_radius * std::cos(b);
+      mesh.positions.row(at(i, j)) << radius * std::cos(a), radius * std::sin(a), tube_radius * std::sin(b);
+      mesh.triangles.row(t++) << at(i, j), at(i + 1, j), at(i + 1, j + 1);
+      mesh.triangles.row(t++) << at(i, j), at(i + 1, j + 1), at(i, j + 1);
+    }
+  return mesh;
+}
+
 }  // namespace limber::meshing

@@ -1,0 +1,181 @@
+#include "meshing/detail/enclosing_shell.h"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+
+#include "core/error.h"
+#include "meshing/convex_hull.h"
+#include "meshing/detail/growing_hull.h"
+#include "meshing/detail/orientation.h"
+#include "meshing/detail/overshoot.h"
+
+namespace limber::meshing::detail {
+
+namespace {
+
+Points rows_of(std::span<const Vec3> points) {
+  Points rows(Eigen::Index(points.size()), 3);
+  for (std::size_t i = 0; i < points.size(); ++i) rows.row(Eigen::Index(i)) = points[i].transpose();
+  return rows;
+}
+
+Vec3 mean_of(std::span<const Vec3> points) {
+  Vec3 sum = Vec3::Zero();
+  for (const Vec3& p : points) sum += p;
+  return sum / double(points.size());
+}
+
+// How much a hull must grow about `center` to reach a point, and where.
+struct Gauge {
+  double growth;
+  Eigen::Index plane;
+};
+class Gauges {
+ public:
+  Gauges(const GrowingHull& hull, const Vec3& center) : center_(center), planes_(hull.planes()) {
+    depths_ = -(planes_.leftCols<3>() * center + planes_.col(3));
+  }
+  Gauge at(const Vec3& p) const {
+    Gauge gauge{0, 0};
+    gauge.growth = ((planes_.leftCols<3>() * (p - center_)).array() / depths_.array()).maxCoeff(&gauge.plane);
+    return gauge;
+  }
+
+ private:
+  Vec3 center_;
+  Eigen::Matrix<double, Eigen::Dynamic, 4> planes_;
+  Eigen::VectorXd depths_;
+};
+
+bool holds_all(std::span<const Vec3> corners, const Vec3& center, std::span<const Vec3> points) {
+  GrowingHull hull;
+  hull.add(corners);
+  if (hull.flat() || !hull.holds(center)) return false;
+  const Gauges gauges(hull, center);
+  return std::all_of(points.begin(), points.end(),
+                     [&](const Vec3& p) { return gauges.at(p).growth < 1 + 1e-7; });
+}
+
+// Up to six of the corners that span a volume as the whole does.
+std::vector<Vec3> first_corners(const std::vector<Vec3>& corners) {
+  const auto farthest = [&](auto&& measure) {
+    return *std::max_element(corners.begin(), corners.end(),
+                             [&](const Vec3& a, const Vec3& b) { return measure(a) < measure(b); });
+  };
+  const Vec3 a = farthest([&](const Vec3& p) { return (p - corners[0]).norm(); });
+  const Vec3 b = farthest([&](const Vec3& p) { return (p - a).norm(); });
+  const Vec3 c = farthest([&](const Vec3& p) { return (p - a).cross(b - a).norm(); });
+  const Vec3 normal = (b - a).cross(c - a), across = normal.cross(b - a);
+  return {a,
+          b,
+          farthest([&](const Vec3& p) { return normal.dot(p); }),
+          farthest([&](const Vec3& p) { return -normal.dot(p); }),
+          farthest([&](const Vec3& p) { return across.dot(p); }),
+          farthest([&](const Vec3& p) { return -across.dot(p); })};
+}
+
+}  // namespace
+
+std::vector<Vec3> fewer_corners(const std::vector<Vec3>& corners, int most) {
+  if (int(corners.size()) <= most) return corners;
+
+  // The corners that stand out most.
+  GrowingHull hull;
+  hull.add(first_corners(corners));
+  std::vector<Vec3> chosen = hull.vertices();
+  const Vec3 center = mean_of(chosen);
+  while (int(chosen.size()) < most) {
+    const Gauges gauges(hull, center);
+    double largest = 1 + 1e-6;
+    const Vec3* next = nullptr;
+    for (const Vec3& p : corners)
+      if (const double growth = gauges.at(p).growth; growth > largest) largest = growth, next = &p;
+    if (!next) break;
+    chosen.push_back(*next);
+    hull.add(*next);
+  }
+  chosen = hull.vertices();
+
+  // Raise the corners round each point that is still outside, then lower each as far as nothing comes out.
+  std::vector<double> raised(chosen.size(), 1.0);
+  const auto placed = [&] {
+    std::vector<Vec3> result;
+    for (std::size_t i = 0; i < chosen.size(); ++i)
+      result.push_back(center + raised[i] * (chosen[i] - center));
+    return result;
+  };
+  const Gauges gauges(hull, center);
+  const auto planes = hull.planes();
+  for (const Vec3& p : corners) {
+    const Gauge gauge = gauges.at(p);
+    if (gauge.growth <= 1) continue;
+    for (std::size_t i = 0; i < chosen.size(); ++i)
+      if (std::abs(planes.row(gauge.plane).leftCols<3>().dot(chosen[i]) + planes(gauge.plane, 3)) < 1e-9)
+        raised[i] = std::max(raised[i], gauge.growth);
+  }
+  for (std::size_t i = 0; i < chosen.size(); ++i) {
+    const double high = raised[i];
+    if (high == 1.0) continue;
+    double low = 1.0, good = high;
+    for (int step = 0; step < 5; ++step) {
+      raised[i] = step == 0 ? low : 0.5 * (low + good);
+      (holds_all(placed(), center, corners) ? good : low) = raised[i];
+      if (good == 1.0) break;
+    }
+    raised[i] = good;
+  }
+  std::vector<Vec3> result = placed();
+  hull.clear();
+  hull.add(result);
+  const Gauges last(hull, center);
+  double growth = 1;
+  for (const Vec3& p : corners) growth = std::max(growth, last.at(p).growth);
+  for (Vec3& p : result) p = center + growth * (p - center);
+  return result;
+}
+
+std::vector<Vec3> thickened(const std::vector<Vec3>& points, double distance) {
+  const Vec3 middle = mean_of(points);
+  Eigen::Matrix3d spread = Eigen::Matrix3d::Zero();
+  for (const Vec3& p : points) spread += (p - middle) * (p - middle).transpose();
+  const Eigen::Matrix3d axes = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(spread).eigenvectors();
+  std::vector<Vec3> thick = points;
+  for (int k = 0; k < 3; ++k) {
+    double reach = 0;
+    for (const Vec3& p : points) reach = std::max(reach, std::abs(axes.col(k).dot(p - middle)));
+    if (reach >= distance) continue;
+    const std::vector<Vec3> thin = thick;
+    thick.clear();
+    for (const Vec3& p : thin)
+      thick.push_back(p + distance * axes.col(k)), thick.push_back(p - distance * axes.col(k));
+  }
+  return thick;
+}
+
+bool encloses(const ConvexShell& shell, const Vec3& point) {
+  for (Eigen::Index f = 0; f < shell.triangles.rows(); ++f)
+    if (orientation(shell.vertices.row(shell.triangles(f, 0)), shell.vertices.row(shell.triangles(f, 1)),
+                    shell.vertices.row(shell.triangles(f, 2)), point) > 0)
+      return false;
+  return true;
+}
+
+ConvexShell enclosing_shell(std::span<const Vec3> corners, std::span<const Vec3> points, double margin) {
+  const Vec3 center = mean_of(corners);
+  for (double growth = 2e-6; growth < 1; growth *= 2) {
+    std::vector<Vec3> grown;
+    for (const Vec3& p : corners) grown.push_back(center + (1 + growth) * (p - center));
+    ConvexShell shell = convex_hull(rows_of(grown));
+    const auto planes = planes_of(shell);
+    bool holds = true;
+    for (const Vec3& p : points) {
+      holds = (planes.leftCols<3>() * p + planes.col(3)).maxCoeff() <= -margin && encloses(shell, p);
+      if (!holds) break;
+    }
+    if (holds) return shell;
+  }
+  throw InternalError("a shell does not hold its points even at twice its size");
+}
+
+}  // namespace limber::meshing::detail

@@ -1,0 +1,104 @@
+#include "meshing/convex_hull.h"
+
+#include <gtest/gtest.h>
+
+#include <map>
+#include <set>
+
+#include "core/error.h"
+#include "core/random.h"
+#include "meshing/detail/growing_hull.h"
+#include "meshing/detail/orientation.h"
+#include "tests/meshing/shell_laws.h"
+
+namespace limber::meshing {
+namespace {
+
+Points ball_of_points(int count, std::uint64_t seed) {
+  Rng rng(seed, 0);
+  Points points(count, 3);
+  for (int i = 0; i < count; ++i) points.row(i) = (std::cbrt(rng.uniform()) * rng.direction()).transpose();
+  return points;
+}
+
+double hull_volume(const ConvexShell& shell) { return volume(SurfaceMesh{shell.vertices, shell.triangles}); }
+
+// The triangles of a hull are those that have no point on their outer side: looked for among all triples.
+TEST(ConvexHull, OfRandomPointsIsAllTrianglesWithNothingBeyond) {
+  for (std::uint64_t seed = 1; seed <= 5; ++seed) {
+    const Points points = ball_of_points(40, seed);
+    std::set<std::array<Vec3::Scalar, 9>> expected, found;
+    const auto key = [](const Vec3& a, const Vec3& b, const Vec3& c) {
+      std::array<std::array<double, 3>, 3> rows = {
+          {{a[0], a[1], a[2]}, {b[0], b[1], b[2]}, {c[0], c[1], c[2]}}};
+      std::rotate(rows.begin(), std::min_element(rows.begin(), rows.end()), rows.end());
+      return std::array<double, 9>{rows[0][0], rows[0][1], rows[0][2], rows[1][0], rows[1][1],
+                                   rows[1][2], rows[2][0], rows[2][1], rows[2][2]};
+    };
+    for (int a = 0; a < 40; ++a)
+      for (int b = 0; b < 40; ++b)
+        for (int c = 0; c < 40; ++c) {
+          if (a == b || b == c || a == c) continue;
+          const Vec3 pa = points.row(a), pb = points.row(b), pc = points.row(c);
+          bool beyond = false;
+          for (int d = 0; d < 40 && !beyond; ++d)
+            beyond = d != a && d != b && d != c && signed_volume(pa, pb, pc, points.row(d)) > 0;
+          if (!beyond) expected.insert(key(pa, pb, pc));
+        }
+    const ConvexShell hull = convex_hull(points);
+    for (Eigen::Index f = 0; f < hull.triangles.rows(); ++f)
+      found.insert(key(hull.vertices.row(hull.triangles(f, 0)), hull.vertices.row(hull.triangles(f, 1)),
+                       hull.vertices.row(hull.triangles(f, 2))));
+    EXPECT_EQ(found, expected);
+  }
+}
+
+TEST(ConvexHull, OfAGridOnACubeHasItsEightCornersOnly) {
+  Points grid(125, 3);
+  for (int i = 0; i < 125; ++i) grid.row(i) << 0.1 * (i % 5), 0.1 * (i / 5 % 5), 0.1 * (i / 25);
+  const ConvexShell hull = convex_hull(grid);
+  EXPECT_EQ(hull.vertices.rows(), 8);
+  EXPECT_EQ(hull.triangles.rows(), 12);
+  EXPECT_NEAR(hull_volume(hull), 0.064, 1e-15);
+  expect_convex(hull);
+}
+
+TEST(ConvexHull, GrowsOverAlmostFlatAndRepeatedPoints) {
+  Points points = ball_of_points(300, 9);
+  points.col(2) *= 1e-15;
+  points.bottomRows(100) = points.topRows(100);
+  expect_convex(convex_hull(points));
+}
+
+TEST(ConvexHull, RefusesPointsInOnePlane) {
+  Points points = ball_of_points(20, 3);
+  points.col(2).setConstant(0.1);
+  EXPECT_THROW(convex_hull(points), InputError);
+  EXPECT_THROW(convex_hull(points.topRows(3)), InputError);
+}
+
+TEST(ConvexHull, GrowingHullHasTheVolumeOfTheExactOneAfterEveryPoint) {
+  const Points points = ball_of_points(200, 4);
+  detail::GrowingHull growing;
+  for (int n = 1; n < 4; ++n) growing.add(Vec3(points.row(n - 1)));
+  for (int n = 4; n <= 200; ++n) {
+    growing.add(Vec3(points.row(n - 1)));
+    EXPECT_NEAR(growing.volume(), hull_volume(convex_hull(points.topRows(n))), 1e-12) << n << " points";
+  }
+}
+
+// Every rounding of these products is wrong by more than the answer: the sign follows the last bit.
+TEST(ConvexHull, OrientationSeesOneBit) {
+  const Vec3 a(12, 12, 0), b(24, 24, 1), c(24, 24, 0);
+  Vec3 d(0.5, 0.5, 0.3);
+  EXPECT_EQ(detail::orientation(a, b, c, d), 0);
+  d.y() = std::nextafter(0.5, 1.0);
+  const int up = detail::orientation(a, b, c, d);
+  d.y() = std::nextafter(0.5, 0.0);
+  EXPECT_EQ(detail::orientation(a, b, c, d), -up);
+  EXPECT_NE(up, 0);
+  EXPECT_EQ(detail::orientation(Vec3::Zero(), Vec3::UnitX(), Vec3::UnitY(), Vec3::UnitZ()), 1);
+}
+
+}  // namespace
+}  // namespace limber::meshing
