@@ -82,7 +82,7 @@ TEST(World, SeesAnOverlapOfEdgesAlone) {
   WorldSpec spec;
   spec.bounds_m = {Vec3::Constant(-5), Vec3::Constant(5)};
   spec.bodies = {{"bar", testing::grid({-2, -0.1, -0.1}, {4, 0.2, 0.2}, 2, 1, 1), {}, {}, false},
-                 {"rod", testing::grid({0.3, -2, -0.05}, {0.2, 4, 0.2}, 1, 2, 1), {}, {}, false}};
+                 {"rod", testing::grid({0.3, -2, -0.05}, {0.2, 4, 0.2}, 1, 1, 1), {}, {}, false}};
   EXPECT_THAT(complaint(spec), HasSubstr("bar and rod overlap"));
 }
 
