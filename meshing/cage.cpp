@@ -18,7 +18,7 @@
 namespace limber::meshing {
 namespace {
 
-using detail::Model;
+using detail::CageModel;
 using detail::Selection;
 
 void require(bool holds, const std::string& text) {
@@ -49,7 +49,7 @@ SurfaceMesh with_lone_vertices(const SurfaceMesh& surface) {
 
 // The spacing whose count comes nearest to the budget. The count falls with the spacing, but by jumps, and on
 // a model that is aligned with the axes by large ones; then other places of the lattice help.
-Selection fit_budget(const Model& model, int budget, const std::optional<DihedralRange>& warp_within) {
+Selection fit_budget(const CageModel& model, int budget, const std::optional<DihedralRange>& warp_within) {
   // The first place is none where a node, an edge or a face would lie on a plane that users like.
   static const std::array<Vec3, 6> phases{Vec3(0.137, 0.291, 0.413), Vec3(0.613, 0.171, 0.829),
                                           Vec3(0.371, 0.743, 0.059), Vec3(0.887, 0.537, 0.271),
@@ -132,7 +132,7 @@ Cage lattice_cage(const SurfaceMesh& surface, const CageOptions& options) {
   const double unit = std::exp2(std::ilogb(diagonal));
   SurfaceMesh scaled = with_lone_vertices(surface);
   scaled.positions /= unit;
-  const Model model(scaled);
+  const CageModel model(scaled);
   std::optional<DihedralRange> warp_within;
   // A warp to the very limits would leave nothing to draw in with.
   if (options.mode == CageMode::lattice)

@@ -188,10 +188,12 @@ class Search {
 
   void consider_for_goal(int node, const Vec3& center) {
     const double distance = (center - settings_.goal.center_of_mass_m).norm();
-    if (distance >= plan_.best_distance_m) return;
+    const bool solves = distance <= settings_.goal.radius_m &&
+                        comes_to_rest(system_, settings_, plan_.tree.states[std::size_t(node)]);
+    if (!solves && distance >= plan_.best_distance_m) return;
     plan_.best_distance_m = distance;
     plan_.best_node = node;
-    if (distance > settings_.goal.radius_m) return;
+    if (!solves) return;
     plan_.goal_node = node;
     end(Ending::goal);
   }
@@ -242,7 +244,8 @@ Plan begin(const System& system, const Settings& settings) {
   LIMBER_CHECK(center.allFinite(), center.x(), center.y(), center.z());
   plan.tree.add(start, -1, Control{}, -1, center.cast<float>());
   plan.best_distance_m = (center - settings.goal.center_of_mass_m).norm();
-  if (plan.best_distance_m <= settings.goal.radius_m) plan.goal_node = 0;
+  if (plan.best_distance_m <= settings.goal.radius_m && comes_to_rest(system, settings, start))
+    plan.goal_node = 0;
   return plan;
 }
 
@@ -277,7 +280,12 @@ std::string explain(const Plan& plan) {
                   plan.best_distance_m, s.goal.radius_m);
   if (plan.solved())
     return fmt::format("reached the goal after {} iterations: {}", statistics.iterations, where);
-  std::string text = "no node reached the goal; the nearest is " + where + ". ";
+  std::string text =
+      plan.best_distance_m <= s.goal.radius_m
+          ? fmt::format("the robot got into the goal, but did not come to rest there within {:g} s: ",
+                        s.settle.max_duration_s) +
+                where + ". "
+          : "no node reached the goal; the nearest is " + where + ". ";
   switch (plan.ending) {
     case Ending::goal:
       break;

@@ -30,7 +30,7 @@ struct Plan {
   Settings settings;
   std::uint64_t system_hash = 0;
   Tree tree;
-  int goal_node = -1;          // −1: none reached the goal
+  int goal_node = -1;          // in the goal, and comes to rest there; −1: none
   int best_node = 0;           // nearest to the goal, the first of equals; goal_node when there is one
   double best_distance_m = 0;  // of its centre of mass from the goal's
   Ending ending = Ending::iterations;
@@ -39,11 +39,11 @@ struct Plan {
   bool solved() const { return goal_node >= 0; }
 };
 
-// Searches until a node lies in the goal or a limit ends it; SIGINT and SIGTERM (core/progress.h) end it too,
-// and what was found is kept. Tree and trajectory depend on system and settings alone; in_flight and threads
-// are free. With `earlier` (the plan of a search that was cut short, of the same system and settings save for
-// limits) goes on from there, to the bytes that one uninterrupted search gives. Throws InputError when
-// settings are out of range or `earlier` is not of this system and these settings.
+// Searches until a node lies in the goal and comes to rest there, or a limit ends it; SIGINT and SIGTERM
+// (core/progress.h) end it too, and what was found is kept. Tree and trajectory depend on system and settings
+// alone; in_flight and threads are free. With `earlier` (the plan of a search that was cut short, of the same
+// system and settings save for limits) goes on from there, to the bytes that one uninterrupted search gives.
+// Throws InputError when settings are out of range or `earlier` is not of this system and these settings.
 Plan plan(const System&, const Settings&, std::optional<Plan> earlier = std::nullopt);
 
 // A sentence or two for the user: reached or not, how near, which limit ended it, what to try.

@@ -114,8 +114,9 @@ Settings settings_from_json(const Json& json, const std::string& what) try {
 
 std::string first_difference(const Settings& a, const Settings& b) {
   const Json in_a = json_of(a), in_b = json_of(b);
-  for (const char* key : {"seed", "goal", "goal_bias", "weights", "max_force_n", "min_force_share",
-                          "max_force_share", "min_duration_s", "max_duration_s", "control_point_radius_m"})
+  for (const char* key :
+       {"seed", "goal", "goal_bias", "weights", "max_force_n", "min_force_share", "max_force_share",
+        "min_duration_s", "max_duration_s", "control_point_radius_m", "settle"})
     if (in_a.at(key) != in_b.at(key)) return key;
   return "";
 }

@@ -16,10 +16,10 @@ constexpr double settle_check_s = 0.05;
 // Runs controls one after the other, cut where a frame is due; the cuts do not change the states.
 class Recorder {
  public:
-  Recorder(const System& system, double frames_per_second)
+  Recorder(const System& system, const State& start, double frames_per_second)
       : propagator_(system.make_propagator()),
         steps_per_frame_(1 / (frames_per_second * system.dt_s())),
-        state_(system.start()),
+        state_(start),
         first_step_(state_.step) {
     take_due_frames();
   }
@@ -91,16 +91,25 @@ std::uint64_t hash_of(const Trajectory& t) {
 }
 
 Trajectory simulate(const System& system, const std::vector<Control>& controls, double frames_per_second) {
-  Recorder recorder(system, frames_per_second);
+  Recorder recorder(system, system.start(), frames_per_second);
   for (const Control& control : controls)
     if (!recorder.run(control)) break;
   return {controls, 0, frames_per_second, std::move(recorder.frames()), recorder.state()};
 }
 
+bool comes_to_rest(const System& system, const Settings& s, const State& in_goal) {
+  if (s.settle.max_duration_s == 0) return true;
+  Recorder recorder(system, in_goal, s.frames_per_second);
+  run_settle(system, s, recorder);
+  const Vec3 center = system.robot_center(recorder.state());
+  return system.mean_speed(recorder.state()) < s.settle.mean_speed_m_s &&
+         (center - s.goal.center_of_mass_m).norm() <= s.goal.radius_m;
+}
+
 Trajectory trajectory_to(const System& system, const Settings& s, const Tree& tree, int node, bool settle) {
   Trajectory t;
   t.frames_per_second = s.frames_per_second;
-  Recorder recorder(system, s.frames_per_second);
+  Recorder recorder(system, system.start(), s.frames_per_second);
   for (const int step : path_to(tree, node)) {
     if (step == 0) continue;
     const Control& control = tree.controls[std::size_t(step)];

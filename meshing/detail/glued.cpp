@@ -55,7 +55,7 @@ std::vector<Vec3> clip(const std::array<Plane, 4>& planes, std::vector<Vec3> pol
   return polygon;
 }
 
-bool holds_strangers(const Model& model, const SurfaceMesh& surface, const TetCorners& corners,
+bool holds_strangers(const CageModel& model, const SurfaceMesh& surface, const TetCorners& corners,
                      const std::vector<int>& triangles) {
   const std::array<Plane, 4> planes = planes_of(corners);
   const auto at = [&](int v) { return Vec3(surface.positions.row(v)); };
@@ -96,7 +96,7 @@ bool holds_strangers(const Model& model, const SurfaceMesh& surface, const TetCo
 
 }  // namespace
 
-double glued_share(const Model& model, const SurfaceMesh& surface, const TetMesh& mesh) {
+double glued_share(const CageModel& model, const SurfaceMesh& surface, const TetMesh& mesh) {
   int meeting = 0, glued = 0;
   for (Eigen::Index t = 0; t < mesh.tets.rows(); ++t) {
     TetCorners p;

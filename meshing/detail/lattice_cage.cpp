@@ -54,7 +54,7 @@ Lattice lattice_round(const Box& box, double spacing, const Vec3& phase) {
 }
 
 // The cells whose tets, wherever their nodes were moved to, may meet the surface.
-std::vector<int> cells_near(const Model& model, const Lattice& lattice) {
+std::vector<int> cells_near(const CageModel& model, const Lattice& lattice) {
   // The tets of a cell reach from half a cell below its lower corner to its upper corner, and nodes move by
   // less than a half.
   std::vector<bool> near(std::size_t(lattice.cell_count()));
@@ -77,7 +77,8 @@ std::vector<int> cells_near(const Model& model, const Lattice& lattice) {
 // and Shewchuk 2007): a tet that the surface barely enters is then not needed at all. Nodes of a tet that
 // would come out badly stay. At 1,000 tets this takes the bunny's volume ratio from 1.23 to 1.15, the camel's
 // from 1.36 to 1.29.
-void warp(const Model& model, const std::vector<int>& cells, const DihedralRange& limits, Lattice& lattice) {
+void warp(const CageModel& model, const std::vector<int>& cells, const DihedralRange& limits,
+          Lattice& lattice) {
   constexpr double reach = 0.35, beyond = 0.12;  // in cells; 0.3 … 0.4 and 0.1 … 0.15 do alike
   std::vector<Vec3> place(2 * std::size_t(lattice.cell_count()));
   for (std::size_t n = 0; n < place.size(); ++n) place[n] = lattice.place(lattice.node(int(n)));
@@ -108,7 +109,7 @@ void warp(const Model& model, const std::vector<int>& cells, const DihedralRange
   }
 }
 
-void mark_touched(const Model& model, const std::vector<int>& cells, Grid& grid) {
+void mark_touched(const CageModel& model, const std::vector<int>& cells, Grid& grid) {
   for (int cell : cells)
     for (int tet = cell * tets_a_cell; tet < (cell + 1) * tets_a_cell; ++tet) {
       const auto [a, b, c, d] = grid.lattice.tet_positions(tet);
@@ -117,7 +118,7 @@ void mark_touched(const Model& model, const std::vector<int>& cells, Grid& grid)
 }
 
 // From each touched tet to the untouched ones beside it, and on through those that are inside.
-void mark_inside(const Model& model, const std::vector<int>& touched_tets, Grid& grid) {
+void mark_inside(const CageModel& model, const std::vector<int>& touched_tets, Grid& grid) {
   const auto judge = [&](int tet) -> std::uint8_t {
     const auto [a, b, c, d] = grid.lattice.tet_positions(tet);
     return model.winding.inside(0.25 * (a + b + c + d)) ? inside : outside;
@@ -233,14 +234,14 @@ void mend(Grid& grid) {
 
 }  // namespace
 
-Model::Model(const SurfaceMesh& surface)
+CageModel::CageModel(const SurfaceMesh& surface)
     : boxes(triangle_boxes(surface)),
       box(union_of(boxes)),
       tree(surface.positions, surface.triangles),
       winding(surface.positions, surface.triangles),
       closed(is_closed(surface.triangles)) {}
 
-Selection select_tets(const Model& model, double spacing, const Vec3& phase,
+Selection select_tets(const CageModel& model, double spacing, const Vec3& phase,
                       const std::optional<DihedralRange>& warp_within) {
   Grid grid{lattice_round(model.box, spacing, phase), {}};
   grid.state.assign(std::size_t(grid.lattice.cell_count() * tets_a_cell), unknown);

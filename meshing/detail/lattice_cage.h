@@ -13,8 +13,8 @@
 namespace limber::meshing::detail {
 
 // What a cage must hold.
-struct Model {
-  explicit Model(const SurfaceMesh&);
+struct CageModel {
+  explicit CageModel(const SurfaceMesh&);
 
   std::vector<Box> boxes;  // of the triangles
   Box box;
@@ -33,7 +33,7 @@ struct Selection {
 // a manifold once build_mesh has split vertices. `phase` in cells shifts the lattice. With `warp_within`,
 // nodes near the surface move as far as the dihedrals stay in that range. A spacing so small that the lattice
 // would exceed max_cells gives no tets.
-Selection select_tets(const Model&, double spacing, const Vec3& phase,
+Selection select_tets(const CageModel&, double spacing, const Vec3& phase,
                       const std::optional<DihedralRange>& warp_within);
 constexpr std::int64_t max_cells = 1'000'000;
 

@@ -315,12 +315,36 @@ TEST(Trajectory, SettlesAtTheGoalWithinItsForce) {
     EXPECT_LT((toy.robot_center(t.end) - s.goal.center_of_mass_m).norm(), 0.05);
 
     s.settle.max_duration_s = 0.52;
-    EXPECT_EQ(plan(toy, s).trajectory.settle_steps, 52);
+    EXPECT_EQ(trajectory_to(toy, s, p.tree, p.goal_node, true).settle_steps, 52);
     s.settle.max_duration_s = 0;
     const Plan none = plan(toy, s);
     EXPECT_EQ(none.trajectory.settle_steps, 0);
     EXPECT_EQ(none.trajectory.end, none.tree.states[std::size_t(none.goal_node)]);
   });
+}
+
+// A node in the goal is not enough: the robot must be able to stop there.
+TEST(Search, PassesOverNodesInTheGoalThatDoNotComeToRest) {
+  Toy toy;
+  Settings s = toy_settings();
+  s.settle.max_duration_s = 0;
+  const Plan arrived = plan(toy, s);
+  ASSERT_TRUE(arrived.solved());
+  ASSERT_GT(toy.mean_speed(arrived.tree.states[std::size_t(arrived.goal_node)]), s.settle.mean_speed_m_s);
+
+  s.settle.max_duration_s = 0.01;  // one step: nobody stops in it
+  s.max_iterations = arrived.statistics.iterations;
+  const Plan restless = plan(toy, s);
+  EXPECT_FALSE(restless.solved());
+  EXPECT_LE(restless.best_distance_m, s.goal.radius_m);
+  EXPECT_EQ(hash_of(restless.tree), hash_of(arrived.tree));  // what counts as solved does not shape the tree
+  EXPECT_NE(explain(restless).find("did not come to rest"), std::string::npos) << explain(restless);
+
+  s.settle.max_duration_s = 10;
+  s.max_iterations = 2000;
+  const Plan rested = plan(toy, s);
+  ASSERT_TRUE(rested.solved());
+  EXPECT_LT(toy.mean_speed(rested.trajectory.end), s.settle.mean_speed_m_s);
 }
 
 TEST(Trajectory, HashSeesEveryPart) {

@@ -1,0 +1,227 @@
+#include "app/body.h"
+
+#include "core/error.h"
+#include "core/hash.h"
+#include "core/log.h"
+#include "core/mesh_files.h"
+#include "core/progress.h"
+#include "core/version.h"
+#include "ffd/binding_file.h"
+#include "meshing/cage.h"
+#include "meshing/certificate.h"
+#include "meshing/decompose.h"
+#include "meshing/quality.h"
+
+namespace limber::app {
+
+namespace {
+
+constexpr const char* body_files[] = {"surface.ply", "shells.obj", "cage.msh", "binding.npz"};
+
+Json json_of(const PrepareSettings& s) {
+  return {{"shells", s.shells}, {"concavity", s.concavity}, {"tets", s.tets}, {"mode", s.mode}};
+}
+
+Json json_of(const meshing::Certificate& c) {
+  return {{"holds", c.holds()},
+          {"vertices", c.vertices},
+          {"vertices_outside", c.vertices_outside},
+          {"triangles", c.triangles},
+          {"triangles_crossing", c.triangles_crossing},
+          {"nonmanifold_edges", c.nonmanifold_edges},
+          {"nonmanifold_vertices", c.nonmanifold_vertices},
+          {"min_dihedral_deg", c.min_dihedral_deg},
+          {"max_dihedral_deg", c.max_dihedral_deg},
+          {"surface_hash", hex(c.surface_hash)},
+          {"cage_hash", hex(c.cage_hash)}};
+}
+
+meshing::CageMode mode_of(const std::string& name) {
+  if (name == "fast") return meshing::CageMode::fast;
+  if (name == "paper") return meshing::CageMode::paper;
+  LIMBER_CHECK(name == "lattice", name);
+  return meshing::CageMode::lattice;
+}
+
+std::string hash_of_file(const fs::path& path) { return hex(hash_of(std::string_view(read_file(path)))); }
+
+bool up_to_date(const fs::path& folder, const Json& input) {
+  try {
+    const Json report = read_json(folder / "report.json");
+    if (report.at("version") != version || report.at("input") != input) return false;
+    for (const char* name : body_files)
+      if (report.at("files").at(name) != hash_of_file(folder / name)) return false;
+    return true;
+  } catch (const InputError&) {
+    return false;
+  } catch (const Json::exception&) {
+    return false;
+  }
+}
+
+// CPU seconds since the last call.
+class Stopwatch {
+ public:
+  double lap() {
+    const double now = cpu_seconds(), seconds = now - last_;
+    last_ = now;
+    return std::round(1e4 * seconds) / 1e4;
+  }
+
+ private:
+  double last_ = cpu_seconds();
+};
+
+}  // namespace
+
+Json prepare_body(const BodySource& source, const PrepareSettings& settings, const fs::path& folder) {
+  const Json input{{"model", source.identity}, {"settings", json_of(settings)}};
+  if (up_to_date(folder, input)) {
+    log::info("{}: up to date", folder.string());
+    return read_json(folder / "report.json");
+  }
+  log::info("{}: preparing {}", folder.string(), source.model);
+  make_folder(folder);
+  std::error_code ignored;
+  fs::remove(folder / "report.json",
+             ignored);  // what is in the folder counts again when a new report says so
+
+  Stopwatch watch;
+  Json seconds;
+  const meshing::ImportedModel model = source.load();
+  validate(model.surface, source.model);
+  seconds["import"] = watch.lap();
+  throw_if_stopped();
+
+  const meshing::Decomposition decomposition =
+      meshing::decompose(model.surface, {.max_shells = settings.shells, .max_concavity = settings.concavity});
+  seconds["decompose"] = watch.lap();
+  throw_if_stopped();
+
+  std::optional<TetMesh> made_cage = source.made_cage();
+  meshing::Cage cage;
+  if (made_cage) {
+    cage.mesh = std::move(*made_cage);
+    cage.shell_from_tet.assign(std::size_t(cage.mesh.tets.rows()), 0);
+  } else {
+    cage = meshing::build_cage(model.surface, decomposition.shells,
+                               {.mode = mode_of(settings.mode), .tets = settings.tets});
+  }
+  validate(cage.mesh, source.model + ": cage");
+  seconds["cage"] = watch.lap();
+  throw_if_stopped();
+
+  const meshing::TetQuality quality = meshing::measure_quality(cage.mesh);
+  const meshing::Certificate certificate = meshing::certify(model.surface, cage.mesh);
+  seconds["certify"] = watch.lap();
+  throw_if_stopped();
+
+  const ffd::Binding binding = ffd::bind(model.surface, cage.mesh);
+  seconds["bind"] = watch.lap();
+
+  write_ply(folder / "surface.ply", model.surface);
+  write_obj(folder / "shells.obj", decomposition.shells);
+  write_msh(folder / "cage.msh", cage.mesh, cage.shell_from_tet);
+  ffd::write_binding(folder / "binding.npz", binding, model.surface, cage.mesh);
+  seconds["write"] = watch.lap();
+
+  std::vector<std::string> warnings = model.warnings;
+  warnings.insert(warnings.end(), cage.notes.begin(), cage.notes.end());
+  if (certificate.vertices_outside > 0)
+    warnings.push_back(fmt::format("{} vertices lie outside the cage", certificate.vertices_outside));
+  if (certificate.triangles_crossing > 0)
+    warnings.push_back(
+        fmt::format("{} triangles cross the boundary of the cage", certificate.triangles_crossing));
+
+  const Box box = bounding_box(model.surface.positions);
+  Json report{{"version", version}, {"model", source.model}, {"input", input}};
+  report.update(meshing::to_json(model));
+  report["warnings"] = warnings;
+  report["surface"] = {{"vertices", model.surface.positions.rows()},
+                       {"triangles", model.surface.triangles.rows()},
+                       {"area_m2", area(model.surface)},
+                       {"volume_m3", volume(model.surface)},
+                       {"lower_m", {box.lower.x(), box.lower.y(), box.lower.z()}},
+                       {"upper_m", {box.upper.x(), box.upper.y(), box.upper.z()}}};
+  report["shells"] = {{"count", decomposition.shells.size()},
+                      {"stopped_by", decomposition.stopped_by},
+                      {"sum_of_volumes_m3", decomposition.sum_of_hull_volumes},
+                      {"mean_overshoot", decomposition.mean_overshoot},
+                      {"max_overshoot", decomposition.max_overshoot},
+                      {"vertices_uncovered", decomposition.vertices_uncovered},
+                      {"triangles_uncovered", decomposition.triangles_uncovered},
+                      {"neighbours", decomposition.neighbours}};
+  report["cage"] = {{"mode", made_cage ? "cells" : settings.mode},
+                    {"tets", cage.mesh.tets.rows()},
+                    {"nodes", cage.mesh.positions.rows()},
+                    {"volume_m3", volume(cage.mesh)},
+                    {"volume_ratio", cage.volume_ratio},
+                    {"glued_share", cage.glued_share},
+                    {"min_dihedral_deg", quality.min_dihedral_deg},
+                    {"max_dihedral_deg", quality.max_dihedral_deg},
+                    {"median_min_dihedral_deg", quality.median_min_dihedral_deg}};
+  report["certificate"] = json_of(certificate);
+  report["binding"] = {{"vertices_outside", binding.outside},
+                       {"max_outside_distance_m", binding.max_outside_distance_m}};
+  report["cpu_seconds"] = seconds;
+  report["peak_memory_mb"] = std::round(peak_memory_mb());
+  for (const char* name : body_files) report["files"][name] = hash_of_file(folder / name);
+  write_json(folder / "report.json", report);
+  for (const std::string& warning : warnings) log::warn("{}: {}", source.model, warning);
+  return report;
+}
+
+PreparedBody read_body(const fs::path& folder) {
+  PreparedBody body;
+  try {
+    body.report = read_json(folder / "report.json");
+    for (const char* name : body_files)
+      if (body.report.at("files").at(name) != hash_of_file(folder / name))
+        throw InputError(
+            fmt::format("{}: is not the file that report.json was written for", (folder / name).string()));
+    body.surface = read_ply(folder / "surface.ply");
+    body.cage = read_msh(folder / "cage.msh");
+    body.binding = ffd::read_binding(folder / "binding.npz", body.surface, body.cage);
+  } catch (const InputError& error) {
+    throw InputError(fmt::format(
+        "{}; make the body anew with limber prepare, or the scene's bodies with limber plan", error.what()));
+  } catch (const Json::exception& error) {
+    throw InputError(
+        fmt::format("{}: is no report of limber's ({}); make the body anew with limber prepare, or the "
+                    "scene's bodies with limber plan",
+                    (folder / "report.json").string(), error.what()));
+  }
+  return body;
+}
+
+std::string summary_of_report(const Json& report) {
+  const Json &surface = report.at("surface"), &shells = report.at("shells"), &cage = report.at("cage"),
+             &certificate = report.at("certificate");
+  std::string text = fmt::format(
+      "{}\n"
+      "  surface      {} vertices, {} triangles\n"
+      "  shells       {} (stopped by {}), overshoot mean {:.3f} %, largest {:.3f} % of the diagonal; {} of "
+      "{} triangles not covered\n"
+      "  cage         {} tets, {} nodes, dihedrals {:.1f} … {:.1f} degrees\n"
+      "  certificate  {}: {} vertices outside, {} triangles cross, {} edges and {} vertices not manifold\n",
+      report.at("model").get<std::string>(), surface.at("vertices").get<int>(),
+      surface.at("triangles").get<int>(), shells.at("count").get<int>(),
+      shells.at("stopped_by").get<std::string>(), 100 * shells.at("mean_overshoot").get<double>(),
+      100 * shells.at("max_overshoot").get<double>(), shells.at("triangles_uncovered").get<int>(),
+      surface.at("triangles").get<int>(), cage.at("tets").get<int>(), cage.at("nodes").get<int>(),
+      cage.at("min_dihedral_deg").get<double>(), cage.at("max_dihedral_deg").get<double>(),
+      certificate.at("holds").get<bool>() ? "holds" : "does NOT hold",
+      certificate.at("vertices_outside").get<int>(), certificate.at("triangles_crossing").get<int>(),
+      certificate.at("nonmanifold_edges").get<int>(), certificate.at("nonmanifold_vertices").get<int>());
+  for (const Json& sentence : report.at("mended"))
+    text += fmt::format("  mended       {}\n", sentence.get<std::string>());
+  for (const Json& sentence : report.at("warnings"))
+    text += fmt::format("  warning      {}\n", sentence.get<std::string>());
+  double seconds = 0;
+  for (const Json& s : report.at("cpu_seconds")) seconds += s.get<double>();
+  text += fmt::format("  cost         {:.2f} CPU s, {:.0f} MB\n", seconds,
+                      report.at("peak_memory_mb").get<double>());
+  return text;
+}
+
+}  // namespace limber::app

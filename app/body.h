@@ -1,0 +1,50 @@
+// A body's folder: surface.ply, shells.obj, cage.msh, binding.npz, report.json. See docs/files.md.
+#pragma once
+
+#include <functional>
+#include <optional>
+#include <string>
+
+#include "core/file.h"
+#include "core/json.h"
+#include "core/mesh.h"
+#include "ffd/binding.h"
+#include "meshing/import.h"
+
+namespace limber::app {
+
+struct PrepareSettings {
+  int shells = 32;
+  double concavity = 0;
+  int tets = 1000;
+  std::string mode = "lattice";  // "lattice", "fast", "paper"
+};
+
+// Where a body comes from. `identity` holds all that load() and made_cage() depend on: when it and the
+// settings are those of the folder's report, the folder is up to date.
+struct BodySource {
+  std::string model;  // a file's name, or a word for a made model
+  Json identity;
+  std::function<meshing::ImportedModel()> load;
+  std::function<std::optional<TetMesh>()> made_cage = [] {
+    return std::nullopt;
+  };  // a box in cells brings its own
+};
+
+// Writes the five files and returns the report; leaves a folder that is up to date as it is.
+Json prepare_body(const BodySource&, const PrepareSettings&, const fs::path& folder);
+
+struct PreparedBody {
+  SurfaceMesh surface;
+  TetMesh cage;
+  ffd::Binding binding;
+  Json report;
+};
+// Throws InputError naming the file and the command that renews it when one is missing, damaged, or of
+// another body.
+PreparedBody read_body(const fs::path& folder);
+
+// The figures of a report as a few lines.
+std::string summary_of_report(const Json& report);
+
+}  // namespace limber::app

@@ -1,0 +1,230 @@
+#include <CLI/CLI.hpp>
+
+#include <cstdio>
+#include <new>
+
+#include "app/commands.h"
+#include "core/error.h"
+#include "core/log.h"
+#include "core/progress.h"
+#include "core/threads.h"
+#include "core/version.h"
+
+namespace limber::app {
+
+namespace {
+
+struct GlobalOptions {
+  bool json = false, quiet = false, verbose = false;
+  int threads = 0;
+};
+
+void add_global(CLI::App& command, GlobalOptions& options) {
+  command.add_flag("--json", options.json, "print one JSON document on stdout, and nothing else there");
+  command.add_flag("-q,--quiet", options.quiet, "only warnings and errors on stderr; no progress bars");
+  command.add_flag("-v,--verbose", options.verbose, "more on stderr");
+}
+
+void add_threads(CLI::App& command, GlobalOptions& options) {
+  command
+      .add_option("--threads", options.threads,
+                  "threads to use, 0 … 256; 0: as many as the machine has. Results do not depend on it")
+      ->check(CLI::Range(0, 256))
+      ->capture_default_str();
+}
+
+void add_scene(CLI::App& command, SceneOptions& options) {
+  command
+      .add_option("SCENE", options.scene,
+                  "a scene file, or the name of a scene that comes with limber (see limber scenes)")
+      ->required();
+  command
+      .add_option("--set", options.sets,
+                  "edit the scene before it is read: --set bodies.robot.material.youngs_modulus_pa=5e4")
+      ->type_name("KEY=VALUE")
+      ->allow_extra_args(false);
+  command
+      .add_option("--data", options.data, "a folder in which model files of the scene are looked for first")
+      ->type_name("DIR")
+      ->check(CLI::ExistingDirectory)
+      ->allow_extra_args(false);
+}
+
+void add_plan(CLI::App& command, PlanOptions& options) {
+  command.add_option("-o,--out", options.out, "work folder; it is made where it is missing")
+      ->required()
+      ->type_name("DIR");
+  command.add_option("--seed", options.seed, "seed of the random numbers, 0 … 2^53; default: the scene's")
+      ->check(CLI::Range(0.0, 0x1p53));
+  command
+      .add_option("--preset", options.preset,
+                  "paper: Algorithm 1 of Rodriguez, Lien and Amato 2006; default: the scene's")
+      ->check(CLI::IsMember({"paper"}));
+  command
+      .add_option("--iterations", options.iterations, "limit of the search, 0 … 1e9; default: the scene's")
+      ->check(CLI::Range(0.0, 1e9));
+  command
+      .add_option("--time-limit", options.time_limit_s,
+                  "wall time of the search: 30, 30s, 5min or 1h; the best so far is kept; default: none")
+      ->transform(CLI::AsNumberWithUnit(std::map<std::string, double>{{"s", 1}, {"min", 60}, {"h", 3600}},
+                                        CLI::AsNumberWithUnit::DEFAULT, "s|min|h"));
+  command
+      .add_option("--in-flight", options.in_flight,
+                  "expansions computed ahead, 0 … 4096; 0: chosen from threads and lanes. The plan does not "
+                  "depend on it")
+      ->check(CLI::Range(0, 4096))
+      ->capture_default_str();
+}
+
+void add_render(CLI::App& command, RenderOptions& options) {
+  command.add_option(
+      "--frames", options.frames,
+      "frames to render: 0-30,47-327:2; beyond the last is left out with a warning; default: all");
+  command.add_option("--chunk", options.chunk, "render the i-th of n parts of these frames, 1 ≤ i ≤ n")
+      ->type_name("I/N");
+  command.add_option("--size", options.size, "pixels of a frame, 16x16 … 8192x8192; default: the scene's")
+      ->type_name("WxH");
+  command
+      .add_option("--video", options.video,
+                  "the film, made when every frame is there; default: film.mp4 in the work folder")
+      ->type_name("FILE");
+}
+
+void print(const Outcome& outcome, bool json) {
+  const std::string text = json ? outcome.json.dump(2) + "\n" : outcome.text;
+  if (std::fwrite(text.data(), 1, text.size(), stdout) != text.size() || std::fflush(stdout) != 0)
+    throw DiskError("stdout: writing the result failed");
+}
+
+int report_failure(int code, const std::string& what, bool json) {
+  log::warn("limber: {}", what);
+  if (json) fmt::print("{}\n", Json{{"error", what}, {"exit_code", code}}.dump(2));
+  return code;
+}
+
+}  // namespace
+
+int run_command_line(int argc, const char* const* argv) {
+  log::set_up(0);
+  install_stop_signals();
+
+  CLI::App program{"limber: plans the motion of soft things among soft things, and films it"};
+  program.name("limber");
+  program.set_version_flag("--version", std::string("limber ") + version);
+  program.require_subcommand(1);
+  program.footer(
+      "Exit codes: 0 done; 1 a defect of limber; 2 bad input or usage; 3 no plan reached the goal (the best "
+      "is kept);\n"
+      "4 frames failed; 5 the disk failed; 130 and 143 stopped by a signal, with all finished work kept.");
+  GlobalOptions global;
+  PrepareOptions prepare_options;
+  PlanOptions plan_options;
+  RenderOptions render_options;
+  fs::path folder;
+  std::function<Outcome()> chosen;
+
+  CLI::App& prepare_command =
+      *program.add_subcommand("prepare", "model → convex shells, enclosing cage, binding, report");
+  prepare_command
+      .add_option("MODEL", prepare_options.model, "a surface model in any format that assimp reads")
+      ->required();
+  prepare_command
+      .add_option("-o,--out", prepare_options.out,
+                  "folder for surface.ply, shells.obj, cage.msh, binding.npz, report.json")
+      ->required()
+      ->type_name("DIR");
+  prepare_command.add_option("--shells", prepare_options.shells, "convex shells, at most; 1 … 1000")
+      ->check(CLI::Range(1, 1000))
+      ->capture_default_str();
+  prepare_command
+      .add_option(
+          "--concavity", prepare_options.concavity,
+          "cut no further below this overshoot, share of the model's diagonal, 0 … 1; 0: only --shells rules")
+      ->check(CLI::Range(0.0, 1.0))
+      ->capture_default_str();
+  prepare_command.add_option("--tets", prepare_options.tets, "tets of the cage, about; 60 … 200000")
+      ->check(CLI::Range(60, 200000))
+      ->capture_default_str();
+  prepare_command
+      .add_option(
+          "--mode", prepare_options.mode,
+          "how the cage is made: lattice; fast (not shrunk to the surface); paper (Delaunay of each shell)")
+      ->check(CLI::IsMember({"lattice", "fast", "paper"}))
+      ->capture_default_str();
+  prepare_command
+      .add_option("--scale", prepare_options.scale, "metres a file unit, 1e-9 … 1e9; 0.001 for millimetres")
+      ->check(CLI::Range(1e-9, 1e9))
+      ->capture_default_str();
+  prepare_command.add_flag("--y-up", prepare_options.y_up, "the model has +Y up; turn it to +Z");
+  add_global(prepare_command, global), add_threads(prepare_command, global);
+  prepare_command.callback([&] { chosen = [&] { return prepare(prepare_options); }; });
+
+  CLI::App& plan_command = *program.add_subcommand("plan", "scene → bodies, tree, path");
+  add_scene(plan_command, plan_options.scene), add_plan(plan_command, plan_options);
+  plan_command.add_flag("--resume", plan_options.resume,
+                        "go on from the plan in the work folder: more iterations, or after it was stopped");
+  add_global(plan_command, global), add_threads(plan_command, global);
+  plan_command.callback([&] { chosen = [&] { return plan(plan_options); }; });
+
+  CLI::App& render_command = *program.add_subcommand("render", "path → frames, contact sheet, film");
+  render_command.add_option("DIR", render_options.folder, "work folder with a plan")->required();
+  add_render(render_command, render_options);
+  render_command.add_flag("--resume", render_options.resume,
+                          "keep frames that already show what they should");
+  add_global(render_command, global), add_threads(render_command, global);
+  render_command.callback([&] { chosen = [&] { return render(render_options); }; });
+
+  CLI::App& run_command =
+      *program.add_subcommand("run", "all of it: prepare, plan, render; what is up to date is skipped");
+  add_scene(run_command, plan_options.scene), add_plan(run_command, plan_options),
+      add_render(run_command, render_options);
+  add_global(run_command, global), add_threads(run_command, global);
+  run_command.callback([&] { chosen = [&] { return run(plan_options, render_options); }; });
+
+  CLI::App& verify_command =
+      *program.add_subcommand("verify", "replays the plan bit for bit, checks every promise, prints a table");
+  verify_command.add_option("DIR", folder, "work folder, or the output folder of prepare")->required();
+  add_global(verify_command, global), add_threads(verify_command, global);
+  verify_command.callback([&] { chosen = [&] { return verify(folder); }; });
+
+  CLI::App& info_command = *program.add_subcommand("info", "what is in a file or folder");
+  info_command
+      .add_option("PATH", folder, "a work folder, a prepared body, a model, a plan, a cage, a binding")
+      ->required();
+  add_global(info_command, global);
+  info_command.callback([&] { chosen = [&] { return info(folder); }; });
+
+  CLI::App& scenes_command = *program.add_subcommand("scenes", "the scenes that come with limber");
+  add_global(scenes_command, global);
+  scenes_command.callback([&] { chosen = [] { return list_scenes(); }; });
+
+  try {
+    program.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return program.exit(error) == 0 ? exit_done : exit_bad_input;
+  }
+
+  log::set_up(global.quiet ? -1 : global.verbose ? 1 : 0);
+  if (global.quiet) set_progress_enabled(false);
+  set_thread_count(global.threads);
+  try {
+    const Outcome outcome = chosen();
+    print(outcome, global.json);
+    return outcome.exit_code;
+  } catch (const InputError& error) {
+    return report_failure(exit_bad_input, error.what(), global.json);
+  } catch (const DiskError& error) {
+    return report_failure(exit_disk, error.what(), global.json);
+  } catch (const Interrupted& stop) {
+    return report_failure(exit_signal + stop.signal_number, stop.what(), global.json);
+  } catch (const std::bad_alloc&) {
+    return report_failure(
+        exit_bad_input,
+        "the machine's memory is not enough for this; ask for fewer tets, shells or iterations", global.json);
+  } catch (const std::exception& error) {
+    return report_failure(exit_defect, fmt::format("this is a defect of limber: {}", error.what()),
+                          global.json);
+  }
+}
+
+}  // namespace limber::app

@@ -1,0 +1,80 @@
+// The subcommands of the program, each as a function from its options to what it prints.
+#pragma once
+
+#include <cstdint>
+#include <limits>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/file.h"
+#include "core/json.h"
+
+namespace limber::app {
+
+// What the process says when it ends; docs/cli.md tells users.
+enum ExitCode : int {
+  exit_done = 0,
+  exit_defect = 1,     // ours
+  exit_bad_input = 2,  // or usage
+  exit_no_plan = 3,    // the best one found is kept, and can be rendered
+  exit_frames_failed = 4,
+  exit_disk = 5,
+  exit_signal = 128,  // plus the signal's number
+};
+
+struct Outcome {
+  int exit_code = exit_done;
+  Json json;         // what --json prints
+  std::string text;  // what is printed otherwise
+};
+
+struct PrepareOptions {
+  fs::path model, out;
+  int shells = 32;       // at most so many convex shells
+  double concavity = 0;  // stop cutting below this overshoot, share of the diagonal; 0: only the count rules
+  int tets = 1000;       // budget of the cage
+  std::string mode = "lattice";
+  double scale = 1;  // metres a file unit
+  bool y_up = false;
+};
+Outcome prepare(const PrepareOptions&);
+
+struct SceneOptions {
+  std::string scene;              // a file, or the name of a scene that comes with limber
+  std::vector<std::string> sets;  // --set a.b=value
+  std::vector<fs::path> data;     // more folders to look for model files in
+};
+
+struct PlanOptions {
+  SceneOptions scene;
+  fs::path out;
+  std::optional<std::int64_t> seed, iterations;
+  std::string preset;  // empty: the scene's
+  double time_limit_s = std::numeric_limits<double>::infinity();
+  int in_flight = 0;  // 0: chosen from threads and lanes
+  bool resume = false;
+};
+Outcome plan(const PlanOptions&);
+
+struct RenderOptions {
+  fs::path folder;
+  std::string frames;             // "1-30,47-327:2"; empty: all
+  std::string chunk;              // "i/n"; empty: 1/1
+  bool resume = false;            // keep the frames that already show what they should
+  std::string size;               // "1920x1080"; empty: the scene's
+  std::optional<fs::path> video;  // default film.mp4 in the folder, made when every frame is there
+};
+Outcome render(const RenderOptions&);
+
+// prepare, plan and render; stages that are up to date are skipped.
+Outcome run(const PlanOptions&, const RenderOptions&);
+
+Outcome verify(const fs::path& folder);
+Outcome info(const fs::path& path);
+Outcome list_scenes();
+
+// Parses the arguments, runs the subcommand, prints, and answers the exit code. Throws nothing.
+int run_command_line(int argc, const char* const* argv);
+
+}  // namespace limber::app

@@ -1,0 +1,69 @@
+#include "app/fem_system.h"
+
+#include "core/hash.h"
+#include "fem/batch.h"
+#include "fem/observe.h"
+
+namespace limber::app {
+
+namespace {
+
+constexpr int preferred_lanes = 16;
+
+class FemPropagator final : public plan::Propagator {
+ public:
+  explicit FemPropagator(const fem::World& world) : batch_(world, preferred_lanes), single_(world, 1) {}
+
+  void propagate(std::span<plan::Rollout> rollouts) override {
+    work_.resize(rollouts.size());
+    for (std::size_t i = 0; i < rollouts.size(); ++i)
+      work_[i].start = rollouts[i].from, work_[i].control = rollouts[i].control;
+    fem::propagate(rollouts.size() == 1 ? single_ : batch_, work_);
+    for (std::size_t i = 0; i < rollouts.size(); ++i) {
+      rollouts[i].ok = work_[i].outcome.status == fem::RunStatus::ok;
+      rollouts[i].to = std::move(work_[i].end);
+    }
+  }
+
+ private:
+  fem::Batch batch_, single_;  // a path is simulated one rollout at a time; fifteen idle lanes would cost
+  std::vector<fem::Rollout> work_;
+};
+
+std::uint64_t hash_of(const fem::World& world) {
+  Hasher hasher;
+  hasher.value(world.robot).matrix(world.bounds_m.lower).matrix(world.bounds_m.upper).value(int(world.walls));
+  hasher.matrix(world.gravity_m_s2).value(world.dt_s).value(world.contact_dt_s);
+  for (const fem::Body& body : world.bodies) {
+    const fem::Material& m = body.material;
+    hasher.value(limber::hash_of(body.cage)).value(int(body.moving));
+    for (const double v :
+         {m.youngs_modulus_pa, m.poisson_ratio, m.density_kg_m3, m.damping_ratio, m.friction})
+      hasher.value(v);
+    for (const bool fixed : body.fixed) hasher.value(int(fixed));
+  }
+  return hasher.digest();
+}
+
+}  // namespace
+
+FemSystem::FemSystem(const fem::World& world) : world_(world), hash_(hash_of(world)) {}
+
+State FemSystem::start() const { return fem::rest_state(world_); }
+Vec3 FemSystem::robot_center(const State& state) const {
+  return fem::center_of_mass_m(world_, state, world_.robot);
+}
+double FemSystem::mean_speed(const State& state) const {
+  return fem::mean_speed_m_s(world_, state, world_.robot);
+}
+int FemSystem::robot_nodes() const { return world_.bodies[std::size_t(world_.robot)].node_count(); }
+Box FemSystem::sample_bounds() const { return world_.bounds_m; }
+double FemSystem::dt_s() const { return world_.dt_s; }
+std::uint64_t FemSystem::hash() const { return hash_; }
+bool FemSystem::acceptable(const State& state) const { return fem::inverted_tets(world_, state) == 0; }
+int FemSystem::lanes() const { return preferred_lanes; }
+std::unique_ptr<plan::Propagator> FemSystem::make_propagator() const {
+  return std::make_unique<FemPropagator>(world_);
+}
+
+}  // namespace limber::app

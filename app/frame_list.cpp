@@ -1,0 +1,85 @@
+#include "app/frame_list.h"
+
+#include <algorithm>
+#include <charconv>
+#include <optional>
+#include <set>
+#include <string_view>
+
+#include "core/error.h"
+
+namespace limber::app {
+
+namespace {
+
+std::optional<int> whole_number(std::string_view text) {
+  int value = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc() || end != text.data() + text.size() || value < 0) return std::nullopt;
+  return value;
+}
+
+// The two numbers round a separator.
+std::optional<std::pair<int, int>> pair_of(std::string_view text, char separator) {
+  const auto at = text.find(separator);
+  if (at == text.npos) return std::nullopt;
+  const auto a = whole_number(text.substr(0, at)), b = whole_number(text.substr(at + 1));
+  if (!a || !b) return std::nullopt;
+  return std::pair(*a, *b);
+}
+
+}  // namespace
+
+std::vector<int> parse_frames(const std::string& text, int count, int* left_out) {
+  std::set<int> frames;
+  int beyond = 0;
+  const auto add_range = [&](int first, int last, int step) {
+    for (std::int64_t f = first; f <= last; f += step) {
+      if (f < count)
+        frames.insert(int(f));
+      else
+        ++beyond;
+    }
+  };
+  std::string_view rest = text;
+  if (text.empty()) add_range(0, count - 1, 1);
+  while (!rest.empty()) {
+    const auto comma = rest.find(',');
+    const std::string_view part = rest.substr(0, comma);
+    rest = comma == rest.npos ? std::string_view() : rest.substr(comma + 1);
+    const auto colon = part.find(':');
+    const std::string_view range = part.substr(0, colon);
+    const auto step = colon == part.npos ? std::optional(1) : whole_number(part.substr(colon + 1));
+    const auto single = whole_number(range);
+    const auto ends = single ? std::optional(std::pair(*single, *single)) : pair_of(range, '-');
+    if (!step || *step == 0 || !ends || ends->first > ends->second)
+      throw InputError(fmt::format(
+          "--frames {}: \"{}\" is not a frame, a range like 3-30, or a range with a step like 3-30:2", text,
+          part));
+    add_range(ends->first, ends->second, *step);
+  }
+  if (frames.empty())
+    throw InputError(
+        fmt::format("--frames {}: names no frame of this motion, which has 0 … {}", text, count - 1));
+  if (left_out) *left_out = beyond;
+  return {frames.begin(), frames.end()};
+}
+
+std::vector<int> chunk_of(const std::vector<int>& frames, const std::string& chunk) {
+  if (chunk.empty()) return frames;
+  const auto parts = pair_of(chunk, '/');
+  if (!parts || parts->first < 1 || parts->first > parts->second)
+    throw InputError(fmt::format("--chunk {}: is not i/n with 1 ≤ i ≤ n, like 2/8", chunk));
+  const auto edge = [&](int i) { return std::ptrdiff_t(std::int64_t(frames.size()) * i / parts->second); };
+  return {frames.begin() + edge(parts->first - 1), frames.begin() + edge(parts->first)};
+}
+
+std::pair<int, int> parse_size(const std::string& text) {
+  const auto size = pair_of(text, 'x');
+  if (!size || std::min(size->first, size->second) < 16 || std::max(size->first, size->second) > 8192)
+    throw InputError(
+        fmt::format("--size {}: is not WIDTHxHEIGHT with both in 16 … 8192, like 1920x1080", text));
+  return *size;
+}
+
+}  // namespace limber::app

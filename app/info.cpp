@@ -1,0 +1,94 @@
+#include "app/body.h"
+#include "app/commands.h"
+#include "app/plan_folder.h"
+#include "core/error.h"
+#include "core/hash.h"
+#include "core/mesh_files.h"
+#include "core/npz.h"
+#include "meshing/quality.h"
+#include "render/png_file.h"
+#include "scenes/library.h"
+
+namespace limber::app {
+
+namespace {
+
+Outcome outcome_of(Json json) {
+  std::string text;
+  for (const auto& [key, value] : json.items())
+    text += fmt::format("{:28} {}\n", key, value.is_string() ? value.get<std::string>() : value.dump());
+  return {exit_done, std::move(json), text};
+}
+
+Json info_of_surface(const SurfaceMesh& mesh) {
+  const Box box = bounding_box(mesh.positions);
+  return {{"vertices", mesh.positions.rows()},
+          {"triangles", mesh.triangles.rows()},
+          {"area", area(mesh)},
+          {"volume", volume(mesh)},
+          {"lower", {box.lower.x(), box.lower.y(), box.lower.z()}},
+          {"upper", {box.upper.x(), box.upper.y(), box.upper.z()}}};
+}
+
+Json info_of_cage(const TetMesh& cage) {
+  const meshing::TetQuality quality = meshing::measure_quality(cage);
+  return {{"nodes", cage.positions.rows()},
+          {"tets", cage.tets.rows()},
+          {"volume", volume(cage)},
+          {"min_dihedral_deg", quality.min_dihedral_deg},
+          {"max_dihedral_deg", quality.max_dihedral_deg},
+          {"hash", hex(hash_of(cage))}};
+}
+
+Json info_of_npz(const fs::path& path) {
+  const Npz npz = read_npz(path);
+  Json json;
+  for (const auto& [name, array] : npz.arrays)
+    json[name] = fmt::format("{} {}", array.dtype, Json(array.shape).dump());
+  for (const auto& [name, text] : npz.texts) json[name] = fmt::format("{} bytes", text.size());
+  return json;
+}
+
+Json info_of_model(const fs::path& path) {
+  const meshing::ImportedModel model = meshing::import_model(path, {});
+  Json json = info_of_surface(model.surface);
+  json.update(meshing::to_json(model));
+  return json;
+}
+
+}  // namespace
+
+Outcome info(const fs::path& path) {
+  if (fs::is_directory(path)) {
+    if (fs::exists(path / "plan.npz")) return outcome_of(read_plan_folder(path).summary);
+    if (fs::exists(path / "report.json")) {
+      const Json report = read_body(path).report;
+      return {exit_done, report, summary_of_report(report)};
+    }
+    throw InputError(
+        fmt::format("{}: holds neither plan.npz nor report.json; nothing here is limber's", path.string()));
+  }
+  const std::string extension = path.extension().string();
+  if (extension == ".msh") return outcome_of(info_of_cage(read_msh(path)));
+  if (extension == ".npz") return outcome_of(info_of_npz(path));
+  if (extension == ".json") return outcome_of(read_json(path));
+  if (extension == ".png") {
+    const auto png = render::inspect_png(path);
+    if (!png) throw InputError(fmt::format("{}: is missing, no PNG, or cut short", path.string()));
+    return outcome_of({{"width", png->width}, {"height", png->height}, {"texts", png->texts}});
+  }
+  return outcome_of(info_of_model(path));
+}
+
+Outcome list_scenes() {
+  Json json = Json::array();
+  std::string text;
+  for (const scenes::KnownScene& known : scenes::known_scenes()) {
+    const scenes::Scene scene = scenes::read_scene_file(known.file);
+    json.push_back({{"name", known.name}, {"file", known.file.string()}, {"description", scene.description}});
+    text += fmt::format("{:20} {}\n", known.name, scene.description);
+  }
+  return {exit_done, json, text};
+}
+
+}  // namespace limber::app

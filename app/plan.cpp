@@ -1,0 +1,145 @@
+#include "app/analysis.h"
+#include "app/commands.h"
+#include "app/fem_system.h"
+#include "app/manifest.h"
+#include "app/plan_folder.h"
+#include "app/scene_world.h"
+#include "core/error.h"
+#include "core/hash.h"
+#include "core/log.h"
+#include "core/progress.h"
+#include "core/threads.h"
+#include "plan/search.h"
+#include "scenes/library.h"
+
+namespace limber::app {
+
+namespace {
+
+Json summary_of(const plan::Plan& plan, const fem::World& world, const MotionFigures& figures) {
+  Json volumes;
+  for (std::size_t b = 0; b < world.bodies.size(); ++b)
+    volumes[world.bodies[b].name] = std::round(1e4 * 100 * figures.largest_volume_change[b]) / 1e4;
+  return {{"solved", plan.solved()},
+          {"explanation", plan::explain(plan)},
+          {"seed", plan.settings.seed},
+          {"nodes", plan.tree.size()},
+          {"distance_m", plan.best_distance_m},
+          {"statistics", plan::json_of(plan.statistics)},
+          {"dt_s", world.dt_s},
+          {"motion_s", double(plan.trajectory.end.step) * world.dt_s},
+          {"frames", plan.trajectory.frames.size()},
+          {"largest_volume_change_percent", volumes},
+          {"deepest_penetration_m", figures.deepest_penetration_m},
+          {"deepest_penetration_of_robot_size", figures.deepest_penetration_m / figures.robot_size_m},
+          {"penetration_between", figures.penetration_between},
+          {"inverted_tets", figures.inverted_tets},
+          {"largest_force_n", figures.largest_force_n},
+          {"tree_hash", hex(plan::hash_of(plan.tree))},
+          {"trajectory_hash", hex(plan::hash_of(plan.trajectory))}};
+}
+
+std::string text_of(const Json& s, const fs::path& file) {
+  std::string volumes;
+  for (const auto& [name, percent] : s.at("largest_volume_change_percent").items())
+    volumes += fmt::format("{}{} {:.2f} %", volumes.empty() ? "" : ", ", name, percent.get<double>());
+  const Json& t = s.at("statistics");
+  return fmt::format(
+      "{}\n"
+      "  search       {} iterations, {} nodes, {} diverged, {} rejected; {:.2f} CPU s, {:.2f} s\n"
+      "  motion       {:.2f} s in {} frames, time step {:.3g} ms\n"
+      "  volume       changes at most: {}\n"
+      "  penetration  at most {:.4f} m, {:.2f} % of the robot's size ({})\n"
+      "  hashes       tree {}, trajectory {}\n"
+      "  file         {}\n",
+      s.at("explanation").get<std::string>(), t.at("iterations").get<std::int64_t>(),
+      s.at("nodes").get<int>(), t.at("diverged").get<std::int64_t>(), t.at("rejected").get<std::int64_t>(),
+      t.at("cpu_s").get<double>(), t.at("wall_s").get<double>(), s.at("motion_s").get<double>(),
+      s.at("frames").get<int>(), 1e3 * s.at("dt_s").get<double>(), volumes,
+      s.at("deepest_penetration_m").get<double>(),
+      100 * s.at("deepest_penetration_of_robot_size").get<double>(),
+      s.at("penetration_between").get<std::string>(), s.at("tree_hash").get<std::string>(),
+      s.at("trajectory_hash").get<std::string>(), file.string());
+}
+
+plan::Settings settings_of(const scenes::Scene& scene, const PlanOptions& options) {
+  const scenes::PlannerSpec& p = scene.planner;
+  plan::Settings s;
+  s.seed = std::uint64_t(options.seed.value_or(p.seed));
+  s.max_iterations = options.iterations.value_or(p.iterations);
+  s.goal = {scene.goal.center_of_mass_m, scene.goal.radius_m};
+  s.goal_bias = p.goal_bias;
+  s.weights = {p.weight_body, p.weight_control_point, p.weight_interpolation};
+  s.max_force_n = p.max_force_n;
+  s.min_force_share = p.min_force_share, s.max_force_share = p.max_force_share;
+  s.min_duration_s = p.min_duration_s, s.max_duration_s = p.max_duration_s;
+  s.control_point_radius_m = p.control_point_radius_m;
+  s.settle = {.max_duration_s = p.settle_time_s,
+              .mean_speed_m_s = p.settle_speed_m_s,
+              .max_force_share = p.settle_force_share};
+  s.frames_per_second = scene.film.frames_per_second;
+  s.in_flight = options.in_flight;
+  s.time_limit_s = options.time_limit_s;
+  return s;
+}
+
+bool finished(const plan::Plan& plan) { return plan.solved() || plan.ending == plan::Ending::iterations; }
+
+}  // namespace
+
+scenes::Scene read_scene(const PlanOptions& options) {
+  std::vector<std::string> sets = options.scene.sets;
+  if (!options.preset.empty()) sets.push_back("planner.preset=" + options.preset);
+  return scenes::read_scene_file(scenes::find_scene(options.scene.scene), sets);
+}
+
+Outcome plan(const PlanOptions& options) { return plan(options, read_scene(options)); }
+
+Outcome plan(const PlanOptions& options, const scenes::Scene& scene) {
+  make_folder(options.out);
+  const std::vector<PreparedBody> bodies = prepare_bodies(scene, options.scene.data, options.out);
+  const fem::World world = build_world(scene, bodies);
+  const FemSystem system(world);
+  const plan::Settings settings = settings_of(scene, options);
+  const fs::path file = options.out / "plan.npz";
+
+  std::optional<plan::Plan> earlier;
+  if (options.resume) {
+    earlier = read_plan_folder(options.out).plan;
+    if (earlier->system_hash != system.hash())
+      throw InputError(fmt::format(
+          "{}: was made for another world than this scene's; plan anew without --resume", file.string()));
+    log::info("{}: going on after {} iterations", file.string(), earlier->statistics.iterations);
+  }
+  plan::Plan plan = plan::plan(system, settings, std::move(earlier));
+
+  const MotionFigures figures = measure_motion(world, plan.trajectory);
+  const Json summary = summary_of(plan, world, figures);
+  write_plan_folder(options.out, plan, scene, bodies, summary);
+  write_volume_plot(options.out / "volume.svg", scene, world, figures, settings.frames_per_second);
+  update_manifest(options.out, "plan", summary);
+  if (plan.ending == plan::Ending::stopped) {
+    log::info("{}: the plan so far is kept; go on with --resume", file.string());
+    throw_if_stopped();
+  }
+  return {plan.solved() ? exit_done : exit_no_plan, summary, text_of(summary, file)};
+}
+
+bool plan_is_up_to_date(const PlanOptions& options, const scenes::Scene& scene) {
+  if (!fs::exists(options.out / "plan.npz")) return false;
+  try {
+    const std::vector<PreparedBody> bodies = prepare_bodies(scene, options.scene.data, options.out);
+    const fem::World world = build_world(scene, bodies);
+    const PlanFolder folder = read_plan_folder(options.out);
+    const plan::Settings settings = settings_of(scene, options);
+    return folder.plan.system_hash == FemSystem(world).hash() &&
+           plan::first_difference(folder.plan.settings, settings).empty() && finished(folder.plan) &&
+           (folder.plan.solved() || folder.plan.settings.max_iterations >= settings.max_iterations) &&
+           folder.plan.settings.frames_per_second == settings.frames_per_second;
+  } catch (const InputError& error) {
+    log::info("planning anew: {}", error.what());
+    return false;
+  }
+}
+
+}  // namespace limber::app

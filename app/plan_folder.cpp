@@ -1,0 +1,57 @@
+#include "app/plan_folder.h"
+
+#include "app/scene_world.h"
+#include "core/error.h"
+#include "core/hash.h"
+#include "core/version.h"
+#include "plan/plan_file.h"
+
+namespace limber::app {
+
+void write_plan_folder(const fs::path& folder, const plan::Plan& plan, const scenes::Scene& scene,
+                       const std::vector<PreparedBody>& bodies, const Json& summary) {
+  Json cages;
+  for (std::size_t b = 0; b < bodies.size(); ++b) cages[scene.bodies[b].name] = hex(hash_of(bodies[b].cage));
+  plan::write_plan(folder / "plan.npz", plan,
+                   {{"version", version},
+                    {"scene", scene.text},
+                    {"sets", scene.sets},
+                    {"cage_hashes", cages},
+                    {"summary", summary}});
+}
+
+PlanFolder read_plan_folder(const fs::path& folder) {
+  const fs::path file = folder / "plan.npz";
+  if (!fs::exists(file))
+    throw InputError(fmt::format("{}: there is no such file; make it with limber plan SCENE -o {}",
+                                 file.string(), folder.string()));
+  PlanFolder result;
+  plan::PlanFile read = plan::read_plan(file);
+  result.plan = std::move(read.plan);
+  const Json& extra = read.given;
+  try {
+    result.scene = scenes::read_scene(extra.at("scene").get<std::string>(), file.string() + " (scene)",
+                                      extra.at("sets").get<std::vector<std::string>>());
+    result.summary = extra.at("summary");
+    result.cage_hashes = extra.at("cage_hashes");
+  } catch (const Json::exception& error) {
+    throw InputError(fmt::format("{}: its meta.json is not limber's ({}); plan anew with limber plan",
+                                 file.string(), error.what()));
+  }
+  result.file_hash = hash_of(std::string_view(read_file(file)));
+  return result;
+}
+
+std::vector<PreparedBody> read_bodies_of(const PlanFolder& planned, const fs::path& folder) {
+  std::vector<PreparedBody> bodies = read_bodies(planned.scene, folder);
+  for (std::size_t b = 0; b < bodies.size(); ++b) {
+    const std::string& name = planned.scene.bodies[b].name;
+    if (planned.cage_hashes.value(name, "") != hex(hash_of(bodies[b].cage)))
+      throw InputError(
+          fmt::format("{}: the cage has changed since the plan was made; plan anew with limber plan",
+                      body_folder(folder, planned.scene.bodies[b]).string()));
+  }
+  return bodies;
+}
+
+}  // namespace limber::app

@@ -1,0 +1,35 @@
+// plan.npz with what it takes to rebuild its world: the scene's text, the edits made to it, and the hashes of
+// the bodies.
+#pragma once
+
+#include <vector>
+
+#include "app/body.h"
+#include "app/commands.h"
+#include "plan/search.h"
+#include "scenes/scene.h"
+
+namespace limber::app {
+
+struct PlanFolder {
+  plan::Plan plan;
+  scenes::Scene scene;
+  Json summary;             // as `limber plan --json` printed it
+  std::uint64_t file_hash;  // of plan.npz
+  Json cage_hashes;         // by body name
+};
+
+void write_plan_folder(const fs::path& folder, const plan::Plan&, const scenes::Scene&,
+                       const std::vector<PreparedBody>&, const Json& summary);
+
+// Throws InputError when plan.npz is missing, damaged, or not limber's.
+PlanFolder read_plan_folder(const fs::path& folder);
+
+// The bodies that the plan was made with. Throws InputError when one has changed since.
+std::vector<PreparedBody> read_bodies_of(const PlanFolder&, const fs::path& folder);
+
+scenes::Scene read_scene(const PlanOptions&);
+Outcome plan(const PlanOptions&, const scenes::Scene&);
+bool plan_is_up_to_date(const PlanOptions&, const scenes::Scene&);
+
+}  // namespace limber::app

@@ -1,0 +1,121 @@
+#include "app/scene_world.h"
+
+#include "core/error.h"
+#include "core/hash.h"
+#include "core/log.h"
+#include "core/progress.h"
+#include "scenes/library.h"
+#include "scenes/models.h"
+
+namespace limber::app {
+
+namespace {
+
+// The lines of the scene that shape a body's meshes, as the user's text has them once more: a change of any
+// makes them anew.
+Json identity_of(const scenes::BodySpec& body, const std::string& model_hash) {
+  const auto list = [](const auto& v) { return Json(std::vector<double>(v.data(), v.data() + v.size())); };
+  Json model{{"source", model_hash}};
+  if (const auto* file = std::get_if<scenes::FileModel>(&body.model))
+    model.update({{"scale", file->scale},
+                  {"height_m", file->height_m.value_or(0)},
+                  {"up", list(file->up)},
+                  {"front", list(file->front)}});
+  return {{"model", model},
+          {"cells", {body.cage.cells.x(), body.cage.cells.y(), body.cage.cells.z()}},
+          {"position_m", list(body.pose.position_m)},
+          {"axis", list(body.pose.axis)},
+          {"angle_deg", body.pose.angle_deg},
+          {"anchor", body.pose.anchor}};
+}
+
+BodySource source_of(const scenes::Scene& scene, const scenes::BodySpec& body,
+                     std::vector<fs::path> folders) {
+  folders.push_back(scene.folder);
+  BodySource source;
+  std::optional<fs::path> path;
+  if (const auto* file = std::get_if<scenes::FileModel>(&body.model)) {
+    path = scenes::find_model(file->file, folders);
+    if (!path && file->made.empty())
+      throw InputError(fmt::format("scene {}: body {}: {}", scene.name, body.name,
+                                   scenes::how_to_get_model(file->file, folders)));
+    if (!path)
+      log::warn("body {}: {} The made model \"{}\" takes its place.", body.name,
+                scenes::how_to_get_model(file->file, folders), file->made);
+  }
+  if (path) {
+    source.model = path->filename().string();
+    source.identity = identity_of(body, hex(hash_of(std::string_view(read_file(*path)))));
+    source.load = [&body, file = *path] {
+      meshing::ImportedModel model = meshing::import_model(file, {});
+      scenes::transform(scenes::world_from_model(body, model.surface.positions, false),
+                        model.surface.positions);
+      return model;
+    };
+    return source;
+  }
+  const SurfaceMesh made = scenes::made_surface(body).value();
+  source.model = fmt::format("made model of body {}", body.name);
+  source.identity = identity_of(body, hex(hash_of(made)));
+  source.load = [&body, made] {
+    meshing::ImportedModel model = meshing::clean(made, {}, "made model");
+    scenes::transform(scenes::world_from_model(body, made.positions, true), model.surface.positions);
+    return model;
+  };
+  source.made_cage = [&body, made] {
+    std::optional<TetMesh> cage = scenes::made_cage(body);
+    if (cage) scenes::transform(scenes::world_from_model(body, made.positions, true), cage->positions);
+    return cage;
+  };
+  return source;
+}
+
+}  // namespace
+
+fs::path body_folder(const fs::path& work_folder, const scenes::BodySpec& body) {
+  return work_folder / "bodies" / body.name;
+}
+
+std::vector<PreparedBody> prepare_bodies(const scenes::Scene& scene, const std::vector<fs::path>& data,
+                                         const fs::path& work_folder) {
+  for (const scenes::BodySpec& body : scene.bodies) {
+    throw_if_stopped();
+    const BodySource source = source_of(scene, body, data);
+    prepare_body(source, {.shells = body.cage.shells, .tets = body.cage.tets, .mode = body.cage.mode},
+                 body_folder(work_folder, body));
+  }
+  return read_bodies(scene, work_folder);
+}
+
+std::vector<PreparedBody> read_bodies(const scenes::Scene& scene, const fs::path& work_folder) {
+  std::vector<PreparedBody> bodies;
+  for (const scenes::BodySpec& body : scene.bodies)
+    bodies.push_back(read_body(body_folder(work_folder, body)));
+  return bodies;
+}
+
+fem::World build_world(const scenes::Scene& scene, const std::vector<PreparedBody>& prepared) {
+  fem::WorldSpec spec;
+  for (std::size_t b = 0; b < prepared.size(); ++b) {
+    const scenes::BodySpec& body = scene.bodies[b];
+    fem::BodySpec fem_body;
+    fem_body.name = body.name;
+    fem_body.cage = prepared[b].cage;
+    fem_body.material = {.youngs_modulus_pa = body.material.youngs_modulus_pa,
+                         .poisson_ratio = body.material.poisson_ratio,
+                         .density_kg_m3 = body.material.density_kg_m3,
+                         .damping_ratio = body.material.damping_ratio,
+                         .friction = body.material.friction};
+    fem_body.fixed_nodes = scenes::fixed_nodes(body, scene.bounds_m, prepared[b].cage.positions);
+    fem_body.rigid = body.kind == scenes::Kind::rigid;
+    spec.bodies.push_back(std::move(fem_body));
+  }
+  spec.robot = scene.robot;
+  spec.bounds_m = scene.bounds_m;
+  spec.walls = scene.walls;
+  spec.gravity_m_s2 = scene.gravity_m_s2;
+  spec.max_dt_s = scene.max_dt_s.value_or(0);
+  return fem::build_world(spec);
+}
+
+}  // namespace limber::app

@@ -1,0 +1,24 @@
+// From a scene to prepared bodies, and from those to the world that is stepped.
+#pragma once
+
+#include <vector>
+
+#include "app/body.h"
+#include "fem/world.h"
+#include "scenes/scene.h"
+
+namespace limber::app {
+
+fs::path body_folder(const fs::path& work_folder, const scenes::BodySpec&);
+
+// Prepares what is not up to date; meshes are in world coordinates, where the scene puts them. `data` are
+// folders in which model files are looked for first.
+std::vector<PreparedBody> prepare_bodies(const scenes::Scene&, const std::vector<fs::path>& data,
+                                         const fs::path& work_folder);
+
+// Throws InputError when a body is missing or damaged.
+std::vector<PreparedBody> read_bodies(const scenes::Scene&, const fs::path& work_folder);
+
+fem::World build_world(const scenes::Scene&, const std::vector<PreparedBody>&);
+
+}  // namespace limber::app

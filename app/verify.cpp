@@ -1,0 +1,119 @@
+#include "app/analysis.h"
+#include "app/commands.h"
+#include "app/fem_system.h"
+#include "app/plan_folder.h"
+#include "app/scene_world.h"
+#include "core/error.h"
+#include "core/hash.h"
+#include "core/log.h"
+#include "core/mesh_files.h"
+#include "meshing/certificate.h"
+#include "plan/trajectory.h"
+
+namespace limber::app {
+
+namespace {
+
+// The paper's conclusion: every deformable object stays within 10 % of its rest volume.
+constexpr double largest_volume_change = 0.10;
+// What limber promises on its own scenes, as a share of the robot's size.
+constexpr double largest_penetration = 0.04;
+
+class Table {
+ public:
+  void row(const std::string& promise, bool kept, const std::string& value) {
+    rows_.push_back({{"promise", promise}, {"kept", kept}, {"value", value}});
+    all_kept_ = all_kept_ && kept;
+  }
+  Outcome outcome() const {
+    std::string text;
+    for (const Json& r : rows_)
+      text += fmt::format("  {:6}  {:48}  {}\n", r.at("kept").get<bool>() ? "kept" : "BROKEN",
+                          r.at("promise").get<std::string>(), r.at("value").get<std::string>());
+    text += all_kept_ ? "every promise is kept\n" : "not every promise is kept\n";
+    return {all_kept_ ? exit_done : exit_defect, {{"all_kept", all_kept_}, {"promises", rows_}}, text};
+  }
+
+ private:
+  std::vector<Json> rows_;
+  bool all_kept_ = true;
+};
+
+void check_body(const std::string& name, const PreparedBody& body, Table& table) {
+  const meshing::Certificate c = meshing::certify(body.surface, body.cage);
+  table.row(name + ": no vertex outside the cage", c.vertices_outside == 0,
+            fmt::format("{} of {}", c.vertices_outside, c.vertices));
+  table.row(name + ": no triangle crosses its boundary", c.triangles_crossing == 0,
+            fmt::format("{} of {}", c.triangles_crossing, c.triangles));
+  table.row(name + ": boundary of the cage is a manifold", c.nonmanifold_edges + c.nonmanifold_vertices == 0,
+            fmt::format("{} edges and {} vertices are not", c.nonmanifold_edges, c.nonmanifold_vertices));
+  const Json& written = body.report.at("certificate");
+  table.row(name + ": certificate is of these meshes",
+            written.at("surface_hash") == hex(c.surface_hash) &&
+                written.at("cage_hash") == hex(c.cage_hash) && written.at("holds") == c.holds(),
+            fmt::format("dihedrals {:.1f} … {:.1f} degrees", c.min_dihedral_deg, c.max_dihedral_deg));
+}
+
+void check_plan(const PlanFolder& planned, const fem::World& world, Table& table) {
+  const plan::Plan& plan = planned.plan;
+  const plan::Trajectory& path = plan.trajectory;
+  const FemSystem system(world);
+  table.row("the plan is of this world", plan.system_hash == system.hash(), hex(system.hash()));
+
+  const plan::Trajectory replay = plan::simulate(system, path.controls, path.frames_per_second);
+  const bool same = replay.frames == path.frames && replay.end == path.end;
+  table.row("replay gives the same bits", same,
+            fmt::format("{} frames, end {}", replay.frames.size(), hex(hash_of(replay.end))));
+
+  const MotionFigures figures = measure_motion(world, replay);
+  const double distance = (system.robot_center(plan.tree.states[std::size_t(plan.best_node)]) -
+                           plan.settings.goal.center_of_mass_m)
+                              .norm();
+  table.row("the robot reaches the goal", distance <= plan.settings.goal.radius_m,
+            fmt::format("{:.3f} m from it, radius {:.3f} m", distance, plan.settings.goal.radius_m));
+  const double end_distance = (system.robot_center(replay.end) - plan.settings.goal.center_of_mass_m).norm();
+  const double end_speed = system.mean_speed(replay.end);
+  table.row("and comes to rest near it",
+            end_distance <= plan.settings.goal.radius_m && (plan.settings.settle.max_duration_s == 0 ||
+                                                            end_speed <= plan.settings.settle.mean_speed_m_s),
+            fmt::format("{:.3f} m from it at {:.4f} m/s", end_distance, end_speed));
+  table.row("no force is above the maximum",
+            figures.largest_force_n <= plan.settings.max_force_n * (1 + 1e-6),
+            fmt::format("{:.1f} of {:.1f} N", figures.largest_force_n, plan.settings.max_force_n));
+  for (std::size_t b = 0; b < world.bodies.size(); ++b)
+    if (world.bodies[b].moving)
+      table.row(world.bodies[b].name + ": volume changes by at most 10 %",
+                figures.largest_volume_change[b] <= largest_volume_change,
+                fmt::format("{:.2f} %", 100 * figures.largest_volume_change[b]));
+  table.row("no tet is inverted at a frame", figures.inverted_tets == 0,
+            fmt::format("{}", figures.inverted_tets));
+  table.row(
+      "penetration is at most 4 % of the robot's size",
+      figures.deepest_penetration_m <= largest_penetration * figures.robot_size_m,
+      fmt::format("{:.4f} m, {:.2f} % ({})", figures.deepest_penetration_m,
+                  100 * figures.deepest_penetration_m / figures.robot_size_m, figures.penetration_between));
+}
+
+}  // namespace
+
+Outcome verify(const fs::path& folder) {
+  if (!fs::is_directory(folder))
+    throw InputError(fmt::format("{}: is not a folder; name a work folder of limber", folder.string()));
+  Table table;
+  if (fs::exists(folder / "plan.npz")) {
+    const PlanFolder planned = read_plan_folder(folder);
+    const std::vector<PreparedBody> bodies = read_bodies_of(planned, folder);
+    for (std::size_t b = 0; b < bodies.size(); ++b)
+      check_body(planned.scene.bodies[b].name, bodies[b], table);
+    check_plan(planned, build_world(planned.scene, bodies), table);
+  } else if (fs::exists(folder / "report.json")) {
+    check_body("body", read_body(folder), table);
+  } else {
+    throw InputError(
+        fmt::format("{}: holds neither plan.npz nor report.json; make them with limber run or limber prepare",
+                    folder.string()));
+  }
+  return table.outcome();
+}
+
+}  // namespace limber::app

@@ -1,0 +1,282 @@
+// The program as a user meets it: arguments in, files, texts and exit codes out.
+#include <gtest/gtest.h>
+#include <signal.h>
+#include <sys/resource.h>
+
+#include <fstream>
+
+#include "app/commands.h"
+#include "core/error.h"
+#include "core/json.h"
+#include "core/progress.h"
+#include "tests/core/temporary_folder.h"
+
+namespace limber::app {
+namespace {
+
+struct Result {
+  int code;
+  std::string out, err;
+  Json json() const { return Json::parse(out); }
+};
+
+Result limber_program(std::vector<std::string> arguments) {
+  std::vector<const char*> argv{"limber"};
+  for (const std::string& a : arguments) argv.push_back(a.c_str());
+  testing::internal::CaptureStdout();
+  testing::internal::CaptureStderr();
+  const int code = run_command_line(int(argv.size()), argv.data());
+  const std::string out = testing::internal::GetCapturedStdout();
+  return {code, out, testing::internal::GetCapturedStderr()};
+}
+
+// A soft cube of 40 tets pushes itself past a soft block that leaves half the way free.
+constexpr const char* small_scene = R"(name = "small"
+[world]
+bounds_m = [[0, 0, 0], [4, 2, 2]]
+gravity_m_s2 = [0, 0, 0]
+[[bodies]]
+name = "robot"
+role = "robot"
+kind = "deformable"
+model = { box = { size_m = [0.6, 0.6, 0.6] } }
+cage = { cells = [2, 2, 2] }
+material = { youngs_modulus_pa = 5e3, poisson_ratio = 0.45, density_kg_m3 = 100 }
+pose = { position_m = [0.6, 1, 1.3] }
+color = "#c0392b"
+[[bodies]]
+name = "block"
+role = "obstacle"
+kind = "deformable"
+model = { box = { size_m = [0.4, 2, 0.9] } }
+cage = { cells = [2, 4, 2] }
+material = { youngs_modulus_pa = 5e3, poisson_ratio = 0.45, density_kg_m3 = 100 }
+pose = { position_m = [2, 1, 0.45] }
+fixed = "walls"
+color = "#2980b9"
+[goal]
+center_of_mass_m = [3.2, 1, 1]
+radius_m = 0.3
+[planner]
+preset = "paper"
+seed = 1
+iterations = 400
+max_force_n = 100
+[film]
+size_px = [96, 64]
+frames_per_second = 5
+)";
+
+class Program : public testing::Test {
+ protected:
+  std::string scene(std::string text = small_scene) const {
+    const fs::path path = folder / "scene.toml";
+    std::ofstream(path) << text;
+    return path.string();
+  }
+  static std::string replaced(const std::string& from, const std::string& to) {
+    std::string text = small_scene;
+    const auto at = text.find(from);
+    LIMBER_CHECK(at != text.npos, from);
+    return text.replace(at, from.size(), to);
+  }
+  std::string out(const std::string& name = "out") const { return (folder / name).string(); }
+  TemporaryFolder folder;
+};
+
+std::vector<std::pair<std::string, std::string>> contents(const fs::path& folder) {
+  std::vector<std::pair<std::string, std::string>> files;
+  for (const auto& entry : fs::recursive_directory_iterator(folder))
+    if (entry.is_regular_file())
+      files.emplace_back(fs::relative(entry.path(), folder).string(), read_file(entry.path()));
+  std::sort(files.begin(), files.end());
+  return files;
+}
+
+TEST_F(Program, RunFilmsASceneVerifyAgreesAndASecondRunChangesNothing) {
+  const Result first = limber_program({"run", scene(), "-o", out(), "--json"});
+  ASSERT_EQ(first.code, exit_done) << first.err;
+  EXPECT_TRUE(first.json().at("plan").at("solved").get<bool>());
+  for (const char* name : {"plan.npz", "film.mp4", "sheet.png", "volume.svg", "manifest.json",
+                           "frames/0000.png", "bodies/robot/cage.msh"})
+    EXPECT_TRUE(fs::exists(folder.path() / "out" / name)) << name;
+
+  const Result verified = limber_program({"verify", out(), "--json"});
+  EXPECT_EQ(verified.code, exit_done) << verified.err << verified.out;
+  EXPECT_TRUE(verified.json().at("all_kept").get<bool>());
+
+  const auto before = contents(out());
+  const Result second = limber_program({"run", scene(), "-o", out(), "--json"});
+  EXPECT_EQ(second.code, exit_done);
+  EXPECT_EQ(second.json().at("render").at("painted"), 0);
+  for (const auto& file : contents(out())) {
+    if (file.first == "manifest.json") continue;
+    EXPECT_NE(std::find(before.begin(), before.end(), file), before.end()) << file.first << " has changed";
+  }
+}
+
+TEST_F(Program, TheSameSeedGivesTheSameBytesForAnyThreadCount) {
+  std::vector<Json> results;
+  for (const char* threads : {"1", "2", "2"})
+    results.push_back(limber_program({"plan", scene(), "-o", out(threads + std::to_string(results.size())),
+                                      "--threads", threads, "--json"})
+                          .json());
+  for (const Json& r : results) {
+    EXPECT_EQ(r.at("tree_hash"), results[0].at("tree_hash"));
+    EXPECT_EQ(r.at("trajectory_hash"), results[0].at("trajectory_hash"));
+  }
+  const Json other = limber_program({"plan", scene(), "-o", out("other"), "--seed", "2", "--json"}).json();
+  EXPECT_NE(other.at("tree_hash"), results[0].at("tree_hash"));
+}
+
+TEST_F(Program, ASearchCutShortAndResumedEndsLikeAnUninterruptedOne) {
+  const Json whole = limber_program({"plan", scene(), "-o", out("whole"), "--json"}).json();
+  const Result cut = limber_program({"plan", scene(), "-o", out("cut"), "--iterations", "2", "--json"});
+  EXPECT_EQ(cut.code, exit_no_plan);
+  EXPECT_EQ(cut.json().at("statistics").at("iterations"), 2);
+  const Json resumed = limber_program({"plan", scene(), "-o", out("cut"), "--resume", "--json"}).json();
+  EXPECT_EQ(resumed.at("tree_hash"), whole.at("tree_hash"));
+  EXPECT_EQ(resumed.at("trajectory_hash"), whole.at("trajectory_hash"));
+}
+
+TEST_F(Program, ASignalKeepsThePlanSoFar) {
+  limber_program({"plan", scene(), "-o", out(), "--iterations", "3"});  // prepares the bodies
+  fs::remove(fs::path(out()) / "plan.npz");
+  request_stop(SIGINT);
+  const Result stopped = limber_program({"plan", scene(), "-o", out()});
+  request_stop(0);
+  EXPECT_EQ(stopped.code, 130) << stopped.err;
+}
+
+TEST_F(Program, ChunksOfFramesAreTheFramesOfOneRun) {
+  ASSERT_EQ(limber_program({"run", scene(), "-o", out("whole")}).code, exit_done);
+  ASSERT_EQ(limber_program({"plan", scene(), "-o", out("parts")}).code, exit_done);
+  for (const char* chunk : {"2/3", "1/3", "3/3"}) {
+    EXPECT_FALSE(fs::exists(fs::path(out("parts")) / "film.mp4"));
+    EXPECT_EQ(limber_program({"render", out("parts"), "--chunk", chunk, "--threads", "1"}).code, exit_done);
+  }
+  EXPECT_TRUE(fs::exists(fs::path(out("parts")) / "film.mp4"));
+  EXPECT_EQ(contents(fs::path(out("whole")) / "frames"), contents(fs::path(out("parts")) / "frames"));
+}
+
+TEST_F(Program, ResumePaintsOnlyFramesThatAreMissingOrDamaged) {
+  ASSERT_EQ(limber_program({"run", scene(), "-o", out()}).code, exit_done);
+  const fs::path frames = fs::path(out()) / "frames";
+  const auto good = contents(frames);
+  ASSERT_GT(good.size(), 3u);
+  fs::remove(frames / "0001.png");
+  fs::resize_file(frames / "0002.png", fs::file_size(frames / "0002.png") / 2);
+  const Result resumed = limber_program({"render", out(), "--resume", "--json"});
+  EXPECT_EQ(resumed.json().at("painted"), 2);
+  EXPECT_EQ(contents(frames), good);
+}
+
+TEST_F(Program, BadScenesAreRefusedWithAPlaceAndAWayOut) {
+  struct Case {
+    std::string text, place, words;
+  };
+  const std::vector<Case> cases{
+      {"", "scene.toml:1", ""},
+      {replaced("gravity_m_s2", "gravity"), "scene.toml:4:1", "gravity_m_s2"},
+      {replaced("iterations = 400", "iterations = \"many\""), "scene.toml:30:14", ""},
+      {replaced("poisson_ratio = 0.45", "poisson_ratio = 0.7"), "scene.toml:11:", ""},
+      {replaced("center_of_mass_m = [3.2, 1, 1]", "center_of_mass_m = [5, 1, 1]"), "scene.toml:", ""},
+      {replaced("role = \"obstacle\"", "role = \"robot\""), "scene.toml:", "robot"},
+      {replaced("size_m = [0.6, 0.6, 0.6]", "size_m = [0, 0.6, 0.6]"), "scene.toml:9:", ""},
+      {replaced("max_force_n = 100", "max_force_n = nan"), "scene.toml:31:15", ""},
+      {replaced("pose = { position_m = [0.6, 1, 1.3] }", "pose = { position_m = [1.9, 1, 1] }"), "",
+       "overlap"},
+  };
+  for (const Case& c : cases) {
+    const Result run = limber_program({"plan", scene(c.text), "-o", out()});
+    EXPECT_EQ(run.code, exit_bad_input) << c.text;
+    EXPECT_NE(run.err.find(c.place), std::string::npos) << c.place << " in: " << run.err;
+    EXPECT_NE(run.err.find(c.words), std::string::npos) << c.words << " in: " << run.err;
+    EXPECT_FALSE(fs::exists(fs::path(out()) / "plan.npz"));
+  }
+}
+
+TEST_F(Program, UsageErrorsAreBadInput) {
+  EXPECT_EQ(limber_program({}).code, exit_bad_input);
+  EXPECT_EQ(limber_program({"paint"}).code, exit_bad_input);
+  EXPECT_EQ(limber_program({"plan", "barriers1"}).code, exit_bad_input);  // no -o
+  EXPECT_EQ(limber_program({"prepare", "x.obj", "-o", out(), "--tets", "many"}).code, exit_bad_input);
+  EXPECT_EQ(limber_program({"prepare", "x.obj", "-o", out(), "--tets", "3"}).code, exit_bad_input);
+  EXPECT_EQ(limber_program({"plan", scene(), "-o", out(), "--set", "planner.iteration=5"}).code,
+            exit_bad_input);
+  EXPECT_EQ(limber_program({"plan", "no_such_scene", "-o", out()}).code, exit_bad_input);
+  EXPECT_EQ(limber_program({"render", out("nothing")}).code, exit_bad_input);
+  EXPECT_EQ(limber_program({"verify", folder.path().string()}).code, exit_bad_input);
+  EXPECT_EQ(limber_program({"info", out("nothing")}).code, exit_bad_input);
+  for (const char* command : {"prepare", "plan", "render", "run", "verify", "info", "scenes"})
+    EXPECT_EQ(limber_program({command, "--help"}).code, exit_done) << command;
+  EXPECT_EQ(limber_program({"--version"}).out, "limber 0.1.0\n");
+}
+
+TEST_F(Program, AnErrorIsOneJsonDocumentToo) {
+  const Result run = limber_program({"plan", "no_such_scene", "-o", out(), "--json"});
+  EXPECT_EQ(run.json().at("exit_code"), exit_bad_input);
+  EXPECT_NE(run.json().at("error").get<std::string>().find("no_such_scene"), std::string::npos);
+}
+
+TEST_F(Program, AnUnwritableFolderIsADiskError) {
+  EXPECT_EQ(limber_program({"plan", scene(), "-o", "/dev/null/out"}).code, exit_disk);
+  std::ofstream(folder / "file") << "x";
+  EXPECT_EQ(limber_program({"plan", scene(), "-o", (folder / "file").string()}).code, exit_disk);
+}
+
+// A limit on the size of a file makes write() fail in its middle, as a full disk does.
+TEST_F(Program, ADiskThatFillsUpLeavesNothingHalfWritten) {
+  const std::string scene_file = scene();
+  rlimit old{};
+  getrlimit(RLIMIT_FSIZE, &old);
+  const rlimit small{20000, old.rlim_max};
+  signal(SIGXFSZ, SIG_IGN);
+  setrlimit(RLIMIT_FSIZE, &small);
+  const Result run = limber_program({"plan", scene_file, "-o", out()});
+  setrlimit(RLIMIT_FSIZE, &old);
+  signal(SIGXFSZ, SIG_DFL);
+  EXPECT_EQ(run.code, exit_disk) << run.err;
+  for (const auto& [name, content] : contents(out())) EXPECT_EQ(name.find(".tmp"), std::string::npos) << name;
+  EXPECT_EQ(limber_program({"plan", scene_file, "-o", out()}).code,
+            exit_done);  // with room, the same command goes through
+}
+
+TEST_F(Program, FilesThatDoNotBelongTogetherAreRefused) {
+  ASSERT_EQ(limber_program({"plan", scene(), "-o", out()}).code, exit_done);
+  const fs::path cage = fs::path(out()) / "bodies" / "robot" / "cage.msh";
+  const std::string content = read_file(cage);
+  std::ofstream(cage) << content << " ";
+  const Result changed = limber_program({"render", out()});
+  EXPECT_EQ(changed.code, exit_bad_input);
+  EXPECT_NE(changed.err.find("limber plan"), std::string::npos) << changed.err;
+  write_file(cage, content);
+  EXPECT_EQ(limber_program({"verify", out()}).code, exit_done);
+
+  // Bodies of another shape: the plan says that it is not theirs.
+  ASSERT_EQ(
+      limber_program({"plan", scene(replaced("[0.6, 0.6, 0.6]", "[0.6, 0.6, 0.5]")), "-o", out("other")})
+          .code,
+      exit_done);
+  fs::copy_file(fs::path(out()) / "plan.npz", fs::path(out("other")) / "plan.npz",
+                fs::copy_options::overwrite_existing);
+  EXPECT_EQ(limber_program({"verify", out("other")}).code, exit_bad_input);
+}
+
+TEST_F(Program, PrepareReportsAndVerifyProvesAgain) {
+  std::ofstream(folder / "tetrahedron.obj")
+      << "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n";
+  const Result prepared = limber_program(
+      {"prepare", (folder / "tetrahedron.obj").string(), "-o", out(), "--tets", "100", "--json"});
+  ASSERT_EQ(prepared.code, exit_done) << prepared.err;
+  EXPECT_EQ(prepared.json().at("surface").at("triangles"), 4);
+  EXPECT_EQ(prepared.json().at("shells").at("count"), 1);
+  EXPECT_TRUE(prepared.json().at("certificate").at("holds").get<bool>());
+  EXPECT_EQ(limber_program({"verify", out()}).code, exit_done);
+  EXPECT_EQ(limber_program({"info", out()}).code, exit_done);
+  for (const char* name : {"surface.ply", "shells.obj", "cage.msh", "binding.npz", "report.json"})
+    EXPECT_EQ(limber_program({"info", (fs::path(out()) / name).string()}).code, exit_done) << name;
+}
+
+}  // namespace
+}  // namespace limber::app
