@@ -61,23 +61,23 @@ Selection fit_budget(const CageModel& model, int budget, const std::optional<Dih
   double spacing = model.box.diagonal() / std::cbrt(double(budget));
   for (const Vec3& phase : phases) {
     double too_fine = 0, too_coarse = 0;
+    bool too_large = false;  // a spacing was refused; then no other place of the lattice will help
     for (int i = 0; i < tries_a_phase; ++i) {
       Selection s = detail::select_tets(model, spacing, phase, warp_within);
-      const double count = double(s.tets.size());
-      // No tets: the lattice would be too large.
-      const double ratio = s.tets.empty() ? 4 : count / budget;
+      too_large = too_large || s.tets.empty();
+      const double ratio = s.tets.empty() ? 4 : double(s.tets.size()) / budget;
       (ratio > 1 ? too_fine : too_coarse) = spacing;
       if (!s.tets.empty() && (best.tets.empty() || miss(s) < miss(best))) best = std::move(s);
       if (!best.tets.empty() && miss(best) < near_enough) return best;
       spacing *= std::pow(ratio, 0.42);
       if (too_fine > 0 && too_coarse > 0) {
-        if (too_coarse / too_fine < 1.0005) break;
+        if (too_coarse / too_fine < (too_large ? 1.1 : 1.0005)) break;
         const double low = too_fine * std::pow(too_coarse / too_fine, 0.1),
                      high = too_coarse * too_fine / low;
         spacing = std::clamp(spacing, low, high);
       }
     }
-    if (miss(best) < 0.1) return best;
+    if (best.tets.empty() || too_large || miss(best) < 0.1) return best;
     spacing = best.lattice.spacing;
   }
   return best;
@@ -201,7 +201,7 @@ Cage build_cage(const SurfaceMesh& surface, const std::vector<ConvexShell>& shel
   cage.components = component_count(cage.mesh.tets);
   if (cage.components > 1)
     cage.notes.push_back(
-        fmt::format("the cage has {} pieces that nothing joins, as the model has", cage.components));
+        fmt::format("the cage has {} pieces, because the model has parts that lie apart", cage.components));
   return cage;
 }
 

@@ -34,10 +34,10 @@ int common(int first, Signs... rest) {
 using Tri = std::array<Vec3, 3>;
 using Tet = std::array<Vec3, 4>;
 
-// Two convex bodies are disjoint when a plane through an edge of one and a corner of the other, or through a
-// face, has one body on one side and the other beyond it. Every sign below is that of four corners, so no
-// plane is ever computed. In general position this finds all disjoint pairs; a pair that shares a plane may
-// go unproved.
+// Two convex bodies are disjoint when some plane has one on one side and the other beyond it: one through a
+// face of either, or else one through an edge of the tet, turned about that edge until it meets a corner of
+// the triangle. Every sign below is that of four corners, so no plane is ever computed. In general position
+// this finds all disjoint pairs; a pair that shares a plane may go unproved.
 bool proved_disjoint(const Tet& tet, const Tri& tri) {
   // side[i][m]: where tri[m] lies of the face opposite tet[i]; positive where tet[i] would be in a positive
   // tet.
@@ -78,20 +78,6 @@ bool proved_disjoint(const Tet& tet, const Tri& tri) {
     for (int r = 0; r < 3; ++r) {
       const int tri_side = common(mixed[e][(r + 2) % 3], -mixed[e][(r + 1) % 3]);
       if (tri_side != 0 && common(tet_corner(p, q, r, x), tet_corner(p, q, r, y)) == -tri_side) return true;
-    }
-  }
-  for (int m = 0; m < 3; ++m) {    // the edge of the triangle opposite tri[m]
-    for (int p = 0; p < 4; ++p) {  // and a corner of the tet
-      // (s t p tri[m]) = −(s t tri[m] p) = −(tri[m] s t p)
-      const int tri_side = -beyond[p];
-      if (tri_side == 0) continue;
-      bool separates = true;
-      for (int e = 0; e < 6 && separates; ++e) {
-        // (s t p x) = (p x s t)
-        if (edge[e][0] == p) separates = mixed[e][m] == -tri_side;
-        if (edge[e][1] == p) separates = mixed[e][m] == tri_side;
-      }
-      if (separates) return true;
     }
   }
   return false;

@@ -76,11 +76,15 @@ bool holds_strangers(const CageModel& model, const SurfaceMesh& surface, const T
       points[pieces.root(i)].push_back(p);
   }
   if (points.size() < 2) return false;
+  // Where a model is all threads: the first few tell, and each pair costs a winding number.
+  constexpr std::size_t max_pieces = 12;
+  if (points.size() > max_pieces) points.erase(std::next(points.begin(), max_pieces), points.end());
 
   UnionFind bodies(int(triangles.size()));
   constexpr std::size_t samples = 200;  // of a piece
   for (auto a = points.begin(); a != points.end(); ++a)
     for (auto b = std::next(a); b != points.end(); ++b) {
+      if (bodies.root(a->first) == bodies.root(b->first)) continue;
       double nearest = 1e300;
       Vec3 middle;
       for (std::size_t i = 0; i < a->second.size(); i += 1 + a->second.size() / samples)

@@ -29,16 +29,17 @@ bool is_closed(const Triangles& triangles) {
   return closed;
 }
 
-std::vector<Box> triangle_boxes(const SurfaceMesh& surface) {
-  std::vector<Box> boxes(std::size_t(surface.triangles.rows()));
-  for (std::size_t f = 0; f < boxes.size(); ++f)
-    for (int k = 0; k < 3; ++k) boxes[f].include(Vec3(surface.positions.row(surface.triangles(int(f), k))));
-  return boxes;
+std::vector<Tri> triangles_of(const SurfaceMesh& surface) {
+  std::vector<Tri> triangles(std::size_t(surface.triangles.rows()));
+  for (std::size_t f = 0; f < triangles.size(); ++f)
+    for (int k = 0; k < 3; ++k) triangles[f][k] = surface.positions.row(surface.triangles(int(f), k));
+  return triangles;
 }
 
-Box union_of(const std::vector<Box>& boxes) {
+Box box_of(const std::vector<Tri>& triangles) {
   Box all;
-  for (const Box& box : boxes) all.include(box);
+  for (const Tri& triangle : triangles)
+    for (const Vec3& p : triangle) all.include(p);
   return all;
 }
 
@@ -56,16 +57,22 @@ Lattice lattice_round(const Box& box, double spacing, const Vec3& phase) {
 // The cells whose tets, wherever their nodes were moved to, may meet the surface.
 std::vector<int> cells_near(const CageModel& model, const Lattice& lattice) {
   // The tets of a cell reach from half a cell below its lower corner to its upper corner, and nodes move by
-  // less than a half.
+  // less than a half: so they lie within [−1, 1.5] cells of the lower corner.
+  const double to_middle = 0.25, half_width = 1.25;
   std::vector<bool> near(std::size_t(lattice.cell_count()));
-  for (const Box& box : model.boxes) {
-    const Vec3 lower = (box.lower - lattice.origin) / lattice.spacing,
-               upper = (box.upper - lattice.origin) / lattice.spacing;
-    const Cell first = (lower.array() - 1.5).floor().cast<int>(),
-               last = (upper.array() + 1).floor().cast<int>();
+  for (const Tri& triangle : model.triangles) {
+    std::array<Vec3, 3> p;
+    Box box;
+    for (int k = 0; k < 3; ++k) box.include(p[k] = (triangle[k] - lattice.origin) / lattice.spacing);
+    const Vec3 n = (p[1] - p[0]).cross(p[2] - p[0]);
+    const double reach = (half_width + 1e-6) * n.cwiseAbs().sum();  // of a cell's box along n
+    const Cell first = (box.lower.array() - 1.5).floor().cast<int>(),
+               last = (box.upper.array() + 1).floor().cast<int>();
     for (int z = first.z(); z <= last.z(); ++z)
       for (int y = first.y(); y <= last.y(); ++y)
-        for (int x = first.x(); x <= last.x(); ++x) near[lattice.index({x, y, z})] = true;
+        for (int x = first.x(); x <= last.x(); ++x)
+          if (std::abs(n.dot(Vec3(x + to_middle, y + to_middle, z + to_middle) - p[0])) <= reach)
+            near[lattice.index({x, y, z})] = true;
   }
   std::vector<int> cells;
   for (int cell = 0; cell < int(near.size()); ++cell)
@@ -235,8 +242,8 @@ void mend(Grid& grid) {
 }  // namespace
 
 CageModel::CageModel(const SurfaceMesh& surface)
-    : boxes(triangle_boxes(surface)),
-      box(union_of(boxes)),
+    : triangles(triangles_of(surface)),
+      box(box_of(triangles)),
       tree(surface.positions, surface.triangles),
       winding(surface.positions, surface.triangles),
       closed(is_closed(surface.triangles)) {}
@@ -244,6 +251,7 @@ CageModel::CageModel(const SurfaceMesh& surface)
 Selection select_tets(const CageModel& model, double spacing, const Vec3& phase,
                       const std::optional<DihedralRange>& warp_within) {
   Grid grid{lattice_round(model.box, spacing, phase), {}};
+  if (grid.lattice.cell_count() == 0) return {grid.lattice, {}, {}};
   grid.state.assign(std::size_t(grid.lattice.cell_count() * tets_a_cell), unknown);
   const std::vector<int> cells = cells_near(model, grid.lattice);
   if (warp_within) warp(model, cells, *warp_within, grid.lattice);

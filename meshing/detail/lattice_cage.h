@@ -1,6 +1,7 @@
 // The coarse start of a cage: the tets of a lattice that a model needs (docs/cage.md, steps 3 to 5).
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <optional>
 #include <vector>
@@ -12,11 +13,13 @@
 
 namespace limber::meshing::detail {
 
+using Tri = std::array<Vec3, 3>;
+
 // What a cage must hold.
 struct CageModel {
   explicit CageModel(const SurfaceMesh&);
 
-  std::vector<Box> boxes;  // of the triangles
+  std::vector<Tri> triangles;
   Box box;
   SurfaceTree tree;
   WindingNumber winding;

@@ -13,7 +13,7 @@
 
 namespace limber::meshing {
 
-inline SurfaceMesh made_box(const Vec3& size) {
+inline SurfaceMesh box_at_origin(const Vec3& size) {
   SurfaceMesh m{Points(8, 3), Triangles(12, 3)};
   for (int i = 0; i < 8; ++i)
     m.positions.row(i) << (i & 1) * size.x(), (i >> 1 & 1) * size.y(), (i >> 2) * size.z();
@@ -23,7 +23,7 @@ inline SurfaceMesh made_box(const Vec3& size) {
 }
 
 // A tube bent to a ring of radius 1: `thickness` its own radius.
-inline SurfaceMesh made_torus(double thickness, int around, int across) {
+inline SurfaceMesh made_ring(double thickness, int around, int across) {
   SurfaceMesh m{Points(around * across, 3), Triangles(2 * around * across, 3)};
   const double turn = 2 * std::numbers::pi;
   for (int i = 0; i < around; ++i)
@@ -79,11 +79,11 @@ inline SurfaceMesh made_soup(int count) {
 // Add a model: every law gains a witness.
 inline std::map<std::string, SurfaceMesh> models() {
   return {{"sphere", made_sphere(12)},
-          {"box", made_box({1, 2, 3})},
-          {"torus", made_torus(0.25, 24, 10)},
+          {"box", box_at_origin({1, 2, 3})},
+          {"torus", made_ring(0.25, 24, 10)},
           {"hemisphere", compact(made_hemisphere(8))},
           {"two spheres", joined(made_sphere(6), moved(made_sphere(6), {3, 0.2, 0.1}))},
-          {"needle", made_box({0.01, 0.01, 5})},
+          {"needle", box_at_origin({0.01, 0.01, 5})},
           {"soup", made_soup(60)}};
 }
 

@@ -57,6 +57,17 @@ TEST(Cage, MeetsTheBudgetWithinTenPercentOrSaysSo) {
   EXPECT_LE(noted, asked / 10);
 }
 
+TEST(Cage, SaysWhenTheLatticeCannotMeetTheBudget) {
+  // A needle along the diagonal of its box: as many tets as asked would need a lattice of too many cells.
+  SurfaceMesh needle = box_at_origin({0.01, 0.01, 5});
+  needle.positions.col(0) += needle.positions.col(2), needle.positions.col(1) += needle.positions.col(2);
+  const Cage cage = cage_of(needle, 8000, CageMode::fast);
+  EXPECT_LT(cage.mesh.tets.rows(), 7000);
+  ASSERT_EQ(cage.notes.size(), 1u);
+  EXPECT_NE(cage.notes[0].find("8000 tets were asked for"), std::string::npos) << cage.notes[0];
+  EXPECT_TRUE(certify(needle, cage.mesh).holds());
+}
+
 TEST(Cage, DihedralsStayWithinTheirBounds) {
   for (const auto& [name, m] : models()) {
     SCOPED_TRACE(name);
@@ -100,7 +111,7 @@ TEST(Cage, BoundaryIsAManifoldByWalkingRoundEachVertex) {
 }
 
 TEST(Cage, ConnectedModelsGetOnePieceAndOthersTheirNumber) {
-  EXPECT_EQ(cage_of(made_torus(0.25, 24, 10), 300).components, 1);
+  EXPECT_EQ(cage_of(made_ring(0.25, 24, 10), 300).components, 1);
   EXPECT_EQ(cage_of(models().at("hemisphere"), 300).components, 1);
   const Cage two = cage_of(models().at("two spheres"), 600);
   EXPECT_EQ(two.components, 2);
@@ -149,7 +160,7 @@ TEST(Cage, SameBytesForAnyOrderOfTheTriangles) {
 }
 
 TEST(Cage, SameShapeAtAnyPowerOfTwo) {
-  const SurfaceMesh m = made_torus(0.25, 24, 10);
+  const SurfaceMesh m = made_ring(0.25, 24, 10);
   const Cage cage = cage_of(m, 400);
   for (int power : {-200, -30, 7, 300}) {
     SurfaceMesh scaled = m;
@@ -198,8 +209,8 @@ TEST(Cage, TellsWhatIsWrongWithItsInput) {
 ConvexShell shell_of(const SurfaceMesh& m) { return {m.positions, m.triangles}; }
 
 TEST(Cage, EachTetIsLabelledByTheShellThatHoldsIt) {
-  const SurfaceMesh left = made_box({1, 1, 1}), right = moved(left, {1, 0, 0});
-  const SurfaceMesh whole = made_box({2, 1, 1});
+  const SurfaceMesh left = box_at_origin({1, 1, 1}), right = moved(left, {1, 0, 0});
+  const SurfaceMesh whole = box_at_origin({2, 1, 1});
   const Cage cage = build_cage(whole, {shell_of(left), shell_of(right)}, {.tets = 500});
   for (int t = 0; t < cage.mesh.tets.rows(); ++t) {
     double x = 0;
@@ -211,9 +222,9 @@ TEST(Cage, EachTetIsLabelledByTheShellThatHoldsIt) {
 }
 
 TEST(Cage, ModePaperFillsEachShellAndWeldsSharedCorners) {
-  const SurfaceMesh left = made_box({1, 1, 1}), right = moved(left, {1, 0, 0});
+  const SurfaceMesh left = box_at_origin({1, 1, 1}), right = moved(left, {1, 0, 0});
   const Cage cage =
-      build_cage(made_box({2, 1, 1}), {shell_of(left), shell_of(right)}, {.mode = CageMode::paper});
+      build_cage(box_at_origin({2, 1, 1}), {shell_of(left), shell_of(right)}, {.mode = CageMode::paper});
   EXPECT_NEAR(volume(cage.mesh), 2, 1e-12);
   EXPECT_EQ(cage.mesh.positions.rows(), 12);
   EXPECT_EQ(std::count(cage.shell_from_tet.begin(), cage.shell_from_tet.end(), 0) * 2, cage.mesh.tets.rows());
