@@ -209,9 +209,10 @@ bool Contacts<Real>::sort_points(const LaneView<Real>& view, int from, int into,
   for (int k = 0; k < int(points_.size()); ++k) {
     Real* p = points_[k].at;
     place_of(first_point_ + k, p);
-    if (p[0] < lower[0] || p[0] > upper[0] || p[1] < lower[1] || p[1] > upper[1] || p[2] < lower[2] ||
-        p[2] > upper[2])
-      continue;
+    // Said so that a point that is not finite, of a rollout that blows up, is left out: no grid can hold it.
+    bool held = true;
+    for (int c = 0; c < 3; ++c) held &= p[c] >= lower[c] && p[c] <= upper[c] && std::isfinite(p[c]);
+    if (!held) continue;
     near_.push_back(k);
     for (int c = 0; c < 3; ++c) {
       grid_.lower[c] = std::min(grid_.lower[c], p[c]);
@@ -309,9 +310,10 @@ void Contacts<Real>::find_touches(const LaneView<Real>& view, int into, Real tra
   for (const Record& record : list.records[direction]) {
     Real p[3];
     place_of(record.point, p);
-    if (p[0] < lower[0] || p[0] > upper[0] || p[1] < lower[1] || p[1] > upper[1] || p[2] < lower[2] ||
-        p[2] > upper[2])
-      continue;
+    // Said so that a point that is not finite, of a rollout that blows up, is left out: no grid can hold it.
+    bool held = true;
+    for (int c = 0; c < 3; ++c) held &= p[c] >= lower[c] && p[c] <= upper[c] && std::isfinite(p[c]);
+    if (!held) continue;
     for (Candidate* k = candidates + record.begin; k != candidates + record.end; ++k) {
       if (k->asleep_until > travel) continue;
       const Topology::Tet& tet = topology_.tets[k->tet];

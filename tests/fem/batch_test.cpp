@@ -84,5 +84,35 @@ TEST(Batch, AHundredStepsAreFortyAndThenSixty) {
   }
 }
 
+// A rollout that blows up in the middle of a contact ends with a reason, and its neighbours do not notice.
+TEST(Batch, ARolloutThatBlowsUpIsDivergedAndHarmsNobody) {
+  const World world = build_world(testing::barriers());
+  std::vector<Case> cases = pressed_cases(world, 16);
+  std::vector<Rollout> calm, mixed;
+  for (Case& c : cases) calm.push_back({&c.start, c.control, {}, {}});
+  std::vector<State> wild(cases.size());
+  mixed = calm;
+  for (std::size_t i = 0; i < cases.size(); i += 3) {
+    wild[i] = cases[i].start;
+    // From fast to beyond what float32 holds.
+    for (std::size_t k = 0; k < wild[i].velocities.size(); ++k)
+      wild[i].velocities[k] = float(k % 5 == 0) * std::pow(10.0f, float(2 + 2 * i));
+    mixed[i].start = &wild[i];
+  }
+  Batch batch(world, 16);
+  propagate(batch, calm);
+  propagate(batch, mixed);
+  for (std::size_t i = 0; i < cases.size(); ++i) {
+    SCOPED_TRACE(i);
+    if (i % 3 == 0) {
+      EXPECT_EQ(mixed[i].outcome.status, RunStatus::diverged);
+      EXPECT_NE(mixed[i].outcome.reason.find("body "), std::string::npos) << mixed[i].outcome.reason;
+    } else {
+      EXPECT_EQ(mixed[i].outcome.status, RunStatus::ok);
+      EXPECT_EQ(mixed[i].end, calm[i].end);
+    }
+  }
+}
+
 }  // namespace
 }  // namespace limber::fem
