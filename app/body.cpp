@@ -81,16 +81,15 @@ Json prepare_body(const BodySource& source, const PrepareSettings& settings, con
     return read_json(folder / "report.json");
   }
   log::info("{}: preparing {}", folder.string(), source.model);
-  make_folder(folder);
-  std::error_code ignored;
-  fs::remove(folder / "report.json",
-             ignored);  // what is in the folder counts again when a new report says so
-
   Stopwatch watch;
   Json seconds;
   const meshing::ImportedModel model = source.load();
   validate(model.surface, source.model);
   seconds["import"] = watch.lap();
+
+  make_folder(folder);  // not before: a model that cannot be read leaves nothing behind
+  std::error_code ignored;
+  fs::remove(folder / "report.json", ignored);  // what is in the folder counts again when a new report says so
   throw_if_stopped();
 
   const meshing::Decomposition decomposition =
