@@ -89,7 +89,8 @@ Json prepare_body(const BodySource& source, const PrepareSettings& settings, con
 
   make_folder(folder);  // not before: a model that cannot be read leaves nothing behind
   std::error_code ignored;
-  fs::remove(folder / "report.json", ignored);  // what is in the folder counts again when a new report says so
+  fs::remove(folder / "report.json",
+             ignored);  // what is in the folder counts again when a new report says so
   throw_if_stopped();
 
   const meshing::Decomposition decomposition =
