@@ -115,7 +115,15 @@ fem::World build_world(const scenes::Scene& scene, const std::vector<PreparedBod
   spec.walls = scene.walls;
   spec.gravity_m_s2 = scene.gravity_m_s2;
   spec.max_dt_s = scene.max_dt_s.value_or(0);
-  return fem::build_world(spec);
+  try {
+    return fem::build_world(spec);
+  } catch (const InputError& error) {
+    for (const scenes::BodySpec& body : scene.bodies)  // the first that is named has the place
+      if (fmt::format(" {} ", error.what()).find(fmt::format(" {} ", body.name)) != std::string::npos ||
+          std::string_view(error.what()).find(fmt::format("body {}:", body.name)) != std::string_view::npos)
+        throw InputError(fmt::format("{}: {}", body.where, error.what()));
+    throw InputError(fmt::format("scene {}: {}", scene.name, error.what()));
+  }
 }
 
 }  // namespace limber::app

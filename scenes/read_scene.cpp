@@ -332,6 +332,7 @@ BodySpec read_body(const Node& table, const Box& bounds) {
   body.fixed = read_fixed(child(table, "fixed"));
   body.color_srgb = read_body_color(table, body.role);
   check_inside(body, bounds, child(pose, "position_m"), what);
+  body.where = child(pose, "position_m").where.text();
   return body;
 }
 

@@ -85,6 +85,7 @@ struct BodySpec {
   Pose pose;
   FixedSpec fixed;
   Vec3 color_srgb = Vec3::Zero();  // 0 … 1
+  std::string where;               // "scene.toml:12:24": its place in the text, for complaints
 };
 
 struct Goal {

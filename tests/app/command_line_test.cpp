@@ -184,8 +184,8 @@ TEST_F(Program, BadScenesAreRefusedWithAPlaceAndAWayOut) {
       {replaced("role = \"obstacle\"", "role = \"robot\""), "scene.toml:", "robot"},
       {replaced("size_m = [0.6, 0.6, 0.6]", "size_m = [0, 0.6, 0.6]"), "scene.toml:9:", ""},
       {replaced("max_force_n = 100", "max_force_n = nan"), "scene.toml:31:15", ""},
-      {replaced("pose = { position_m = [0.6, 1, 1.3] }", "pose = { position_m = [1.9, 1, 1] }"), "",
-       "overlap"},
+      {replaced("pose = { position_m = [0.6, 1, 1.3] }", "pose = { position_m = [1.9, 1, 1] }"),
+       "scene.toml:12:23", "overlap"},
   };
   for (const Case& c : cases) {
     const Result run = limber_program({"plan", scene(c.text), "-o", out()});
