@@ -55,6 +55,17 @@ Box box_of_motion(const Motion& motion) {
   return box;
 }
 
+// From over the photographer's left shoulder, so that what faces the camera is lit, and shadows fall to the
+// right and away.
+Vec3 toward_key_light(const render::Camera& camera) {
+  constexpr double to_the_left_deg = 40, height = 1.3;  // height: over the horizontal distance
+  const Vec3 view = camera.eye - camera.target;
+  const Vec3 level(view.x(), view.y(), 0);
+  if (level.norm() < 1e-3 * view.norm()) return Vec3(-0.5, -0.6, 1);  // looking straight down
+  return Eigen::AngleAxisd(-to_the_left_deg * EIGEN_PI / 180, Vec3::UnitZ()) * level.normalized() +
+         Vec3(0, 0, height);
+}
+
 Motion motion_of(const PlanFolder& planned, const std::vector<PreparedBody>& bodies, const fem::World& world,
                  std::pair<int, int> size) {
   const scenes::Scene& scene = planned.scene;
@@ -73,6 +84,8 @@ Motion motion_of(const PlanFolder& planned, const std::vector<PreparedBody>& bod
   for (const scenes::Keyframe& key : scene.camera.keyframes)
     motion.cameras.push_back(
         {key.at, {.eye = key.eye_m, .target = key.target_m, .fov_deg = scene.camera.fov_deg}});
+
+  motion.look.toward_key = toward_key_light(motion.cameras.front().camera);
 
   Hasher hasher;
   hasher.text(version)

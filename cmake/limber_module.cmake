@@ -40,8 +40,12 @@ function(limber_tests NAME)
     LIMBER_SHARED_DATA="${LIMBER_SHARED_DATA}" LIMBER_SOURCE_DIR="${PROJECT_SOURCE_DIR}"
     LIMBER_BINARY_DIR="${PROJECT_BINARY_DIR}")
   include(GoogleTest)
+  set(environment)
+  if(LIMBER_SANITIZE MATCHES address)
+    set(environment ENVIRONMENT "LSAN_OPTIONS=suppressions=${PROJECT_SOURCE_DIR}/tools/lsan.supp:print_suppressions=0")
+  endif()
   gtest_discover_tests(${NAME}_tests TEST_PREFIX ${NAME}. DISCOVERY_TIMEOUT 60
-                       PROPERTIES LABELS "${NAME};${T_LABELS}" TIMEOUT 600)
+                       PROPERTIES LABELS "${NAME};${T_LABELS}" TIMEOUT 600 ${environment})
 endfunction()
 
 # Writes the module map where the layering test reads it.
