@@ -27,10 +27,10 @@ function(limber_module NAME)
   set_property(GLOBAL PROPERTY LIMBER_OWNS_${NAME} "${M_OWNS}")
 endfunction()
 
-# limber_tests(MODULE SOURCES … [LABELS …]): the executable MODULE_tests; one ctest a TEST.
-# LABELS slow keeps a suite out of the sanitizer runs.
+# limber_tests(NAME SOURCES … USES module …): the executable NAME_tests; one ctest a TEST, labelled NAME. A suite whose name
+# ends in _slow stays out of the sanitizer runs.
 function(limber_tests NAME)
-  cmake_parse_arguments(T "" "" "SOURCES;USES;LABELS" ${ARGN})
+  cmake_parse_arguments(T "" "" "SOURCES;USES" ${ARGN})
   add_executable(${NAME}_tests ${T_SOURCES})
   foreach(module ${T_USES})
     target_link_libraries(${NAME}_tests PRIVATE limber_${module})
@@ -45,7 +45,7 @@ function(limber_tests NAME)
     set(environment ENVIRONMENT "LSAN_OPTIONS=suppressions=${PROJECT_SOURCE_DIR}/tools/lsan.supp:print_suppressions=0")
   endif()
   gtest_discover_tests(${NAME}_tests TEST_PREFIX ${NAME}. DISCOVERY_TIMEOUT 60
-                       PROPERTIES LABELS "${NAME};${T_LABELS}" TIMEOUT 600 ${environment})
+                       PROPERTIES LABELS ${NAME} TIMEOUT 600 ${environment})
 endfunction()
 
 # Writes the module map where the layering test reads it.
