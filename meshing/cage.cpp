@@ -200,8 +200,10 @@ Cage build_cage(const SurfaceMesh& surface, const std::vector<ConvexShell>& shel
   if (options.mode != CageMode::paper) cage.shell_from_tet = label_tets(cage.mesh, shells);
   cage.components = component_count(cage.mesh.tets);
   if (cage.components > 1)
-    cage.notes.push_back(
-        fmt::format("the cage has {} pieces, because the model has parts that lie apart", cage.components));
+    cage.notes.push_back(fmt::format("the cage has {} pieces, because {}", cage.components,
+                                     options.mode == CageMode::paper
+                                         ? "shells that share no corner are not joined"
+                                         : "the model has parts that lie apart"));
   return cage;
 }
 
