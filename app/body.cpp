@@ -1,5 +1,6 @@
 #include "app/body.h"
 
+#include "app/export.h"
 #include "core/error.h"
 #include "core/hash.h"
 #include "core/log.h"
@@ -91,6 +92,8 @@ Json prepare_body(const BodySource& source, const PrepareSettings& settings, con
   std::error_code ignored;
   fs::remove(folder / "report.json",
              ignored);  // what is in the folder counts again when a new report says so
+  for (const char* name : export_files)
+    fs::remove(folder / name, ignored);  // they would be of the body before
   throw_if_stopped();
 
   const meshing::Decomposition decomposition =
@@ -180,7 +183,7 @@ PreparedBody read_body(const fs::path& folder) {
         throw InputError(
             fmt::format("{}: is not the file that report.json was written for", (folder / name).string()));
     body.surface = read_ply(folder / "surface.ply");
-    body.cage = read_msh(folder / "cage.msh");
+    body.cage = read_msh(folder / "cage.msh", &body.shell_from_tet);
     body.binding = ffd::read_binding(folder / "binding.npz", body.surface, body.cage);
   } catch (const InputError& error) {
     throw InputError(fmt::format(

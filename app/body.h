@@ -37,6 +37,7 @@ Json prepare_body(const BodySource&, const PrepareSettings&, const fs::path& fol
 struct PreparedBody {
   SurfaceMesh surface;
   TetMesh cage;
+  std::vector<int> shell_from_tet;  // (T)
   ffd::Binding binding;
   Json report;
 };

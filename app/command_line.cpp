@@ -4,6 +4,7 @@
 #include <new>
 
 #include "app/commands.h"
+#include "app/export.h"
 #include "core/error.h"
 #include "core/log.h"
 #include "core/progress.h"
@@ -156,6 +157,16 @@ int run_command_line(int argc, const char* const* argv) {
       ->check(CLI::Range(1e-9, 1e9))
       ->capture_default_str();
   prepare_command.add_flag("--y-up", prepare_options.y_up, "the model has +Y up; turn it to +Z");
+  prepare_command
+      .add_option(
+          "--export", prepare_options.exports,
+          "files for other programs, also of a body that is up to date; any of vtu (ParaView: cage.vtu, "
+          "surface.vtu), node (TetGen: cage.node, cage.ele), interp (Vega FEM: cage.veg, surface.interp, "
+          "surface.obj)")
+      ->type_name("FORMAT[,FORMAT…]")
+      ->delimiter(',')
+      ->check(CLI::IsMember(export_formats))
+      ->allow_extra_args(false);
   add_global(prepare_command, global), add_threads(prepare_command, global);
   prepare_command.callback([&] { chosen = [&] { return prepare(prepare_options); }; });
 

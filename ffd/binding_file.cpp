@@ -73,4 +73,16 @@ Binding read_binding(const fs::path& path, const SurfaceMesh& surface, const Tet
   return binding;
 }
 
+void write_interp(const fs::path& path, const Binding& binding, const Tets& tets) {
+  std::string text;
+  for (Eigen::Index v = 0; v < binding.tet_from_vertex.size(); ++v) {
+    fmt::format_to(std::back_inserter(text), "{}", v);
+    for (int k = 0; k < 4; ++k)
+      fmt::format_to(std::back_inserter(text), " {} {}", tets(binding.tet_from_vertex[v], k),
+                     binding.weights(v, k));
+    text += '\n';
+  }
+  write_file(path, text);
+}
+
 }  // namespace limber::ffd

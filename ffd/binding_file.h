@@ -13,4 +13,8 @@ void write_binding(const fs::path&, const Binding&, const SurfaceMesh&, const Te
 // than these (then the text names the command that renews it).
 Binding read_binding(const fs::path&, const SurfaceMesh&, const TetMesh& cage);
 
+// Vega FEM's .interp, which goes with core/export_files.h's .veg: a line for each vertex of the surface, its
+// number and four pairs of a cage node and its weight, all counted from 0.
+void write_interp(const fs::path&, const Binding&, const Tets& cage_tets);
+
 }  // namespace limber::ffd

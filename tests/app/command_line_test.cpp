@@ -2,7 +2,9 @@
 #include <gtest/gtest.h>
 #include <signal.h>
 #include <sys/resource.h>
+#include <sys/wait.h>
 
+#include <cstdlib>
 #include <fstream>
 
 #include "app/commands.h"
@@ -276,6 +278,31 @@ TEST_F(Program, PrepareReportsAndVerifyProvesAgain) {
   EXPECT_EQ(limber_program({"info", out()}).code, exit_done);
   for (const char* name : {"surface.ply", "shells.obj", "cage.msh", "binding.npz", "report.json"})
     EXPECT_EQ(limber_program({"info", (fs::path(out()) / name).string()}).code, exit_done) << name;
+}
+
+TEST_F(Program, ExportsAreWrittenAlsoOfABodyThatIsUpToDateAndGoWithIt) {
+  const std::string model = (folder / "tetrahedron.obj").string();
+  std::ofstream(model) << "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n";
+  ASSERT_EQ(limber_program({"prepare", model, "-o", out(), "--tets", "100"}).code, exit_done);
+  const Result exported = limber_program(
+      {"prepare", model, "-o", out(), "--tets", "100", "--export", "vtu,node,interp", "--json"});
+  ASSERT_EQ(exported.code, exit_done) << exported.err;
+  EXPECT_NE(exported.err.find("up to date"), std::string::npos) << exported.err;
+  const Json files = exported.json().at("exports");
+  EXPECT_EQ(files.size(), 7);
+  for (const Json& name : files) EXPECT_TRUE(fs::exists(fs::path(out()) / name)) << name;
+
+  const std::string command = LIMBER_SOURCE_DIR "/tools/check_exports '" + out() + "'";
+  const int status = std::system(command.c_str());
+  ASSERT_TRUE(WIFEXITED(status));
+
+  ASSERT_EQ(limber_program({"prepare", model, "-o", out(), "--tets", "200"}).code, exit_done);
+  for (const Json& name : files)
+    EXPECT_FALSE(fs::exists(fs::path(out()) / name)) << name << " is of the old cage";
+
+  EXPECT_EQ(limber_program({"prepare", model, "-o", out(), "--export", "vtk"}).code, exit_bad_input);
+  if (WEXITSTATUS(status) == 77) GTEST_SKIP() << "no other program's reader is installed: see " << command;
+  EXPECT_EQ(WEXITSTATUS(status), 0);
 }
 
 }  // namespace

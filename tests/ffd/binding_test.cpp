@@ -7,6 +7,7 @@
 #include <cmath>
 #include <fstream>
 #include <functional>
+#include <sstream>
 
 #include "core/error.h"
 #include "core/npz.h"
@@ -390,6 +391,31 @@ TEST_F(BindingFile, RoundTrip) {
   EXPECT_EQ(back.outside, 1);
   EXPECT_EQ(back.farthest_outside_vertex, 0);
   EXPECT_EQ(back.max_outside_distance_m, binding.max_outside_distance_m);
+}
+
+// Vega's form: the vertex, then four times a node of the cage and its weight.
+TEST_F(BindingFile, InterpRebuildsTheSurface) {
+  write_interp(folder / "a.interp", bind(surface, cage), cage.tets);
+  std::ifstream in(folder / "a.interp");
+  for (Eigen::Index v = 0; v < surface.positions.rows(); ++v) {
+    std::string line;
+    std::getline(in, line);
+    std::istringstream numbers(line);
+    Eigen::Index vertex = -1;
+    numbers >> vertex;
+    EXPECT_EQ(vertex, v);
+    Vec3 sum = Vec3::Zero();
+    for (int k = 0; k < 4; ++k) {
+      int node = -1;
+      double weight = 0;
+      numbers >> node >> weight;
+      ASSERT_TRUE(numbers && node >= 0 && node < cage.positions.rows()) << line;
+      sum += weight * cage.positions.row(node).transpose();
+    }
+    EXPECT_LT((sum - surface.positions.row(v).transpose()).norm(), 1e-14);
+    EXPECT_TRUE((numbers >> std::ws).eof()) << line;
+  }
+  EXPECT_EQ(in.get(), std::ifstream::traits_type::eof());
 }
 
 TEST_F(BindingFile, OtherMeshesAreRefusedWithTheCommandThatRenewsIt) {

@@ -1,0 +1,119 @@
+#include "core/export_files.h"
+
+#include <algorithm>
+#include <map>
+
+#include "core/error.h"
+
+namespace limber {
+
+namespace {
+
+// fmt's {} of a double is the shortest text that reads back as the same double.
+template <class... Numbers>
+void append_line(std::string& text, const Numbers&... numbers) {
+  const std::size_t begin = text.size();
+  ((fmt::format_to(std::back_inserter(text), "{} ", numbers)), ...);
+  if (text.size() > begin) text.back() = '\n';
+}
+
+constexpr const char* vtk_type(const std::vector<int>&) { return "Int32"; }
+constexpr const char* vtk_type(const std::vector<std::int64_t>&) { return "Int64"; }
+constexpr const char* vtk_type(const std::vector<std::uint8_t>&) { return "UInt8"; }
+constexpr const char* vtk_type(const std::vector<double>&) { return "Float64"; }
+
+template <class T>
+void append_data_array(std::string& xml, const std::string& name, const std::vector<T>& values,
+                       int components) {
+  fmt::format_to(std::back_inserter(xml), "<DataArray type=\"{}\" Name=\"{}\"{} format=\"ascii\">\n",
+                 vtk_type(values), name,
+                 components == 1 ? "" : fmt::format(" NumberOfComponents=\"{}\"", components));
+  for (std::size_t i = 0; i < values.size(); ++i)
+    fmt::format_to(std::back_inserter(xml), "{}{}", values[i],
+                   (i + 1) % std::size_t(components) ? ' ' : '\n');
+  xml += "</DataArray>\n";
+}
+
+void append_data(std::string& xml, const char* kind, const std::vector<VtuData>& data, Eigen::Index count) {
+  fmt::format_to(std::back_inserter(xml), "<{}>\n", kind);
+  for (const VtuData& d : data)
+    std::visit(
+        [&](const auto& values) {
+          LIMBER_CHECK(values.size() == std::size_t(count) * std::size_t(d.components), d.name, values.size(),
+                       count);
+          append_data_array(xml, d.name, values, d.components);
+        },
+        d.values);
+  fmt::format_to(std::back_inserter(xml), "</{}>\n", kind);
+}
+
+void check_label(const TetMesh& mesh, const std::vector<int>& label) {
+  LIMBER_CHECK(label.empty() || label.size() == std::size_t(mesh.tets.rows()), label.size(),
+               mesh.tets.rows());
+}
+
+}  // namespace
+
+void write_vtu(const fs::path& path, const Points& points, const Eigen::Ref<const Cells>& cells,
+               const std::vector<VtuData>& point_data, const std::vector<VtuData>& cell_data) {
+  const Eigen::Index corners = cells.cols(), count = cells.rows();
+  LIMBER_CHECK(corners == 3 || corners == 4, corners);
+  std::string xml = fmt::format(
+      "<?xml version=\"1.0\"?>\n"
+      "<VTKFile type=\"UnstructuredGrid\" version=\"1.0\" byte_order=\"LittleEndian\">\n"
+      "<UnstructuredGrid>\n<Piece NumberOfPoints=\"{}\" NumberOfCells=\"{}\">\n",
+      points.rows(), count);
+  append_data(xml, "PointData", point_data, points.rows());
+  append_data(xml, "CellData", cell_data, count);
+  xml += "<Points>\n";
+  append_data_array(xml, "Points", std::vector<double>(points.data(), points.data() + points.size()), 3);
+  xml += "</Points>\n<Cells>\n";
+  std::vector<std::int64_t> connectivity, offsets;
+  for (Eigen::Index c = 0; c < count; ++c) {
+    for (Eigen::Index k = 0; k < corners; ++k) connectivity.push_back(cells(c, k));
+    offsets.push_back(corners * (c + 1));
+  }
+  constexpr std::uint8_t vtk_triangle = 5, vtk_tetra = 10;
+  append_data_array(xml, "connectivity", connectivity, 1);  // VTK refuses it in rows of `corners`
+  append_data_array(xml, "offsets", offsets, 1);
+  append_data_array(xml, "types", std::vector(std::size_t(count), corners == 3 ? vtk_triangle : vtk_tetra),
+                    1);
+  write_file(path, xml + "</Cells>\n</Piece>\n</UnstructuredGrid>\n</VTKFile>\n");
+}
+
+void write_node_ele(const fs::path& node_file, const TetMesh& mesh, const std::vector<int>& label) {
+  check_label(mesh, label);
+  std::string nodes = fmt::format("{} 3 0 0\n", mesh.positions.rows());
+  for (Eigen::Index v = 0; v < mesh.positions.rows(); ++v)
+    append_line(nodes, v, mesh.positions(v, 0), mesh.positions(v, 1), mesh.positions(v, 2));
+  std::string elements = fmt::format("{} 4 {}\n", mesh.tets.rows(), label.empty() ? 0 : 1);
+  for (Eigen::Index t = 0; t < mesh.tets.rows(); ++t) {
+    append_line(elements, t, mesh.tets(t, 0), mesh.tets(t, 1), mesh.tets(t, 2), mesh.tets(t, 3));
+    if (!label.empty()) elements.back() = ' ', append_line(elements, label[std::size_t(t)]);
+  }
+  write_file(node_file, nodes);
+  write_file(fs::path(node_file).replace_extension(".ele"), elements);
+}
+
+void write_veg(const fs::path& path, const TetMesh& mesh, const std::vector<int>& label) {
+  check_label(mesh, label);
+  std::string text = fmt::format("*VERTICES\n{} 3 0 0\n", mesh.positions.rows());
+  for (Eigen::Index v = 0; v < mesh.positions.rows(); ++v)
+    append_line(text, v + 1, mesh.positions(v, 0), mesh.positions(v, 1), mesh.positions(v, 2));
+  fmt::format_to(std::back_inserter(text), "\n*ELEMENTS\nTET\n{} 4 0\n", mesh.tets.rows());
+  for (Eigen::Index t = 0; t < mesh.tets.rows(); ++t)
+    append_line(text, t + 1, mesh.tets(t, 0) + 1, mesh.tets(t, 1) + 1, mesh.tets(t, 2) + 1,
+                mesh.tets(t, 3) + 1);
+  std::map<int, std::vector<Eigen::Index>> sets;
+  for (std::size_t t = 0; t < label.size(); ++t) sets[label[t]].push_back(Eigen::Index(t) + 1);
+  constexpr std::size_t numbers_a_line = 10;  // Vega reads lines of up to 1023 letters
+  for (const auto& [name, tets] : sets) {
+    fmt::format_to(std::back_inserter(text), "\n*SET label_{}\n", name);
+    for (std::size_t i = 0; i < tets.size(); ++i)
+      fmt::format_to(std::back_inserter(text), "{}{}", tets[i],
+                     i + 1 == tets.size() || (i + 1) % numbers_a_line == 0 ? ",\n" : ", ");
+  }
+  write_file(path, text);
+}
+
+}  // namespace limber

@@ -1,0 +1,35 @@
+// Mesh files for other programs. limber writes them and never reads them: each number has the digits that
+// bring back the same double. Which program reads what: docs/files.md. Each throws DiskError (core/file.h).
+#pragma once
+
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "core/file.h"
+#include "core/mesh.h"
+
+namespace limber {
+
+// An array of ParaView's: `components` numbers for each point or cell, one after the other.
+struct VtuData {
+  std::string name;  // letters, digits and _
+  std::variant<std::vector<int>, std::vector<double>> values;
+  int components = 1;
+};
+
+using Cells = Eigen::Matrix<int, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+
+// VTK's XML of an unstructured grid, ASCII. cells: (n × 3) triangles or (n × 4) tets.
+void write_vtu(const fs::path&, const Points&, const Eigen::Ref<const Cells>& cells,
+               const std::vector<VtuData>& point_data, const std::vector<VtuData>& cell_data);
+
+// TetGen's pair, numbered from 0: `node_file` and, beside it, the same name with .ele. `label` (per tet, may
+// be empty) is the attribute of each tet.
+void write_node_ele(const fs::path& node_file, const TetMesh&, const std::vector<int>& label = {});
+
+// Vega FEM's .veg, numbered from 1: *VERTICES, *ELEMENTS TET, and a *SET label_i for each label. No *MATERIAL
+// and no *REGION: Vega then takes its own defaults, and says so.
+void write_veg(const fs::path&, const TetMesh&, const std::vector<int>& label = {});
+
+}  // namespace limber
