@@ -24,7 +24,7 @@ enum class InstructionSet { automatic, sse2, avx2, avx512 };
 // Scratch memory of one thread; `world` must outlive it.
 class Batch {
  public:
-  // lanes: 1, 8 or 16. Throws InputError when the machine lacks the instruction set.
+  // lanes: 1, 4, 8 or 16. Throws InputError when the machine lacks the instruction set.
   explicit Batch(const World& world, int lanes = 16, InstructionSet = InstructionSet::automatic);
   ~Batch();
   Batch(Batch&&) noexcept;

@@ -17,11 +17,19 @@ void advance(const World& world, const Control& control, ReferenceState& state) 
 }
 
 std::vector<double> elastic_forces(const World& world, const ReferenceState& state) {
-  const auto& t = world.tables64;
-  std::vector<double> forces(state.positions.size(), 0.0);
+  const auto place = detail::state_layout(1), push = detail::force_layout(1);
+  const int nodes = int(state.positions.size()) / 3;
+  std::vector<double> records(std::size_t(nodes * place.node), 0.0), f(std::size_t(nodes * push.node), 0.0),
+      forces;
+  for (int n = 0; n < nodes; ++n)
+    for (int c = 0; c < 3; ++c) {
+      records[place.at(n, c)] = state.positions[3 * n + c];
+      records[place.at(n, c) + 4] = state.velocities[3 * n + c];
+    }
   detail::kernels<double>(detail::best_isa(), 1)
-      .elastic({t.springs.data(), int(t.springs.size()), t.volumes.data(), int(t.volumes.size())},
-               state.positions.data(), state.velocities.data(), forces.data());
+      .elastic(detail::elements_of(world.tables64), records.data(), records.data() + 4, f.data());
+  for (int n = 0; n < nodes; ++n)
+    for (int c = 0; c < 3; ++c) forces.push_back(f[push.at(n, c)]);
   return forces;
 }
 

@@ -172,6 +172,28 @@ double mean_edge(const Body& body) {
   return sum / double(6 * body.cage.tets.rows());
 }
 
+// The last block repeats the last element.
+void pack(detail::Tables<float>& t) {
+  constexpr std::size_t size = detail::block_size;
+  t.spring_blocks.resize((t.springs.size() + size - 1) / size);
+  t.volume_blocks.resize((t.volumes.size() + size - 1) / size);
+  for (std::size_t e = 0; e < t.spring_blocks.size() * size; ++e) {
+    const auto& s = t.springs[std::min(e, t.springs.size() - 1)];
+    auto& block = t.spring_blocks[e / size];
+    const std::size_t k = e % size;
+    block.i[k] = s.i, block.j[k] = s.j;
+    block.rest_length[k] = s.rest_length, block.stiffness[k] = s.stiffness, block.damping[k] = s.damping;
+  }
+  for (std::size_t e = 0; e < t.volume_blocks.size() * size; ++e) {
+    const auto& q = t.volumes[std::min(e, t.volumes.size() - 1)];
+    auto& block = t.volume_blocks[e / size];
+    const std::size_t k = e % size;
+    for (int i = 0; i < 4; ++i) block.node[i][k] = q.node[i];
+    block.rest_volume6[k] = q.rest_volume6, block.stiffness[k] = q.stiffness;
+    block.inverted_stiffness[k] = q.inverted_stiffness, block.damping[k] = q.damping;
+  }
+}
+
 template <class To>
 detail::Tables<To> converted(const detail::Tables<double>& t) {
   detail::Tables<To> out;
@@ -364,6 +386,7 @@ World build_world(const WorldSpec& spec) {
     tables.skin.push_back(0.2 * mean_edge(a));
   }
   world.tables = converted<float>(tables);
+  pack(world.tables);
   choose_step(spec.max_dt_s, world);
   check_places(world);
   return world;

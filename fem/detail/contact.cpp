@@ -27,7 +27,7 @@ Real det_from(const Real* p, const Real* a, const Real* b, const Real* c) {
 
 template <class Real>
 void fetch(const LaneView<Real>& view, int node, Real out[3]) {
-  for (int c = 0; c < 3; ++c) out[c] = view.x[(3 * node + c) * view.stride];
+  for (int c = 0; c < 3; ++c) out[c] = view.x[view.state.at(node, c)];
 }
 
 // Inward normals of a tet's faces, each twice as long as the face is large: 6V of (face, p) gains normal·δ
@@ -485,7 +485,7 @@ void Contacts<Real>::respond(const LaneView<Real>& view, Real friction, const To
   Real inverse_mass = 0, relative[3] = {0, 0, 0};
   for (int i = 0; i < 6; ++i) {
     inverse_mass += share[i] * share[i] * tables_.inverse_mass[node[i]];
-    for (int c = 0; c < 3; ++c) relative[c] += share[i] * view.v[(3 * node[i] + c) * view.stride];
+    for (int c = 0; c < 3; ++c) relative[c] += share[i] * view.v[view.state.at(node[i], c)];
   }
   if (!(inverse_mass > 0)) return;
   const Real beta = Real(point.share[1] > 0 ? contact_edge_beta : contact_beta);
@@ -494,7 +494,7 @@ void Contacts<Real>::respond(const LaneView<Real>& view, Real friction, const To
     return;
   for (int i = 0; i < 6; ++i)
     if (tables_.inverse_mass[node[i]] > 0)
-      for (int c = 0; c < 3; ++c) view.f[(3 * node[i] + c) * view.stride] += share[i] * force[c];
+      for (int c = 0; c < 3; ++c) view.f[view.force.at(node[i], c)] += share[i] * force[c];
 }
 
 template <class Real>
@@ -508,15 +508,15 @@ void Contacts<Real>::add_wall_forces(const LaneView<Real>& view, int body) const
       Real normal[3] = {0, 0, 0};
       normal[axis] = out;
       for (int n : topology_.bodies[body].surface_nodes) {
-        const Real depth = out * (wall - view.x[(3 * n + axis) * view.stride]);
+        const Real depth = out * (wall - view.x[view.state.at(n, axis)]);
         if (!(depth > 0) || !(tables_.inverse_mass[n] > 0)) continue;
-        const Real velocity[3] = {view.v[3 * n * view.stride], view.v[(3 * n + 1) * view.stride],
-                                  view.v[(3 * n + 2) * view.stride]};
+        const Real velocity[3] = {view.v[view.state.at(n, 0)], view.v[view.state.at(n, 1)],
+                                  view.v[view.state.at(n, 2)]};
         Real force[3];
         if (!penalty_force(Real(contact_beta), depth, normal, velocity, tables_.node_mass[n], step_,
                            tables_.pair_friction[body * bodies_ + body], force))
           continue;
-        for (int c = 0; c < 3; ++c) view.f[(3 * n + c) * view.stride] += force[c];
+        for (int c = 0; c < 3; ++c) view.f[view.force.at(n, c)] += force[c];
       }
     }
 }

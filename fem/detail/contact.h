@@ -20,12 +20,13 @@ inline constexpr double contact_edge_beta = 0.2;  // middles of edges: a vertex 
 inline constexpr double contact_damping_ratio = 0.3;
 inline constexpr double contact_slip_stop = 0.5;
 
-// One lane's arrays: component c of node n is at [(3n + c) stride].
+// One lane's arrays.
 template <class Real>
 struct LaneView {
   const Real *x, *v;
   Real* f;
-  int stride;
+  Layout state, force;  // of x and v, of f
+  int stride;           // lanes
   // Boxes of the bodies, [(3 body + c) stride], and how far each body's fastest node can have come since
   // load, [body stride].
   const Real *lower, *upper, *travel;

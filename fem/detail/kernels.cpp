@@ -28,8 +28,9 @@ const Kernels<float>& kernels(Isa isa, int lanes) {
   const Kernels<float>* all = isa == Isa::avx512 ? avx512_float()
                               : isa == Isa::avx2 ? avx2_float()
                                                  : sse2_float();
-  LIMBER_CHECK(lanes == 1 || lanes == 8 || lanes == 16, lanes);
-  return all[lanes == 1 ? 0 : lanes == 8 ? 1 : 2];
+  for (int k = 0; k < 4; ++k)
+    if (all[k].lanes == lanes) return all[k];
+  LIMBER_CHECK(false, lanes);
 }
 
 template <>

@@ -1,6 +1,8 @@
 // The kernels in AVX2.
 #include "fem/detail/kernels.h"
 
+#include <immintrin.h>
+
 namespace limber::fem::detail {
 namespace {
 #include "fem/detail/kernels.inc"

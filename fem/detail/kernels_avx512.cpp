@@ -1,6 +1,8 @@
 // The kernels in AVX-512 (F, DQ, VL, BW).
 #include "fem/detail/kernels.h"
 
+#include <immintrin.h>
+
 namespace limber::fem::detail {
 namespace {
 #include "fem/detail/kernels.inc"

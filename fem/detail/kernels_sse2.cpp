@@ -1,6 +1,8 @@
 // The kernels in SSE2, which every x86-64 has.
 #include "fem/detail/kernels.h"
 
+#include <immintrin.h>
+
 namespace limber::fem::detail {
 namespace {
 #include "fem/detail/kernels.inc"

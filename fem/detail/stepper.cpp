@@ -32,15 +32,19 @@ Stepper<Real>::Stepper(const World& world, int lanes, Isa isa)
       kernels_(kernels<Real>(isa, lanes)),
       lanes_(lanes),
       contacts_(world, lanes),
+      state_layout_(state_layout(lanes)),
+      force_layout_(force_layout(lanes)),
+      first_velocity_(lanes == 1 ? 4 : world.nodes * state_layout_.node),
       controls_(std::size_t(lanes)),
       contact_(std::size_t(lanes), false) {
-  const std::size_t values = std::size_t(3 * world.nodes * lanes),
-                    bodies = world.bodies.size() * std::size_t(lanes);
-  x_.resize(values), v_.assign(values, 0), f_.assign(values, 0);
+  const std::size_t nodes = std::size_t(world.nodes), bodies = world.bodies.size() * std::size_t(lanes);
+  state_.assign(nodes * std::size_t(lanes == 1 ? 8 : 6 * lanes), 0);
+  f_.assign(nodes * std::size_t(force_layout_.node), 0);
   push_.assign(std::size_t(3 * world.bodies[world.robot].node_count() * lanes), 0);
   lower_.resize(3 * bodies), upper_.resize(3 * bodies);
   speed2_.assign(bodies, 0), travel_.assign(bodies, 0);
-  for (int k = 0; k < 3 * world.nodes; ++k) std::fill_n(&x_[k * lanes], lanes, tables_.rest_positions[k]);
+  for (int n = 0; n < world.nodes; ++n)
+    for (int c = 0; c < 3; ++c) std::fill_n(&x(0, n, c), lanes, tables_.rest_positions[3 * n + c]);
   const std::vector<Real> still(std::size_t(3 * world.moving_nodes), 0);
   for (int lane = 0; lane < lanes; ++lane) load(lane, tables_.rest_positions.data(), still.data(), {}, false);
 }
@@ -48,17 +52,18 @@ Stepper<Real>::Stepper(const World& world, int lanes, Isa isa)
 template <class Real>
 void Stepper<Real>::load(int lane, const Real* positions, const Real* velocities, const Control& control,
                          bool contact) {
-  for (int k = 0; k < 3 * world_.moving_nodes; ++k) {
-    x_[k * lanes_ + lane] = positions[k];
-    v_[k * lanes_ + lane] = velocities[k];
-  }
+  for (int n = 0; n < world_.moving_nodes; ++n)
+    for (int c = 0; c < 3; ++c) {
+      x(lane, n, c) = positions[3 * n + c];
+      v(lane, n, c) = velocities[3 * n + c];
+    }
   for (std::size_t b = 0; b < world_.bodies.size(); ++b) {
     const Topology::Body& body = world_.topology.bodies[b];
     for (int c = 0; c < 3; ++c) {
       Real lower = std::numeric_limits<Real>::max(), upper = -lower;
       for (int n = body.first_node; n < body.last_node; ++n) {
-        lower = std::min(lower, x_[(3 * n + c) * lanes_ + lane]);
-        upper = std::max(upper, x_[(3 * n + c) * lanes_ + lane]);
+        lower = std::min(lower, x(lane, n, c));
+        upper = std::max(upper, x(lane, n, c));
       }
       lower_[(3 * b + c) * lanes_ + lane] = lower;
       upper_[(3 * b + c) * lanes_ + lane] = upper;
@@ -79,15 +84,21 @@ void Stepper<Real>::load(int lane, const Real* positions, const Real* velocities
 
 template <class Real>
 void Stepper<Real>::store(int lane, Real* positions, Real* velocities) const {
-  for (int k = 0; k < 3 * world_.moving_nodes; ++k) {
-    positions[k] = x_[k * lanes_ + lane];
-    velocities[k] = v_[k * lanes_ + lane];
-  }
+  for (int n = 0; n < world_.moving_nodes; ++n)
+    for (int c = 0; c < 3; ++c) {
+      const std::size_t k = std::size_t(state_layout_.at(n, c) + lane);
+      positions[3 * n + c] = state_[k];
+      velocities[3 * n + c] = state_[std::size_t(first_velocity_) + k];
+    }
 }
 
 template <class Real>
 LaneView<Real> Stepper<Real>::view(int lane) {
-  return {&x_[lane], &v_[lane], &f_[lane], lanes_, &lower_[lane], &upper_[lane], &travel_[lane]};
+  return {&state_[lane], &state_[first_velocity_ + lane],
+          &f_[lane],     state_layout_,
+          force_layout_, lanes_,
+          &lower_[lane], &upper_[lane],
+          &travel_[lane]};
 }
 
 template <class Real>
@@ -97,11 +108,10 @@ void Stepper<Real>::pull_towards_goal(int lane) {
   const Real most = Real(control.max_force_n) / Real(robot.mass_kg);
   for (int n = 0; n < robot.node_count(); ++n) {
     if (robot.fixed[n]) continue;
-    const int first = 3 * (robot.first_node + n);
+    const int node = robot.first_node + n;
     Real way[3], length2 = 0;
     for (int c = 0; c < 3; ++c) {
-      way[c] =
-          tables_.rest_from_center[3 * n + c] + Real(control.target_m[c]) - x_[(first + c) * lanes_ + lane];
+      way[c] = tables_.rest_from_center[3 * n + c] + Real(control.target_m[c]) - x(lane, node, c);
       length2 += way[c] * way[c];
     }
     // Far away, no faster than half the force can stop within the way left.
@@ -109,7 +119,7 @@ void Stepper<Real>::pull_towards_goal(int lane) {
     const Real rate = std::min(Real(goal_frequency / 2), braking);
     Real pull[3], square = 0;
     for (int c = 0; c < 3; ++c) {
-      pull[c] = Real(2 * goal_frequency) * (rate * way[c] - v_[(first + c) * lanes_ + lane]);
+      pull[c] = Real(2 * goal_frequency) * (rate * way[c] - v(lane, node, c));
       square += pull[c] * pull[c];
     }
     const Real scale = square > most * most ? most / std::sqrt(square) : Real(1);
@@ -123,9 +133,7 @@ void Stepper<Real>::step() {
     if (contact_[lane]) contacts_.add_forces(lane, view(lane));
     if (controls_[lane].manipulation == Manipulation::interpolation) pull_towards_goal(lane);
   }
-  kernels_.elastic({tables_.springs.data(), int(tables_.springs.size()), tables_.volumes.data(),
-                    int(tables_.volumes.size())},
-                   x_.data(), v_.data(), f_.data());
+  kernels_.elastic(elements_of(tables_), state_.data(), &state_[first_velocity_], f_.data());
   for (std::size_t b = 0; b < world_.bodies.size(); ++b) {
     const Topology::Body& body = world_.topology.bodies[b];
     if (!body.moving) continue;
@@ -139,7 +147,7 @@ void Stepper<Real>::step() {
                         &upper_[3 * b * lanes_],
                         &speed2_[b * lanes_]};
     for (int c = 0; c < 3; ++c) motion.gravity[c] = Real(world_.gravity_m_s2[c]);
-    kernels_.integrate(motion, x_.data(), v_.data(), f_.data());
+    kernels_.integrate(motion, state_.data(), &state_[first_velocity_], f_.data());
     for (int lane = 0; lane < lanes_; ++lane)
       travel_[b * lanes_ + lane] += motion.dt * std::sqrt(speed2_[b * lanes_ + lane]);
   }

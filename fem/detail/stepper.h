@@ -21,6 +21,8 @@ class Stepper {
 
  private:
   LaneView<Real> view(int lane);
+  Real& x(int lane, int node, int c) { return state_[state_layout_.at(node, c) + lane]; }
+  Real& v(int lane, int node, int c) { return state_[first_velocity_ + state_layout_.at(node, c) + lane]; }
   void pull_towards_goal(int lane);
 
   const World& world_;
@@ -28,7 +30,9 @@ class Stepper {
   const Kernels<Real>& kernels_;
   int lanes_;
   Contacts<Real> contacts_;
-  std::vector<Real> x_, v_, f_;        // [node][xyz][lane]
+  Layout state_layout_, force_layout_;
+  int first_velocity_;
+  std::vector<Real> state_, f_;
   std::vector<Real> push_;             // [robot node][xyz][lane] accelerations
   std::vector<Real> lower_, upper_;    // [body][xyz][lane]
   std::vector<Real> speed2_, travel_;  // [body][lane]

@@ -9,16 +9,24 @@ namespace limber::fem::detail {
 
 template <class Real>
 struct Tables {
-  std::vector<Spring<Real>> springs;         // every edge of the moving bodies once, i < j, ascending
-  std::vector<VolumeElement<Real>> volumes;  // tets of the moving bodies
-  std::vector<Real> node_mass;               // a world node
-  std::vector<Real> inverse_mass;            // a world node; 0: never moves
-  std::vector<Real> rest_positions;          // (3 × nodes)
+  std::vector<Spring<Real>> springs;             // every edge of the moving bodies once, i < j, ascending
+  std::vector<VolumeElement<Real>> volumes;      // tets of the moving bodies
+  std::vector<SpringBlock<Real>> spring_blocks;  // the same in columns
+  std::vector<VolumeBlock<Real>> volume_blocks;
+  std::vector<Real> node_mass;       // a world node
+  std::vector<Real> inverse_mass;    // a world node; 0: never moves
+  std::vector<Real> rest_positions;  // (3 × nodes)
   std::vector<Real>
       rest_from_center;             // (3 × robot nodes) place in the rest shape seen from its centre of mass
   std::vector<Real> pair_friction;  // [body a × bodies + body b]
   std::vector<Real> skin;           // a body: share of its mean edge by which contact candidates may be old
 };
+
+template <class Real>
+Elements<Real> elements_of(const Tables<Real>& t) {
+  return {t.springs.data(), t.spring_blocks.data(), int(t.springs.size()),
+          t.volumes.data(), t.volume_blocks.data(), int(t.volumes.size())};
+}
 
 // Connectivity for contact, world nodes and world tets. Face i of a tet is opposite its node i.
 struct Topology {

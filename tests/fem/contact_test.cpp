@@ -56,7 +56,7 @@ struct Lane {
     update_boxes();
   }
   detail::LaneView<float> view() {
-    return {x.data(), v.data(), f.data(), 1, lower.data(), upper.data(), travel.data()};
+    return {x.data(), v.data(), f.data(), {3, 1}, {3, 1}, 1, lower.data(), upper.data(), travel.data()};
   }
   Vec3 place(int point) const {
     const auto& p = world.topology.points[point];
