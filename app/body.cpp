@@ -1,6 +1,7 @@
 #include "app/body.h"
 
 #include "app/export.h"
+#include "app/preview.h"
 #include "core/error.h"
 #include "core/hash.h"
 #include "core/log.h"
@@ -92,8 +93,9 @@ Json prepare_body(const BodySource& source, const PrepareSettings& settings, con
   std::error_code ignored;
   fs::remove(folder / "report.json",
              ignored);  // what is in the folder counts again when a new report says so
-  for (const char* name : export_files)
-    fs::remove(folder / name, ignored);  // they would be of the body before
+  // These would be of the body before.
+  for (const char* name : export_files) fs::remove(folder / name, ignored);
+  for (const char* name : preview_files) fs::remove(folder / name, ignored);
   throw_if_stopped();
 
   const meshing::Decomposition decomposition =

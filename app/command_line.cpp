@@ -157,6 +157,10 @@ int run_command_line(int argc, const char* const* argv) {
       ->check(CLI::Range(1e-9, 1e9))
       ->capture_default_str();
   prepare_command.add_flag("--y-up", prepare_options.y_up, "the model has +Y up; turn it to +Z");
+  prepare_command.add_flag(
+      "--preview", prepare_options.preview,
+      "pictures, also of a body that is up to date: preview-shells.png, preview-cage.png, "
+      "preview-cut.png, preview-dihedrals.png");
   prepare_command
       .add_option(
           "--export", prepare_options.exports,

@@ -37,6 +37,7 @@ struct PrepareOptions {
   std::string mode = "lattice";
   double scale = 1;  // metres a file unit
   bool y_up = false;
+  bool preview = false;              // pictures beside the files
   std::vector<std::string> exports;  // of export_formats (app/export.h)
 };
 Outcome prepare(const PrepareOptions&);

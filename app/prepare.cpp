@@ -3,7 +3,9 @@
 #include "app/body.h"
 #include "app/commands.h"
 #include "app/export.h"
+#include "app/preview.h"
 #include "core/hash.h"
+#include "core/mesh_files.h"
 
 namespace limber::app {
 
@@ -21,11 +23,16 @@ Outcome prepare(const PrepareOptions& options) {
       {.shells = options.shells, .concavity = options.concavity, .tets = options.tets, .mode = options.mode},
       options.out);
   std::string text = summary_of_report(report);
-  if (!options.exports.empty()) {
-    report["exports"] = export_body(read_body(options.out), options.exports, options.out);
-    text += fmt::format("  exports      {}\n",
-                        fmt::join(report["exports"].get<std::vector<std::string>>(), ", "));
+  if (options.exports.empty() && !options.preview) return {exit_done, report, text};
+
+  const PreparedBody body = read_body(options.out);
+  std::vector<std::string> written = export_body(body, options.exports, options.out);
+  if (options.preview) {
+    write_previews(body, read_obj_shells(options.out / "shells.obj"), options.out);
+    written.insert(written.end(), std::begin(preview_files), std::end(preview_files));
   }
+  report["also_written"] = written;
+  text += fmt::format("  also         {}\n", fmt::join(written, ", "));
   return {exit_done, report, text};
 }
 

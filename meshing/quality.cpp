@@ -4,24 +4,46 @@
 #include <array>
 #include <cmath>
 #include <numbers>
+#include <optional>
 
 #include "meshing/detail/tet_faces.h"
 
 namespace limber::meshing {
 
-DihedralRange dihedral_range(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& d) {
+namespace {
+
+constexpr double degrees = 180 / std::numbers::pi;
+
+// Of the six dihedrals; none where a face has no area.
+std::optional<std::array<double, 6>> dihedral_cosines(const Vec3& a, const Vec3& b, const Vec3& c,
+                                                      const Vec3& d) {
   const Vec3 ab = b - a, ac = c - a, ad = d - a, bc = c - b, bd = d - b;
   const std::array<Vec3, 4> normal{bc.cross(bd), ad.cross(ac), ab.cross(ad), ac.cross(ab)};  // outwards
-  double min_cos = 1, max_cos = -1;
+  std::array<double, 6> cosines;
+  std::size_t edge = 0;
   for (int i = 0; i < 4; ++i)
     for (int j = 0; j < i; ++j) {
       const double length = std::sqrt(normal[i].squaredNorm() * normal[j].squaredNorm());
-      if (!(length > 0)) return {0, 180};
-      const double cosine = std::clamp(-normal[i].dot(normal[j]) / length, -1.0, 1.0);
-      min_cos = std::min(min_cos, cosine), max_cos = std::max(max_cos, cosine);
+      if (!(length > 0)) return {};
+      cosines[edge++] = std::clamp(-normal[i].dot(normal[j]) / length, -1.0, 1.0);
     }
-  constexpr double degrees = 180 / std::numbers::pi;
-  return {std::acos(max_cos) * degrees, std::acos(min_cos) * degrees};
+  return cosines;
+}
+
+}  // namespace
+
+DihedralRange dihedral_range(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& d) {
+  const auto cosines = dihedral_cosines(a, b, c, d);
+  if (!cosines) return {0, 180};
+  const auto [least, most] = std::minmax_element(cosines->begin(), cosines->end());
+  return {std::acos(*most) * degrees, std::acos(*least) * degrees};
+}
+
+std::array<double, 6> dihedral_angles(const std::array<Vec3, 4>& p) {
+  std::array<double, 6> angles{};
+  if (const auto cosines = dihedral_cosines(p[0], p[1], p[2], p[3]))
+    for (std::size_t i = 0; i < 6; ++i) angles[i] = std::acos((*cosines)[i]) * degrees;
+  return angles;
 }
 
 TetQuality measure_quality(const TetMesh& mesh) {

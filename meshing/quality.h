@@ -1,6 +1,8 @@
 // Figures that say how good the tets of a mesh are.
 #pragma once
 
+#include <array>
+
 #include "core/mesh.h"
 
 namespace limber::meshing {
@@ -10,6 +12,9 @@ struct DihedralRange {
   double min_deg, max_deg;
 };
 DihedralRange dihedral_range(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& d);
+
+// All six, degrees, in no particular order; 0 where a face has no area.
+std::array<double, 6> dihedral_angles(const std::array<Vec3, 4>& corners);
 
 struct TetQuality {
   int tets = 0;

@@ -11,6 +11,7 @@
 #include "core/error.h"
 #include "core/json.h"
 #include "core/progress.h"
+#include "render/png_file.h"
 #include "tests/core/temporary_folder.h"
 
 namespace limber::app {
@@ -288,7 +289,7 @@ TEST_F(Program, ExportsAreWrittenAlsoOfABodyThatIsUpToDateAndGoWithIt) {
       {"prepare", model, "-o", out(), "--tets", "100", "--export", "vtu,node,interp", "--json"});
   ASSERT_EQ(exported.code, exit_done) << exported.err;
   EXPECT_NE(exported.err.find("up to date"), std::string::npos) << exported.err;
-  const Json files = exported.json().at("exports");
+  const Json files = exported.json().at("also_written");
   EXPECT_EQ(files.size(), 7);
   for (const Json& name : files) EXPECT_TRUE(fs::exists(fs::path(out()) / name)) << name;
 
@@ -303,6 +304,23 @@ TEST_F(Program, ExportsAreWrittenAlsoOfABodyThatIsUpToDateAndGoWithIt) {
   EXPECT_EQ(limber_program({"prepare", model, "-o", out(), "--export", "vtk"}).code, exit_bad_input);
   if (WEXITSTATUS(status) == 77) GTEST_SKIP() << "no other program's reader is installed: see " << command;
   EXPECT_EQ(WEXITSTATUS(status), 0);
+}
+
+TEST_F(Program, PreviewPaintsTheSamePicturesEachTime) {
+  const std::string model = (folder / "tetrahedron.obj").string();
+  std::ofstream(model) << "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n";
+  for (const char* name : {"one", "two"})
+    ASSERT_EQ(limber_program({"prepare", model, "-o", out(name), "--tets", "100", "--preview"}).code,
+              exit_done);
+  for (const char* name :
+       {"preview-shells.png", "preview-cage.png", "preview-cut.png", "preview-dihedrals.png"}) {
+    const auto picture = render::inspect_png(folder.path() / "one" / name);
+    ASSERT_TRUE(picture) << name;
+    EXPECT_EQ(picture->width, 1600) << name;
+    EXPECT_EQ(read_file(folder.path() / "one" / name), read_file(folder.path() / "two" / name)) << name;
+  }
+  ASSERT_EQ(limber_program({"prepare", model, "-o", out("one"), "--tets", "200"}).code, exit_done);
+  EXPECT_FALSE(fs::exists(folder.path() / "one" / "preview-cut.png")) << "it shows the old cage";
 }
 
 }  // namespace

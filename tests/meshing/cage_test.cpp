@@ -305,6 +305,23 @@ TEST(Quality, KnowsTheAnglesOfKnownTets) {
   EXPECT_EQ(flat.max_deg, 180);
 }
 
+TEST(Quality, AnglesAreThoseBetweenTheOtherCornersSeenAlongAnEdge) {
+  const std::array<Vec3, 4> needle{Vec3(0, 0, 0), Vec3(1, 0.1, 0), Vec3(0.4, 2, 0.1), Vec3(0.3, 0.2, 0.5)};
+  std::array<double, 6> angles = dihedral_angles(needle);
+  std::sort(angles.begin(), angles.end());
+  std::vector<double> expected;  // at each edge, between the other corners seen along it
+  for (const auto& [a, b, c, d] : std::vector<std::array<int, 4>>{
+           {0, 1, 2, 3}, {0, 2, 1, 3}, {0, 3, 1, 2}, {1, 2, 0, 3}, {1, 3, 0, 2}, {2, 3, 0, 1}}) {
+    const Vec3 edge = (needle[b] - needle[a]).normalized();
+    const auto across = [&](const Vec3& p) {
+      return Vec3((p - needle[a]) - edge * edge.dot(p - needle[a])).normalized();
+    };
+    expected.push_back(std::acos(across(needle[c]).dot(across(needle[d]))) * 180 / M_PI);
+  }
+  std::sort(expected.begin(), expected.end());
+  for (int i = 0; i < 6; ++i) EXPECT_NEAR(angles[i], expected[i], 1e-10);
+}
+
 TEST(Lattice, TwelveTetsFillACellAndNeighboursAreMutual) {
   using namespace detail;
   const Lattice lattice{Vec3::Zero(), 2, {5, 5, 5}};

@@ -1,0 +1,31 @@
+// Words on pictures: a caption with a legend below a picture, and a histogram. Printable ASCII only.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "render/image.h"
+
+namespace limber::render {
+
+struct LegendKey {
+  std::string text;
+  Vec3 color_srgb;
+};
+
+// The picture with a white band below it: the lines, the first one larger, then the keys in a row. Letters
+// shrink until the longest line fits the width.
+Image8 with_caption(const Image8& picture, const std::vector<std::string>& lines,
+                    const std::vector<LegendKey>& keys = {});
+
+struct HistogramLook {
+  std::string x_label, y_label;
+  double low = 0, high = 1;    // values outside count in the first and the last bar
+  std::vector<Vec3> bar_srgb;  // a colour for each bar, ≥ 1; bars are equally wide
+  int width_px = 1600, height_px = 900;
+};
+// How many of the values fall into each bar: [low, low + w), …, the last with its upper end.
+std::vector<int> histogram_counts(const std::vector<double>& values, double low, double high, int bars);
+Image8 histogram(const std::vector<double>& values, const HistogramLook&);
+
+}  // namespace limber::render
