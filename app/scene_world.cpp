@@ -101,7 +101,9 @@ fem::World build_world(const scenes::Scene& scene, const std::vector<PreparedBod
     fem::BodySpec fem_body;
     fem_body.name = body.name;
     fem_body.cage = prepared[b].cage;
-    fem_body.material = {.youngs_modulus_pa = body.material.youngs_modulus_pa,
+    fem_body.material = {.model = body.material.model == "springs" ? fem::MaterialModel::springs
+                                                                   : fem::MaterialModel::neo_hookean,
+                         .youngs_modulus_pa = body.material.youngs_modulus_pa,
                          .poisson_ratio = body.material.poisson_ratio,
                          .density_kg_m3 = body.material.density_kg_m3,
                          .damping_ratio = body.material.damping_ratio,

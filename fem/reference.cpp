@@ -1,6 +1,9 @@
 #include "fem/reference.h"
 
+#include <cmath>
+
 #include "fem/detail/stepper.h"
+#include "fem/detail/timestep.h"
 
 namespace limber::fem {
 
@@ -17,33 +20,36 @@ void advance(const World& world, const Control& control, ReferenceState& state) 
 }
 
 std::vector<double> elastic_forces(const World& world, const ReferenceState& state) {
-  const auto place = detail::state_layout(1), push = detail::force_layout(1);
-  const int nodes = int(state.positions.size()) / 3;
-  std::vector<double> records(std::size_t(nodes * place.node), 0.0), f(std::size_t(nodes * push.node), 0.0),
-      forces;
-  for (int n = 0; n < nodes; ++n)
-    for (int c = 0; c < 3; ++c) {
-      records[place.at(n, c)] = state.positions[3 * n + c];
-      records[place.at(n, c) + 4] = state.velocities[3 * n + c];
-    }
-  detail::kernels<double>(detail::best_isa(), 1)
-      .elastic(detail::elements_of(world.tables64), records.data(), records.data() + 4, f.data());
-  for (int n = 0; n < nodes; ++n)
-    for (int c = 0; c < 3; ++c) forces.push_back(f[push.at(n, c)]);
-  return forces;
+  return detail::forces_of(world.tables64.elements, state.positions, state.velocities);
 }
 
 double elastic_energy_j(const World& world, const ReferenceState& state) {
-  const auto at = [&](int n) { return Eigen::Map<const Vec3>(&state.positions[3 * n]); };
+  const auto& elements = world.tables64.elements;
+  const auto at = [](const std::vector<double>& x, int n) { return Eigen::Map<const Vec3>(&x[3 * n]); };
+  const auto volume6 = [&](const std::vector<double>& x, const int* node) {
+    return 6 * signed_volume(at(x, node[0]), at(x, node[1]), at(x, node[2]), at(x, node[3]));
+  };
+  const auto of_volume = [](double v6, const detail::VolumeLaw<double>& law) {
+    const double change = v6 - law.rest_volume6, inverted = std::min(v6, 0.0);
+    return 0.5 * (law.stiffness * change * change + law.inverted_stiffness * inverted * inverted);
+  };
+  const auto& x = state.positions;
   double energy = 0;
-  for (const auto& s : world.tables64.springs) {
-    const double stretch = (at(s.j) - at(s.i)).norm() - s.rest_length;
-    energy += 0.5 * s.stiffness * stretch * stretch;
+  for (const auto& [node, law] : elements.springs.elements) {
+    const double stretch = (at(x, node[1]) - at(x, node[0])).norm() - law.rest_length;
+    energy += 0.5 * law.stiffness * stretch * stretch;
   }
-  for (const auto& q : world.tables64.volumes) {
-    const double v6 = 6 * signed_volume(at(q.node[0]), at(q.node[1]), at(q.node[2]), at(q.node[3]));
-    const double change = v6 - q.rest_volume6, inverted = std::min(v6, 0.0);
-    energy += 0.5 * (q.stiffness * change * change + q.inverted_stiffness * inverted * inverted);
+  for (const auto& [node, law] : elements.volumes.elements) energy += of_volume(volume6(x, node), law);
+  for (const auto& [node, law] : elements.neo_hookeans.elements) {
+    // At rest its two parts hold each other in balance; only what is above that counts.
+    const double at_rest = of_volume(volume6(world.tables64.rest_positions, node), law.volume);
+    Eigen::Matrix3d edges, metric;
+    for (int i = 0; i < 3; ++i) edges.col(i) = at(x, node[i + 1]) - at(x, node[0]);
+    const double* m = law.metric;
+    metric << m[0], m[1], m[2], m[1], m[3], m[4], m[2], m[4], m[5];
+    const double trace = (edges.transpose() * edges * metric).trace() / law.scale;
+    energy += of_volume(volume6(x, node), law.volume) - at_rest +
+              0.5 * law.scale * (trace - 3 - std::log((trace + 1) / 4));
   }
   return energy;
 }

@@ -14,12 +14,12 @@
 namespace limber::fem {
 namespace {
 
-using detail::Spring;
+using detail::ElementTables;
 using detail::Topology;
-using detail::VolumeElement;
 
 // Share of the largest stable elastic step that is taken: contact needs the rest (docs/contact.md).
-constexpr double step_safety = 1.0 / 3;
+// Neo-Hookean tets stiffen when stretched, and so need more.
+constexpr double step_safety = 1.0 / 3, neo_hookean_step_safety = 0.25;
 // Inverted tets are pushed back with at least this many μV, which springs cannot hold against
 // (docs/dynamics.md).
 constexpr double inversion_stiffness = 6;
@@ -36,7 +36,10 @@ void check(const BodySpec& spec) {
   validate(spec.cage, fmt::format("body {}: cage", spec.name));
   const Material& m = spec.material;
   require_range(spec, "youngs_modulus_pa", m.youngs_modulus_pa, 1e-3, 1e13, "from 0.001 to 1e13");
-  require_range(spec, "poisson_ratio", m.poisson_ratio, 0.25, 0.495, "from 0.25 to 0.495");
+  if (m.model == MaterialModel::springs)
+    require_range(spec, "poisson_ratio", m.poisson_ratio, 0.25, 0.495, "from 0.25 to 0.495 for springs");
+  else
+    require_range(spec, "poisson_ratio", m.poisson_ratio, 0, 0.495, "from 0 to 0.495");
   require_range(spec, "density_kg_m3", m.density_kg_m3, 1e-6, 1e6, "from 1e-6 to 1e6");
   require_range(spec, "damping_ratio", m.damping_ratio, 0, 1, "from 0 to 1");
   require_range(spec, "friction", m.friction, 0, 2, "from 0 to 2");
@@ -94,6 +97,16 @@ Body make_body(const BodySpec& spec) {
   return body;
 }
 
+std::vector<double> tet_volumes(const TetMesh& mesh) {
+  std::vector<double> volumes;
+  const auto& x = mesh.positions;
+  for (int t = 0; t < mesh.tets.rows(); ++t) {
+    const auto q = mesh.tets.row(t);
+    volumes.push_back(signed_volume(x.row(q[0]), x.row(q[1]), x.row(q[2]), x.row(q[3])));
+  }
+  return volumes;
+}
+
 // k_d = τ k everywhere, so that the lowest longitudinal mode of a cube of the body's volume has the damping
 // ratio asked for.
 double damping_time(const Body& body) {
@@ -102,50 +115,89 @@ double damping_time(const Body& body) {
   return 2 * body.material.damping_ratio / frequency;
 }
 
-// The material's energies on the body's own node numbers. Sources and derivation: docs/dynamics.md.
-void make_elements(const Body& body, std::vector<Spring<double>>& springs,
-                   std::vector<VolumeElement<double>>& volumes) {
-  const double young = body.material.youngs_modulus_pa, poisson = body.material.poisson_ratio;
-  const double mu = young / (2 * (1 + poisson)),
-               lambda = young * poisson / ((1 + poisson) * (1 - 2 * poisson));
+struct Lame {
+  double mu, lambda;
+};
+Lame lame_of(const Material& m) {
+  return {m.youngs_modulus_pa / (2 * (1 + m.poisson_ratio)),
+          m.youngs_modulus_pa * m.poisson_ratio / ((1 + m.poisson_ratio) * (1 - 2 * m.poisson_ratio))};
+}
+
+// Each edge once, with the sum over its tets of what `of_tet` gives them.
+template <class OfTet>
+std::map<std::pair<int, int>, double> sum_over_edges(const Body& body, const OfTet& of_tet) {
+  std::map<std::pair<int, int>, double> sums;
+  for (int t = 0; t < body.cage.tets.rows(); ++t)
+    for (const auto& [i, j] : tet_edges)
+      sums[std::minmax(body.cage.tets(t, i), body.cage.tets(t, j))] += of_tet(t);
+  return sums;
+}
+
+// The energies of `springs` on the body's own node numbers. Sources and derivations: docs/dynamics.md.
+void make_springs(const Body& body, ElementTables<double>& tables) {
+  const auto [mu, lambda] = lame_of(body.material);
   const double tau = damping_time(body);
   const auto& x = body.cage.positions;
-  std::map<std::pair<int, int>, double> stiffness_of_edge;
+  const std::vector<double> volumes = tet_volumes(body.cage);
   for (int t = 0; t < body.cage.tets.rows(); ++t) {
     const auto q = body.cage.tets.row(t);
-    const double v = signed_volume(x.row(q[0]), x.row(q[1]), x.row(q[2]), x.row(q[3]));
-    for (const auto& [i, j] : tet_edges) stiffness_of_edge[std::minmax(q[i], q[j])] += 2.5 * mu * v;
-    const double k = (lambda - mu) * v, scale = 1 / (36 * v * v);
+    const double v = volumes[t], k = (lambda - mu) * v, scale = 1 / (36 * v * v);
     const double inverted = std::max(0.0, inversion_stiffness * mu * v - k);
-    volumes.push_back({{q[0], q[1], q[2], q[3]}, 6 * v, k * scale, inverted * scale, tau * k * scale});
+    tables.volumes.elements.push_back(
+        {{q[0], q[1], q[2], q[3]}, {6 * v, k * scale, inverted * scale, tau * k * scale}});
   }
-  for (const auto& [edge, k] : stiffness_of_edge) {
+  for (const auto& [edge, k] : sum_over_edges(body, [&](int t) { return 2.5 * mu * volumes[t]; })) {
     const double rest = (x.row(edge.first) - x.row(edge.second)).norm();
-    springs.push_back({edge.first, edge.second, rest, k / (rest * rest), tau * k / (rest * rest)});
+    tables.springs.elements.push_back(
+        {{edge.first, edge.second}, {rest, k / (rest * rest), tau * k / (rest * rest)}});
   }
 }
 
-double largest_stable_step(const Body& body, const std::vector<Spring<double>>& springs,
-                           const std::vector<VolumeElement<double>>& volumes) {
-  std::vector<double> positions(body.cage.positions.data(),
-                                body.cage.positions.data() + body.cage.positions.size());
+// The same of `neo_hookean`. Its μ and λ are not Lamé's, but give them at small strain; its damping is that
+// of springs.
+void make_neo_hookean(const Body& body, ElementTables<double>& tables) {
+  const auto [lame_mu, lame_lambda] = lame_of(body.material);
+  const double mu = 4.0 / 3 * lame_mu, lambda = lame_lambda + 5.0 / 6 * lame_mu;
+  const double tau = damping_time(body);
+  const auto& x = body.cage.positions;
+  const std::vector<double> volumes = tet_volumes(body.cage);
+  for (int t = 0; t < body.cage.tets.rows(); ++t) {
+    const auto q = body.cage.tets.row(t);
+    const double v = volumes[t], scale = 1 / (36 * v * v);
+    Eigen::Matrix3d edges;
+    for (int i = 0; i < 3; ++i) edges.col(i) = x.row(q[i + 1]) - x.row(q[0]);
+    const Eigen::Matrix3d m = mu * v * (edges.transpose() * edges).inverse();
+    const double damping = tau * std::max(0.0, lame_lambda - lame_mu) * v * scale;
+    tables.neo_hookeans.elements.push_back(
+        {{q[0], q[1], q[2], q[3]},
+         {{6 * v * (1 + 0.75 * mu / lambda), lambda * v * scale, 0, damping},
+          {m(0, 0), m(0, 1), m(0, 2), m(1, 1), m(1, 2), m(2, 2)},
+          mu * v}});
+  }
+  for (const auto& [edge, k] : sum_over_edges(body, [&](int t) { return 2.5 * lame_mu * volumes[t]; })) {
+    const double rest = (x.row(edge.first) - x.row(edge.second)).norm();
+    tables.dashpots.elements.push_back({{edge.first, edge.second}, {tau * k / (rest * rest)}});
+  }
+}
+
+double largest_stable_step(const Body& body, const ElementTables<double>& elements) {
+  const std::vector<double> positions(body.cage.positions.data(),
+                                      body.cage.positions.data() + body.cage.positions.size());
   std::vector<double> inverse_mass;
   for (int n = 0; n < body.node_count(); ++n)
     inverse_mass.push_back(body.fixed[n] ? 0 : 1 / body.node_mass_kg[n]);
-  return detail::stable_step(detail::highest_frequency2(springs, volumes, positions, inverse_mass),
-                             damping_time(body));
+  return detail::stable_step(detail::fastest_mode(elements, positions, inverse_mass));
 }
 
-void append(const Body& body, std::vector<Spring<double>> springs, std::vector<VolumeElement<double>> volumes,
-            detail::Tables<double>& tables) {
-  for (auto& s : springs) {
-    s.i += body.first_node, s.j += body.first_node;
-    tables.springs.push_back(s);
-  }
-  for (auto& q : volumes) {
-    for (int& n : q.node) n += body.first_node;
-    tables.volumes.push_back(q);
-  }
+void append(const ElementTables<double>& of_body, int first_node, ElementTables<double>& all) {
+  detail::for_each_table(
+      [&](const auto& from, auto& to) {
+        for (auto element : from.elements) {
+          for (int& n : element.node) n += first_node;
+          to.elements.push_back(element);
+        }
+      },
+      of_body, all);
 }
 
 void append_nodes(const Body& body, detail::Tables<double>& tables) {
@@ -173,39 +225,40 @@ double mean_edge(const Body& body) {
 }
 
 // The last block repeats the last element.
-void pack(detail::Tables<float>& t) {
+template <class E>
+void pack(detail::ElementTable<E>& table) {
   constexpr std::size_t size = detail::block_size;
-  t.spring_blocks.resize((t.springs.size() + size - 1) / size);
-  t.volume_blocks.resize((t.volumes.size() + size - 1) / size);
-  for (std::size_t e = 0; e < t.spring_blocks.size() * size; ++e) {
-    const auto& s = t.springs[std::min(e, t.springs.size() - 1)];
-    auto& block = t.spring_blocks[e / size];
-    const std::size_t k = e % size;
-    block.i[k] = s.i, block.j[k] = s.j;
-    block.rest_length[k] = s.rest_length, block.stiffness[k] = s.stiffness, block.damping[k] = s.damping;
-  }
-  for (std::size_t e = 0; e < t.volume_blocks.size() * size; ++e) {
-    const auto& q = t.volumes[std::min(e, t.volumes.size() - 1)];
-    auto& block = t.volume_blocks[e / size];
-    const std::size_t k = e % size;
-    for (int i = 0; i < 4; ++i) block.node[i][k] = q.node[i];
-    block.rest_volume6[k] = q.rest_volume6, block.stiffness[k] = q.stiffness;
-    block.inverted_stiffness[k] = q.inverted_stiffness, block.damping[k] = q.damping;
+  table.blocks.resize((table.elements.size() + size - 1) / size);
+  for (std::size_t e = 0; e < table.blocks.size() * size; ++e) {
+    const E& element = table.elements[std::min(e, table.elements.size() - 1)];
+    auto& block = table.blocks[e / size];
+    for (int i = 0; i < E::nodes; ++i) block.node[i][e % size] = element.node[i];
+    const float* numbers = reinterpret_cast<const float*>(&element.law);
+    for (int i = 0; i < detail::Block<E>::numbers; ++i) block.law[i][e % size] = numbers[i];
   }
 }
 
-template <class To>
-detail::Tables<To> converted(const detail::Tables<double>& t) {
-  detail::Tables<To> out;
-  for (const auto& s : t.springs)
-    out.springs.push_back({s.i, s.j, To(s.rest_length), To(s.stiffness), To(s.damping)});
-  for (const auto& q : t.volumes)
-    out.volumes.push_back({{q.node[0], q.node[1], q.node[2], q.node[3]},
-                           To(q.rest_volume6),
-                           To(q.stiffness),
-                           To(q.inverted_stiffness),
-                           To(q.damping)});
-  const auto copy = [](const std::vector<double>& v) { return std::vector<To>(v.begin(), v.end()); };
+// A law of another kind of number, member by member.
+template <class To, class From>
+void convert(const From& from, To& to) {
+  const double* numbers = reinterpret_cast<const double*>(&from);
+  float* out = reinterpret_cast<float*>(&to);
+  for (std::size_t i = 0; i < sizeof(From) / sizeof(double); ++i) out[i] = float(numbers[i]);
+}
+
+detail::Tables<float> single_precision(const detail::Tables<double>& t) {
+  detail::Tables<float> out;
+  detail::for_each_table(
+      [](const auto& from, auto& to) {
+        for (const auto& element : from.elements) {
+          auto& copy = to.elements.emplace_back();
+          std::copy(std::begin(element.node), std::end(element.node), copy.node);
+          convert(element.law, copy.law);
+        }
+        pack(to);
+      },
+      t.elements, out.elements);
+  const auto copy = [](const std::vector<double>& v) { return std::vector<float>(v.begin(), v.end()); };
   out.node_mass = copy(t.node_mass), out.inverse_mass = copy(t.inverse_mass);
   out.rest_positions = copy(t.rest_positions), out.rest_from_center = copy(t.rest_from_center);
   out.pair_friction = copy(t.pair_friction), out.skin = copy(t.skin);
@@ -329,10 +382,14 @@ void check(const WorldSpec& spec) {
 }
 
 void choose_step(double max_dt_s, World& world) {
-  const auto stiffest = std::min_element(
-      world.bodies.begin(), world.bodies.end(),
-      [](const Body& a, const Body& b) { return a.elastic_dt_limit_s < b.elastic_dt_limit_s; });
-  world.contact_dt_s = float(step_safety * stiffest->elastic_dt_limit_s);
+  const auto step_of = [](const Body& body) {
+    const bool springs = body.material.model == MaterialModel::springs;
+    return (springs ? step_safety : neo_hookean_step_safety) * body.elastic_dt_limit_s;
+  };
+  const auto stiffest =
+      std::min_element(world.bodies.begin(), world.bodies.end(),
+                       [&](const Body& a, const Body& b) { return step_of(a) < step_of(b); });
+  world.contact_dt_s = float(step_of(*stiffest));
   world.dt_s = max_dt_s > 0 ? std::min(world.contact_dt_s, double(float(max_dt_s))) : world.contact_dt_s;
   if (!(world.dt_s >= 1e-7))
     throw InputError(fmt::format(
@@ -368,11 +425,11 @@ World build_world(const WorldSpec& spec) {
       append_nodes(body, tables);
       append_topology(body, int(b), world.topology);
       if (!moving) continue;
-      std::vector<Spring<double>> springs;
-      std::vector<VolumeElement<double>> volumes;
-      make_elements(body, springs, volumes);
-      body.elastic_dt_limit_s = largest_stable_step(body, springs, volumes);
-      append(body, springs, volumes, tables);
+      ElementTables<double> elements;
+      body.material.model == MaterialModel::springs ? make_springs(body, elements)
+                                                    : make_neo_hookean(body, elements);
+      body.elastic_dt_limit_s = largest_stable_step(body, elements);
+      append(elements, body.first_node, tables.elements);
     }
     if (moving) world.moving_nodes = world.nodes;
   }
@@ -385,8 +442,7 @@ World build_world(const WorldSpec& spec) {
       tables.pair_friction.push_back(std::sqrt(a.material.friction * b.material.friction));
     tables.skin.push_back(0.2 * mean_edge(a));
   }
-  world.tables = converted<float>(tables);
-  pack(world.tables);
+  world.tables = single_precision(tables);
   choose_step(spec.max_dt_s, world);
   check_places(world);
   return world;

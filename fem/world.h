@@ -11,9 +11,17 @@
 
 namespace limber::fem {
 
+enum class MaterialModel {
+  springs,     // the paper's: springs along edges and a spring of the volume (Teschner et al. 2004)
+  neo_hookean  // stable Neo-Hookean (Smith, de Goes, Kim 2018): true moduli at small strain, whatever the
+               // mesh
+};
+
 struct Material {
+  MaterialModel model = MaterialModel::springs;
   double youngs_modulus_pa = 5e3;  // > 0
-  double poisson_ratio = 0.45;  // 0.25 ≤ ν ≤ 0.495: springs alone have 0.25, the volume term adds the rest
+  double poisson_ratio =
+      0.45;  // springs: 0.25 ≤ ν ≤ 0.495, since springs alone have 0.25; else 0 ≤ ν ≤ 0.495
   double density_kg_m3 = 100;   // > 0
   double damping_ratio = 0.05;  // 0 … 1, share of critical damping of the body's lowest longitudinal mode
   double friction = 0.2;        // 0 … 2, Coulomb; a pair has the geometric mean, a wall the body's own

@@ -269,10 +269,11 @@ MaterialSpec read_material(const Node& body_table, Kind kind, const std::string&
                                      body));
   if (!table) {  // it never deforms: any sound material does
     const Key& friction = *find_key("bodies[].material.friction");
-    return {1e6, 0.45, 1000, 0.05, as_number(parse_set_value(std::string(friction.fallback), ""))};
+    return {"springs", 1e6, 0.45, 1000, 0.05, as_number(parse_set_value(std::string(friction.fallback), ""))};
   }
-  return {number(*table, "youngs_modulus_pa"), number(*table, "poisson_ratio"),
-          number(*table, "density_kg_m3"), number(*table, "damping_ratio"), number(*table, "friction")};
+  return {text(*table, "model"),           number(*table, "youngs_modulus_pa"),
+          number(*table, "poisson_ratio"), number(*table, "density_kg_m3"),
+          number(*table, "damping_ratio"), number(*table, "friction")};
 }
 
 FixedSpec read_fixed(const Node& node) {

@@ -6,47 +6,75 @@
 
 namespace limber::fem::detail {
 
+// Laws, for numbers T: all members are T, so that a law can be read as an array.
 // ½ k ((L−D)/D)², damped: on i along d = x_j − x_i acts s·d, s = stiffness (1 − D/L) + damping (d·ḋ)/L².
-template <class Real>
-struct Spring {
-  int i, j;
-  Real rest_length;  // D
-  Real stiffness;    // k/D²
-  Real damping;      // k_d/D²
+template <class T>
+struct SpringLaw {
+  T rest_length;  // D
+  T stiffness;    // k/D²
+  T damping;      // k_d/D²
 };
-
+// The damping alone.
+template <class T>
+struct DashpotLaw {
+  T damping;
+};
 // ½ k ((V−V0)/V0)² + ½ k_inv (min(V,0)/V0)², damped, all by 6V = (b−a)·(c−a)×(d−a).
-template <class Real>
-struct VolumeElement {
-  int node[4];
-  Real rest_volume6;        // 6 V0
-  Real stiffness;           // k/(6V0)²
-  Real inverted_stiffness;  // k_inv/(6V0)²
-  Real damping;             // k_d/(6V0)²
+template <class T>
+struct VolumeLaw {
+  T rest_volume6;        // 6 V0
+  T stiffness;           // k/(6V0)²
+  T inverted_stiffness;  // k_inv/(6V0)²
+  T damping;             // k_d/(6V0)²
+};
+// The volume law, and ½ μV0 (I − 3 − ln(I+1)), I = tr FᵀF = tr(EᵀE M), E the edges from node 0 as columns,
+// M = (E0ᵀE0)⁻¹.
+template <class T>
+struct NeoHookeanLaw {
+  VolumeLaw<T> volume;
+  T metric[6];  // μV0 M: xx xy xz yy yz zz
+  T scale;      // μV0
 };
 
-// The same in columns, 16 to a block, for the kernel that puts elements of one rollout side by side. The last
-// block is filled up with whatever is harmless to compute.
+// On `nodes` nodes acts a law. Blocks hold the same in columns, 16 elements each, for the kernel that puts
+// elements of one rollout side by side; the last is filled up with what is harmless to compute.
+template <class Real, int Nodes, template <class> class Law>
+struct Element {
+  static constexpr int nodes = Nodes;
+  int node[Nodes];
+  Law<Real> law;
+};
+template <class Real>
+using Spring = Element<Real, 2, SpringLaw>;
+template <class Real>
+using Dashpot = Element<Real, 2, DashpotLaw>;
+template <class Real>
+using VolumeElement = Element<Real, 4, VolumeLaw>;
+template <class Real>
+using NeoHookeanElement = Element<Real, 4, NeoHookeanLaw>;
+
 inline constexpr int block_size = 16;
-template <class Real>
-struct SpringBlock {
-  int i[block_size], j[block_size];
-  Real rest_length[block_size], stiffness[block_size], damping[block_size];
-};
-template <class Real>
-struct VolumeBlock {
-  int node[4][block_size];
-  Real rest_volume6[block_size], stiffness[block_size], inverted_stiffness[block_size], damping[block_size];
+template <class E>
+struct Block;
+template <class Real, int Nodes, template <class> class Law>
+struct Block<Element<Real, Nodes, Law>> {
+  static constexpr int numbers = sizeof(Law<Real>) / sizeof(Real);
+  int node[Nodes][block_size];
+  Real law[numbers][block_size];
 };
 
+template <class E>
+struct List {
+  const E* elements;
+  const Block<E>* blocks;
+  int count;
+};
 template <class Real>
 struct Elements {
-  const Spring<Real>* springs;
-  const SpringBlock<Real>* spring_blocks;
-  int spring_count;
-  const VolumeElement<Real>* volumes;
-  const VolumeBlock<Real>* volume_blocks;
-  int volume_count;
+  List<Spring<Real>> springs;
+  List<Dashpot<Real>> dashpots;
+  List<VolumeElement<Real>> volumes;
+  List<NeoHookeanElement<Real>> neo_hookeans;
 };
 
 // Where numbers of a node are, from the first of their array. One lane: records x y z 0 u v w 0 and forces

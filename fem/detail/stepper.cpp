@@ -133,7 +133,7 @@ void Stepper<Real>::step() {
     if (contact_[lane]) contacts_.add_forces(lane, view(lane));
     if (controls_[lane].manipulation == Manipulation::interpolation) pull_towards_goal(lane);
   }
-  kernels_.elastic(elements_of(tables_), state_.data(), &state_[first_velocity_], f_.data());
+  kernels_.elastic(elements_of(tables_.elements), state_.data(), &state_[first_velocity_], f_.data());
   for (std::size_t b = 0; b < world_.bodies.size(); ++b) {
     const Topology::Body& body = world_.topology.bodies[b];
     if (!body.moving) continue;

@@ -7,12 +7,38 @@
 
 namespace limber::fem::detail {
 
+template <class E>
+struct ElementTable {
+  std::vector<E> elements;
+  std::vector<Block<E>> blocks;  // the same in columns
+};
+
+template <class E>
+List<E> list_of(const ElementTable<E>& table) {
+  return {table.elements.data(), table.blocks.data(), int(table.elements.size())};
+}
+
+// Of the moving bodies.
+template <class Real>
+struct ElementTables {
+  ElementTable<Spring<Real>> springs;         // every edge of a body of springs once, i < j, ascending
+  ElementTable<Dashpot<Real>> dashpots;       // every edge of a Neo-Hookean body
+  ElementTable<VolumeElement<Real>> volumes;  // tets
+  ElementTable<NeoHookeanElement<Real>> neo_hookeans;
+};
+template <class Real>
+Elements<Real> elements_of(const ElementTables<Real>& t) {
+  return {list_of(t.springs), list_of(t.dashpots), list_of(t.volumes), list_of(t.neo_hookeans)};
+}
+// Calls each(table) for the four of them, or each(a, b) for those of two.
+template <class Each, class... Tables>
+void for_each_table(const Each& each, Tables&&... t) {
+  each(t.springs...), each(t.dashpots...), each(t.volumes...), each(t.neo_hookeans...);
+}
+
 template <class Real>
 struct Tables {
-  std::vector<Spring<Real>> springs;             // every edge of the moving bodies once, i < j, ascending
-  std::vector<VolumeElement<Real>> volumes;      // tets of the moving bodies
-  std::vector<SpringBlock<Real>> spring_blocks;  // the same in columns
-  std::vector<VolumeBlock<Real>> volume_blocks;
+  ElementTables<Real> elements;
   std::vector<Real> node_mass;       // a world node
   std::vector<Real> inverse_mass;    // a world node; 0: never moves
   std::vector<Real> rest_positions;  // (3 × nodes)
@@ -21,12 +47,6 @@ struct Tables {
   std::vector<Real> pair_friction;  // [body a × bodies + body b]
   std::vector<Real> skin;           // a body: share of its mean edge by which contact candidates may be old
 };
-
-template <class Real>
-Elements<Real> elements_of(const Tables<Real>& t) {
-  return {t.springs.data(), t.spring_blocks.data(), int(t.springs.size()),
-          t.volumes.data(), t.volume_blocks.data(), int(t.volumes.size())};
-}
 
 // Connectivity for contact, world nodes and world tets. Face i of a tet is opposite its node i.
 struct Topology {

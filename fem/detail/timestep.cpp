@@ -1,6 +1,8 @@
 #include "fem/detail/timestep.h"
 
+#include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "core/random.h"
 
@@ -9,73 +11,84 @@ namespace {
 
 using Vector = std::vector<double>;
 
-Vec3 row(const Vector& v, int i) { return {v[3 * i], v[3 * i + 1], v[3 * i + 2]}; }
-void add(Vector& v, int i, const Vec3& w) {
-  for (int c = 0; c < 3; ++c) v[3 * i + c] += w[c];
-}
+// Differences are taken over this share of the shortest edge: their error is its square.
+constexpr double nudge = 1e-5;
+constexpr int iterations = 300;
+constexpr double margin = 1.02;  // the iteration comes from below
 
-struct Gradient {
-  int node[4];
-  Vec3 of[4];  // of 6V
-  double stiffness;
-};
+template <class E>
+double shortest_edge(const ElementTable<E>& table, const Vector& x) {
+  double shortest2 = std::numeric_limits<double>::infinity();
+  for (const E& e : table.elements)
+    for (int i = 0; i < E::nodes; ++i)
+      for (int j = 0; j < i; ++j) {
+        double length2 = 0;
+        for (int c = 0; c < 3; ++c) length2 += std::pow(x[3 * e.node[i] + c] - x[3 * e.node[j] + c], 2);
+        shortest2 = std::min(shortest2, length2);
+      }
+  return std::sqrt(shortest2);
+}
 
 }  // namespace
 
-double highest_frequency2(std::span<const Spring<double>> springs,
-                          std::span<const VolumeElement<double>> volumes,
-                          const std::vector<double>& positions, const std::vector<double>& inverse_mass) {
-  std::vector<Gradient> gradients;
-  for (const auto& q : volumes) {
-    Gradient g{{q.node[0], q.node[1], q.node[2], q.node[3]}, {}, q.stiffness};
-    const Vec3 a = row(positions, q.node[0]);
-    const Vec3 b = row(positions, q.node[1]) - a, c = row(positions, q.node[2]) - a,
-               d = row(positions, q.node[3]) - a;
-    g.of[1] = c.cross(d), g.of[2] = d.cross(b), g.of[3] = b.cross(c);
-    g.of[0] = -(g.of[1] + g.of[2] + g.of[3]);
-    gradients.push_back(g);
-  }
-  // Symmetric form M^-½ K M^-½, so that the Rayleigh quotient converges with the square of the vector's
-  // error.
-  const std::size_t nodes = inverse_mass.size();
-  Vector root(nodes), u(3 * nodes), moved(3 * nodes), force(3 * nodes);
-  for (std::size_t n = 0; n < nodes; ++n) root[n] = std::sqrt(inverse_mass[n]);
-  Rng rng(1, 0);
-  for (double& c : u) c = rng.uniform(-1, 1);
-  const auto normalize = [&] {
-    double norm2 = 0;
-    for (double c : u) norm2 += c * c;
-    for (double& c : u) c /= std::sqrt(norm2);
-  };
-  for (std::size_t k = 0; k < 3 * nodes; ++k) u[k] *= root[k / 3] > 0;
-  double frequency2 = 0;
-  for (int iteration = 0; iteration < 300; ++iteration) {
-    normalize();
-    for (std::size_t k = 0; k < 3 * nodes; ++k) moved[k] = u[k] * root[k / 3], force[k] = 0;
-    for (const auto& s : springs) {
-      const Vec3 d = (row(positions, s.j) - row(positions, s.i)).normalized();
-      const Vec3 pull = s.stiffness * d.dot(row(moved, s.j) - row(moved, s.i)) * d;
-      add(force, s.i, -pull), add(force, s.j, pull);
+std::vector<double> forces_of(const ElementTables<double>& elements, const Vector& positions,
+                              const Vector& velocities) {
+  const Layout state = state_layout(1), force = force_layout(1);
+  const int nodes = int(positions.size()) / 3;
+  Vector records(std::size_t(nodes * state.node), 0.0), f(std::size_t(nodes * force.node), 0.0), forces;
+  for (int n = 0; n < nodes; ++n)
+    for (int c = 0; c < 3; ++c) {
+      records[state.at(n, c)] = positions[3 * n + c];
+      records[state.at(n, c) + 4] = velocities[3 * n + c];
     }
-    for (const Gradient& g : gradients) {
-      double rate = 0;
-      for (int i = 0; i < 4; ++i) rate += g.of[i].dot(row(moved, g.node[i]));
-      for (int i = 0; i < 4; ++i) add(force, g.node[i], g.stiffness * rate * g.of[i]);
-    }
-    double quotient = 0;
-    for (std::size_t k = 0; k < 3 * nodes; ++k) {
-      force[k] *= root[k / 3];
-      quotient += u[k] * force[k];
-    }
-    frequency2 = quotient;
-    u.swap(force);
-  }
-  return 1.02 * frequency2;
+  kernels<double>(best_isa(), 1).elastic(elements_of(elements), records.data(), records.data() + 4, f.data());
+  for (int n = 0; n < nodes; ++n)
+    for (int c = 0; c < 3; ++c) forces.push_back(f[force.at(n, c)]);
+  return forces;
 }
 
-double stable_step(double frequency2, double damping_time) {
-  const double frequency = std::sqrt(frequency2), ratio = damping_time * frequency / 2;
-  return 2 * (std::sqrt(1 + ratio * ratio) - ratio) / frequency;
+FastestMode fastest_mode(const ElementTables<double>& elements, const Vector& rest,
+                         const Vector& inverse_mass) {
+  double shortest = std::numeric_limits<double>::infinity();
+  for_each_table([&](const auto& table) { shortest = std::min(shortest, shortest_edge(table, rest)); },
+                 elements);
+  // Symmetric form M^-½ K M^-½, so that the Rayleigh quotient converges with the square of the vector's
+  // error.
+  const std::size_t numbers = rest.size();
+  Vector root(numbers), u(numbers), moved(numbers), back(numbers), velocity(numbers);
+  const Vector still(numbers, 0.0);
+  for (std::size_t k = 0; k < numbers; ++k) root[k] = std::sqrt(inverse_mass[k / 3]);
+  Rng rng(1, 0);
+  for (std::size_t k = 0; k < numbers; ++k) u[k] = rng.uniform(-1, 1) * (root[k] > 0);
+  double frequency2 = 0, rate = 0;
+  for (int iteration = 0; iteration < iterations; ++iteration) {
+    double norm2 = 0, farthest = 0;
+    for (double c : u) norm2 += c * c;
+    for (double& c : u) c /= std::sqrt(norm2);
+    for (std::size_t k = 0; k < numbers; ++k) farthest = std::max(farthest, std::abs(root[k] * u[k]));
+    const double step = nudge * shortest / farthest;
+    for (std::size_t k = 0; k < numbers; ++k) {
+      velocity[k] = root[k] * u[k];
+      moved[k] = rest[k] + step * velocity[k];
+      back[k] = rest[k] - step * velocity[k];
+    }
+    const Vector ahead = forces_of(elements, moved, still), behind = forces_of(elements, back, still);
+    const Vector drag = iteration + 1 < iterations ? still : forces_of(elements, rest, velocity);
+    frequency2 = rate = 0;
+    for (std::size_t k = 0; k < numbers; ++k) {
+      const double ku = root[k] * (behind[k] - ahead[k]) / (2 * step);
+      frequency2 += u[k] * ku;
+      rate -= velocity[k] * drag[k];
+      u[k] = ku;
+    }
+  }
+  frequency2 *= margin, rate *= margin;
+  return {frequency2, rate / (2 * std::sqrt(frequency2))};
+}
+
+double stable_step(const FastestMode& mode) {
+  const double zeta = mode.damping_ratio;
+  return 2 * (std::sqrt(1 + zeta * zeta) - zeta) / std::sqrt(mode.frequency2);
 }
 
 }  // namespace limber::fem::detail
