@@ -40,16 +40,22 @@ void measure(benchmark::State& bench, const World& world, const std::vector<Stat
   bench.SetLabel(hex(hasher.digest()));
 }
 
+World barriers(const benchmark::State& bench) {
+  Material material;
+  material.model = MaterialModel(bench.range(2));
+  return build_world(testing::barriers(int(bench.range(0)), material));
+}
+
 // Barriers, nothing touches: the force step alone.
 void free_flight(benchmark::State& bench) {
-  const World world = build_world(testing::barriers(int(bench.range(0))));
+  const World world = barriers(bench);
   const std::vector<State> starts(16, rest_state(world));
   measure(bench, world, starts, std::vector<Control>(16, push({10, 0, 0}, 200)));
 }
 
 // Barriers, the robot at sixteen moments of a way over the first plate, pushed sixteen ways.
 void over_the_plate(benchmark::State& bench) {
-  const World world = build_world(testing::barriers(int(bench.range(0))));
+  const World world = barriers(bench);
   State state = rest_state(world);
   const auto go = [&](const Vec3f& force_n, double seconds) {
     state = propagate(world, state, push(force_n, int(seconds / world.dt_s))).end;
@@ -67,12 +73,12 @@ void over_the_plate(benchmark::State& bench) {
 }
 
 BENCHMARK(free_flight)
-    ->ArgNames({"fineness", "lanes"})
-    ->ArgsProduct({{1, 2}, {1, 4, 8, 16}})
+    ->ArgNames({"fineness", "lanes", "neo_hookean"})
+    ->ArgsProduct({{1, 2}, {1, 4, 8, 16}, {0, 1}})
     ->Unit(benchmark::kMillisecond);
 BENCHMARK(over_the_plate)
-    ->ArgNames({"fineness", "lanes"})
-    ->ArgsProduct({{1, 2}, {1, 4, 8, 16}})
+    ->ArgNames({"fineness", "lanes", "neo_hookean"})
+    ->ArgsProduct({{1, 2}, {1, 4, 8, 16}, {0, 1}})
     ->Unit(benchmark::kMillisecond);
 
 }  // namespace
