@@ -88,10 +88,11 @@ const Tables<double>& tables_of(const World& world) {
 }
 
 template <class Real>
-Contacts<Real>::Contacts(const World& world, int lanes)
+Contacts<Real>::Contacts(const World& world, const Kernels<Real>& kernels, int lanes)
     : world_(world),
       topology_(world.topology),
       tables_(tables_of<Real>(world)),
+      kernels_(kernels),
       bodies_(int(world.bodies.size())),
       step_(Real(world.contact_dt_s)) {
   for (int a = 0; a < bodies_; ++a)
@@ -160,7 +161,7 @@ void Contacts<Real>::refresh(const LaneView<Real>& view, int a, int b, List& lis
   for (int node : list.nodes) listed_[node] = false;
 }
 
-// Tet by tet, the points that a grid finds in its box; then by point, which keeps the tets of each ascending.
+// Tet by tet, the points that slabs find in its box; then by point, which keeps the tets of each ascending.
 template <class Real>
 void Contacts<Real>::build_direction(const LaneView<Real>& view, int from, int into, Real reach, List& list,
                                      int direction) {
@@ -192,7 +193,7 @@ void Contacts<Real>::build_direction(const LaneView<Real>& view, int from, int i
   for (const Candidate& k : candidates) name(topology_.tets[k.tet].node, 4);
 }
 
-// Puts the points of a body that are near the other's box into grid cells; false when there are none.
+// Puts the points of a body that are near the other's box into slabs; false when there are none.
 template <class Real>
 bool Contacts<Real>::sort_points(const LaneView<Real>& view, int from, int into, Real reach) {
   const Topology::Body& body = topology_.bodies[from];
@@ -201,7 +202,7 @@ bool Contacts<Real>::sort_points(const LaneView<Real>& view, int from, int into,
   for (int c = 0; c < 3; ++c) {
     lower[c] = view.lower[(3 * into + c) * view.stride] - reach;
     upper[c] = view.upper[(3 * into + c) * view.stride] + reach;
-    grid_.lower[c] = std::numeric_limits<Real>::max(), grid_.upper[c] = -grid_.lower[c];
+    slabs_.lower[c] = std::numeric_limits<Real>::max(), slabs_.upper[c] = -slabs_.lower[c];
   }
   first_point_ = body.first_point;
   points_.resize(std::size_t(body.last_point - body.first_point));
@@ -209,32 +210,36 @@ bool Contacts<Real>::sort_points(const LaneView<Real>& view, int from, int into,
   for (int k = 0; k < int(points_.size()); ++k) {
     Real* p = points_[k].at;
     place_of(first_point_ + k, p);
-    // Said so that a point that is not finite, of a rollout that blows up, is left out: no grid can hold it.
+    // Said so that a point that is not finite, of a rollout that blows up, is left out: no slab can hold it.
     bool held = true;
     for (int c = 0; c < 3; ++c) held &= p[c] >= lower[c] && p[c] <= upper[c] && std::isfinite(p[c]);
     if (!held) continue;
     near_.push_back(k);
     for (int c = 0; c < 3; ++c) {
-      grid_.lower[c] = std::min(grid_.lower[c], p[c]);
-      grid_.upper[c] = std::max(grid_.upper[c], p[c]);
+      slabs_.lower[c] = std::min(slabs_.lower[c], p[c]);
+      slabs_.upper[c] = std::max(slabs_.upper[c], p[c]);
     }
   }
   if (near_.empty()) return false;
-  for (int c = 0; c < 3; ++c) {
-    const Real size = grid_.upper[c] - grid_.lower[c];
-    grid_.cells[c] = 1 + int(std::min(size / (2 * reach), Real(most_cells - 1)));
-    grid_.inverse_cell[c] = Real(grid_.cells[c]) / (size + reach);
-  }
-  counts_.assign(std::size_t(grid_.cells[0] * grid_.cells[1] * grid_.cells[2] + 1), 0);
-  const auto cell_of = [&](int k) {
-    const Real* p = points_[k].at;
-    return (grid_.row(2, p[2]) * grid_.cells[1] + grid_.row(1, p[1])) * grid_.cells[0] + grid_.row(0, p[0]);
-  };
-  for (int k : near_) ++counts_[cell_of(k) + 1];
+  slabs_.axis = 0;
+  const auto size = [&](int c) { return slabs_.upper[c] - slabs_.lower[c]; };
+  for (int c = 1; c < 3; ++c)
+    if (size(c) > size(slabs_.axis)) slabs_.axis = c;
+  slabs_.count = 1 + int(std::min(size(slabs_.axis) / reach, Real(Slabs::most - 1)));
+  slabs_.inverse_width = Real(slabs_.count) / (size(slabs_.axis) + reach);
+  const auto slab_of = [&](int k) { return slabs_.of(points_[k].at[slabs_.axis]); };
+  counts_.assign(std::size_t(slabs_.count + 1), 0);
+  for (int k : near_) ++counts_[slab_of(k) + 1];
   for (std::size_t k = 1; k < counts_.size(); ++k) counts_[k] += counts_[k - 1];
-  grid_.begin = counts_;
-  grid_.points.resize(near_.size());
-  for (int k : near_) grid_.points[counts_[cell_of(k)]++] = k;
+  slabs_.begin = counts_;
+  slabs_.point.resize(near_.size());
+  for (int k : near_) slabs_.point[counts_[slab_of(k)]++] = k;
+  const std::size_t room = near_.size() + block_size;
+  distance_.resize(room), face_.resize(room);
+  for (int c = 0; c < 3; ++c) {
+    slabs_.at[c].resize(room);
+    for (std::size_t i = 0; i < near_.size(); ++i) slabs_.at[c][i] = points_[slabs_.point[i]].at[c];
+  }
   return true;
 }
 
@@ -243,58 +248,37 @@ bool Contacts<Real>::sort_points(const LaneView<Real>& view, int from, int into,
 template <class Real>
 void Contacts<Real>::collect_near(int t, Real reach) {
   const int* node = topology_.tets[t].node;
-  Real lower[3], upper[3];
+  const Real* const place[4] = {packed_[node[0]].at, packed_[node[1]].at, packed_[node[2]].at,
+                                packed_[node[3]].at};
+  TetPlanes<Real> planes;
   for (int c = 0; c < 3; ++c) {
-    const Real i = packed_[node[0]].at[c], j = packed_[node[1]].at[c], k = packed_[node[2]].at[c],
-               l = packed_[node[3]].at[c];
-    lower[c] = std::min(std::min(i, j), std::min(k, l)) - reach;
-    upper[c] = std::max(std::max(i, j), std::max(k, l)) + reach;
-    if (lower[c] > grid_.upper[c] || upper[c] < grid_.lower[c]) return;
+    planes.lower[c] =
+        std::min(std::min(place[0][c], place[1][c]), std::min(place[2][c], place[3][c])) - reach;
+    planes.upper[c] =
+        std::max(std::max(place[0][c], place[1][c]), std::max(place[2][c], place[3][c])) + reach;
+    if (planes.lower[c] > slabs_.upper[c] || planes.upper[c] < slabs_.lower[c]) return;
   }
-  Real normal[4][3], length2[4];
-  bool flat[4], prepared = false;
-  int first[3], last[3];
-  for (int c = 0; c < 3; ++c) first[c] = grid_.row(c, lower[c]), last[c] = grid_.row(c, upper[c]);
-  for (int z = first[2]; z <= last[2]; ++z)
-    for (int y = first[1]; y <= last[1]; ++y) {
-      const int row = (z * grid_.cells[1] + y) * grid_.cells[0];
-      for (int at = grid_.begin[row + first[0]]; at < grid_.begin[row + last[0] + 1]; ++at) {
-        const int k = grid_.points[at];
-        const Real* p = points_[k].at;
-        if (p[0] < lower[0] || p[0] > upper[0] || p[1] < lower[1] || p[1] > upper[1] || p[2] < lower[2] ||
-            p[2] > upper[2])
-          continue;
-        if (!prepared) {
-          prepared = true;
-          const Real* const place[4] = {packed_[node[0]].at, packed_[node[1]].at, packed_[node[2]].at,
-                                        packed_[node[3]].at};
-          face_normals(place, normal);
-          Real volume6 = 0;
-          for (int c = 0; c < 3; ++c) volume6 += normal[1][c] * (place[1][c] - place[0][c]);
-          for (int i = 0; i < 4; ++i) {
-            length2[i] = dot(normal[i], normal[i]);
-            // A flat tet has no planes to speak of: its box alone decides. An inverted one may have turned
-            // back by then.
-            flat[i] = volume6 * volume6 <= Real(1e-4) * length2[i] * reach * reach;
-            for (int c = 0; c < 3 && volume6 < 0; ++c) normal[i][c] = -normal[i][c];
-          }
-        }
-        int face = 0;
-        Real distance2 = 0;  // from the plane that it is farthest outside of
-        bool outside = false;
-        for (int i = 0; i < 4 && !outside; ++i) {
-          const Real* on_face = packed_[node[(i + 1) % 4]].at;
-          const Real from_face[3] = {p[0] - on_face[0], p[1] - on_face[1], p[2] - on_face[2]};
-          const Real side = dot(normal[i], from_face);
-          if (flat[i] || side >= 0) continue;
-          outside = side * side > reach * reach * length2[i];
-          if (side * side <= distance2 * length2[i]) continue;
-          face = i;
-          distance2 = side * side / length2[i];
-        }
-        if (!outside) found_.push_back({k, t, face, std::sqrt(distance2)});
-      }
-    }
+  const int first = slabs_.begin[slabs_.of(planes.lower[slabs_.axis])],
+            last = slabs_.begin[slabs_.of(planes.upper[slabs_.axis]) + 1];
+  if (first == last) return;
+  face_normals(place, planes.normal);
+  Real volume6 = 0;
+  for (int c = 0; c < 3; ++c) volume6 += planes.normal[1][c] * (place[1][c] - place[0][c]);
+  for (int i = 0; i < 4; ++i) {
+    const Real length2 = dot(planes.normal[i], planes.normal[i]);
+    // A flat tet has no planes to speak of: its box alone decides. An inverted one may have turned back by
+    // then.
+    const bool flat = volume6 * volume6 <= Real(1e-4) * length2 * reach * reach;
+    const Real scale = flat ? Real(0) : (volume6 < 0 ? Real(1) : Real(-1)) / std::sqrt(length2);
+    for (Real& n : planes.normal[i]) n *= scale;
+    planes.offset[i] = dot(planes.normal[i], place[(i + 1) % 4]);
+  }
+  const int count = last - first;
+  kernels_.distances(planes, &slabs_.at[0][first], &slabs_.at[1][first], &slabs_.at[2][first], count,
+                     distance_.data(), face_.data());
+  const Real* const distance = distance_.data();
+  for (int i = 0; i < count; ++i)
+    if (distance[i] <= reach) found_.push_back({slabs_.point[first + i], t, face_[i], distance[i]});
 }
 
 // The first tet that contains the point, in ascending order, has it: a point on a shared face has one owner.
@@ -310,7 +294,7 @@ void Contacts<Real>::find_touches(const LaneView<Real>& view, int into, Real tra
   for (const Record& record : list.records[direction]) {
     Real p[3];
     place_of(record.point, p);
-    // Said so that a point that is not finite, of a rollout that blows up, is left out: no grid can hold it.
+    // Said so that a point that is not finite, of a rollout that blows up, is left out: no slab can hold it.
     bool held = true;
     for (int c = 0; c < 3; ++c) held &= p[c] >= lower[c] && p[c] <= upper[c] && std::isfinite(p[c]);
     if (!held) continue;

@@ -45,7 +45,7 @@ struct Touch {
 template <class Real>
 class Contacts {
  public:
-  Contacts(const World&, int lanes);
+  Contacts(const World&, const Kernels<Real>&, int lanes);
   void forget(int lane);  // the lane holds another state now
   // Adds the forces of all contacts and walls to view.f.
   void add_forces(int lane, const LaneView<Real>& view);
@@ -78,14 +78,16 @@ class Contacts {
     int tet, face;
     Real distance;  // to the tet at least
   };
-  static constexpr int most_cells = 32;  // a side
-  struct Grid {
-    Real lower[3], upper[3], inverse_cell[3];
-    int cells[3];
-    std::vector<int> begin, points;
-    int row(int axis, Real x) const {  // never falls as x grows, so a box finds all that is in it
-      const Real r = (x - lower[axis]) * inverse_cell[axis];
-      return r > 0 ? (r < Real(cells[axis]) ? int(r) : cells[axis] - 1) : 0;
+  // Points of a body near another, in slabs along their longest axis; within a slab by number.
+  struct Slabs {
+    static constexpr int most = 32;
+    int axis, count;
+    Real lower[3], upper[3], inverse_width;
+    std::vector<int> begin, point;
+    std::vector<Real> at[3];  // x, y, z of each point, filled up for the kernel
+    int of(Real x) const {    // never falls as x grows, so a box finds all that is in it
+      const Real slab = (x - lower[axis]) * inverse_width;
+      return slab > 0 ? (slab < Real(count) ? int(slab) : count - 1) : 0;
     }
   };
   struct Cell;
@@ -107,6 +109,7 @@ class Contacts {
   const World& world_;
   const Topology& topology_;
   const Tables<Real>& tables_;
+  const Kernels<Real>& kernels_;
   int bodies_;
   Real step_;  // the step from which stiffness follows
   std::vector<std::pair<int, int>> pairs_;
@@ -118,7 +121,9 @@ class Contacts {
   int first_point_ = 0;
   std::vector<Place> points_;  // of the body at hand, from first_point_
   std::vector<int> near_, counts_;
-  Grid grid_;
+  Slabs slabs_;
+  std::vector<Real> distance_;  // of points of slabs_ to the tet at hand, and their faces
+  std::vector<int> face_;
   std::vector<Found> found_;
   std::vector<bool> listed_;  // by world node
 };

@@ -98,6 +98,13 @@ struct Motion {
   Real* speed2;         // out: largest |v|² of the new velocities, [lane]
 };
 
+// A tet for finding points near it.
+template <class Real>
+struct TetPlanes {
+  Real lower[3], upper[3];       // a box
+  Real normal[4][3], offset[4];  // outward unit normals and places of the faces' planes; all 0 of a flat tet
+};
+
 template <class Real>
 struct Kernels {
   int lanes;
@@ -105,6 +112,10 @@ struct Kernels {
   void (*elastic)(const Elements<Real>&, const Real* x, const Real* v, Real* f);
   // v += dt (f/m + g + push), x += dt v, f = 0.
   void (*integrate)(const Motion<Real>&, Real* x, Real* v, Real* f);
+  // How far points are outside of the planes, at most, and of which; huge outside of the box. Works on
+  // multiples of block_size: all five arrays must be that long.
+  void (*distances)(const TetPlanes<Real>&, const Real* x, const Real* y, const Real* z, int count,
+                    Real* distance, int* face);
 };
 
 enum class Isa { sse2, avx2, avx512 };

@@ -31,7 +31,7 @@ Stepper<Real>::Stepper(const World& world, int lanes, Isa isa)
       tables_(tables_of<Real>(world)),
       kernels_(kernels<Real>(isa, lanes)),
       lanes_(lanes),
-      contacts_(world, lanes),
+      contacts_(world, kernels_, lanes),
       state_layout_(state_layout(lanes)),
       force_layout_(force_layout(lanes)),
       first_velocity_(lanes == 1 ? 4 : world.nodes * state_layout_.node),

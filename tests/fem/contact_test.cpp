@@ -97,7 +97,7 @@ TEST(Contact, FindsWhatBruteForceFinds) {
     const World world =
         build_world(two_bodies(ball({0, 0, 0}, 0.5, 3), grid({0.6, -0.5, -0.5}, {0.5, 1, 1}, 2, 3, 3)));
     Lane lane(world);
-    detail::Contacts<float> contacts(world, 1);
+    detail::Contacts<float> contacts(world, detail::kernels<float>(detail::best_isa(), 1), 1);
     const Vec3f target = (0.3 * rng.direction()).cast<float>() + Vec3f(0.7f, 0, 0);
     for (int place = 0; place < 50; ++place) {
       const Vec3f turn = (0.02 * rng.direction()).cast<float>();
@@ -145,7 +145,7 @@ TEST(Contact, DepthOfAFlatContactIsTheDistance) {
       build_world(two_bodies(cube({0, 0, 1.0}, 1, 3), grid({-1, -1, -0.5}, {2, 2, 1}, 5, 5, 3)));
   Lane lane(world);
   lane.move(0, [](const Vec3f& p) -> Vec3f { return p + Vec3f(0.03f, 0.02f, -0.04f); });
-  detail::Contacts<float> contacts(world, 1);
+  detail::Contacts<float> contacts(world, detail::kernels<float>(detail::best_isa(), 1), 1);
   int from_cube = 0;
   for (const auto& touch : contacts.find(0, lane.view(), 0, 1)) {
     EXPECT_TRUE(touch.known);
