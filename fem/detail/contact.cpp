@@ -336,18 +336,7 @@ void Contacts<Real>::measure_depths(const LaneView<Real>& view, int from, int in
     Touch<Real>& touch = touches_[i];
     const Topology::Point& point = topology_.points[touch.point];
     if (point.node[0] == point.node[1]) touch_of_node_[point.node[0]] = int(i);
-    const Cell start(view, topology_.tets[touch.tet]);
-    Real p[3], sum = 0;
-    place_of(touch.point, p);
-    for (int k = point.neighbor_begin; k < point.neighbor_end; ++k) {
-      Real q[3], way[3], normal[3];
-      fetch(view, topology_.neighbors[k], q);
-      if (!walk_out(view, start, touch.tet, p, q, way, normal)) continue;
-      const Real weight = 1 / (dot(way, way) + tiny);
-      sum += weight;
-      touch.depth += weight * dot(way, normal);
-      for (int c = 0; c < 3; ++c) touch.direction[c] += weight * normal[c];
-    }
+    const Real sum = sum_of_exits(view, touch);
     touch.known = finish(touch, sum);
     unknown += !touch.known;
   }
@@ -381,6 +370,57 @@ void Contacts<Real>::measure_depths(const LaneView<Real>& view, int from, int in
   for (std::size_t i = first; i < last; ++i) touch_of_node_[topology_.points[touches_[i].point].node[0]] = -1;
 }
 
+// Adds the depth and direction of all ways out along mesh edges, weighted by 1/distance², and returns the sum
+// of the weights.
+template <class Real>
+Real Contacts<Real>::sum_of_exits(const LaneView<Real>& view, Touch<Real>& touch) {
+  constexpr Real tiny = Real(1e-12);  // m², keeps 1/distance² finite
+  const Topology::Point& point = topology_.points[touch.point];
+  const Topology::Tet& tet = topology_.tets[touch.tet];
+  const Cell cell(view, tet);
+  WayOut<Real> from;
+  place_of(touch.point, from.place);
+  Real outward[4][3];
+  for (int i = 0; i < 4; ++i) {
+    const Real* on_face = cell.place[(i + 1) % 4];
+    const Real from_face[3] = {from.place[0] - on_face[0], from.place[1] - on_face[1],
+                               from.place[2] - on_face[2]};
+    from.height[i] = dot(cell.normal[i], from_face);
+    const Real length = std::sqrt(dot(cell.normal[i], cell.normal[i]));
+    for (int c = 0; c < 3; ++c) {
+      from.normal[i][c] = cell.normal[i][c];
+      outward[i][c] = -cell.normal[i][c] / length;
+    }
+  }
+  const int count = point.neighbor_end - point.neighbor_begin;
+  for (auto& at : ends_)
+    if (int(at.size()) < count + block_size) at.resize(std::size_t(count + block_size));
+  if (int(share_.size()) < count + block_size)
+    share_.resize(std::size_t(count + block_size)), exit_.resize(share_.size());
+  for (int k = 0; k < count; ++k)
+    for (int c = 0; c < 3; ++c)
+      ends_[c][k] = view.x[view.state.at(topology_.neighbors[point.neighbor_begin + k], c)];
+  kernels_.exits(from, ends_[0].data(), ends_[1].data(), ends_[2].data(), count, share_.data(), exit_.data());
+  Real sum = 0;
+  for (int k = 0; k < count; ++k) {
+    const int exit = exit_[k];
+    if (exit < 0) continue;
+    const Real end[3] = {ends_[0][k], ends_[1][k], ends_[2][k]};
+    Real way[3], normal[3];
+    if (const int next = tet.across[exit]; next < 0) {
+      const Real share = std::max(share_[k], Real(0));
+      for (int c = 0; c < 3; ++c) way[c] = share * (end[c] - from.place[c]), normal[c] = outward[exit][c];
+    } else if (!walk_out(view, next, touch.tet, from.place, end, way, normal)) {
+      continue;
+    }
+    const Real weight = 1 / (dot(way, way) + tiny);
+    sum += weight;
+    touch.depth += weight * dot(way, normal);
+    for (int c = 0; c < 3; ++c) touch.direction[c] += weight * normal[c];
+  }
+  return sum;
+}
+
 // Divides the weighted sums; false when there was nothing to sum, or the directions cancelled.
 template <class Real>
 bool Contacts<Real>::finish(Touch<Real>& touch, Real sum) {
@@ -411,32 +451,31 @@ void Contacts<Real>::leave_along_centers(const LaneView<Real>& view, int from, i
   for (std::size_t i = first; i < last; ++i) {
     Touch<Real>& touch = touches_[i];
     if (touch.known) continue;
-    const Cell start(view, topology_.tets[touch.tet]);
     Real p[3], far[3], way[3], normal[3];
     place_of(touch.point, p);
     for (int c = 0; c < 3; ++c) far[c] = p[c] + scale * line[c];
-    touch.known = walk_out(view, start, touch.tet, p, far, way, normal);
+    touch.known = walk_out(view, touch.tet, -1, p, far, way, normal);
     if (!touch.known) continue;
     touch.depth = dot(way, normal);
     std::copy_n(normal, 3, touch.direction);
   }
 }
 
-// From p in a tet towards q through face neighbours. True when the body's surface is met first: `way` is the
-// part of q − p up to there, `normal` the outward unit normal.
+// From p towards q through face neighbours, beginning in `tet`, come from its neighbour `before` (−1: p is in
+// it). True when the body's surface is met first: `way` is the part of q − p up to there, `normal` the
+// outward unit normal.
 template <class Real>
-bool Contacts<Real>::walk_out(const LaneView<Real>& view, const Cell& start, int tet, const Real p[3],
+bool Contacts<Real>::walk_out(const LaneView<Real>& view, int tet, int before, const Real p[3],
                               const Real q[3], Real way[3], Real normal[3]) const {
   constexpr int most_tets = 256;  // inverted tets can lead in circles
   const Real move[3] = {q[0] - p[0], q[1] - p[1], q[2] - p[2]};
-  Cell cell = start;
-  int entry = -1;
   for (int walked = 0; walked < most_tets; ++walked) {
+    const Cell cell(view, topology_.tets[tet]);
     Real soonest = 1;
     int exit = -1;
     for (int i = 0; i < 4; ++i) {
       const Real change = dot(cell.normal[i], move);
-      if (i == entry || !(change < 0)) continue;
+      if ((before >= 0 && topology_.tets[tet].across[i] == before) || !(change < 0)) continue;
       const Real* on_face = cell.place[(i + 1) % 4];
       const Real from_face[3] = {p[0] - on_face[0], p[1] - on_face[1], p[2] - on_face[2]};
       const Real when = dot(cell.normal[i], from_face) / -change;
@@ -450,10 +489,8 @@ bool Contacts<Real>::walk_out(const LaneView<Real>& view, const Cell& start, int
       for (int c = 0; c < 3; ++c) way[c] = share * move[c], normal[c] = -cell.normal[exit][c] / length;
       return true;
     }
-    for (int i = 0; i < 4; ++i)
-      if (topology_.tets[next].across[i] == tet) entry = i;
+    before = tet;
     tet = next;
-    cell = Cell(view, topology_.tets[tet]);
   }
   return false;
 }

@@ -101,8 +101,9 @@ class Contacts {
   void measure_depths(const LaneView<Real>&, int from, int into, std::size_t first, std::size_t last);
   void leave_along_centers(const LaneView<Real>&, int from, int into, std::size_t first, std::size_t last);
   static bool finish(Touch<Real>&, Real sum);
-  bool walk_out(const LaneView<Real>&, const Cell& start, int tet, const Real p[3], const Real q[3],
-                Real way[3], Real normal[3]) const;
+  Real sum_of_exits(const LaneView<Real>&, Touch<Real>&);
+  bool walk_out(const LaneView<Real>&, int tet, int before, const Real p[3], const Real q[3], Real way[3],
+                Real normal[3]) const;
   void respond(const LaneView<Real>&, Real friction, const Touch<Real>&) const;
   void add_wall_forces(const LaneView<Real>&, int body) const;
 
@@ -117,6 +118,9 @@ class Contacts {
   std::vector<Touch<Real>> touches_;
   std::vector<Place> packed_;       // by world node; valid for the nodes of the list at hand
   std::vector<int> touch_of_node_;  // index into touches_ while depths are measured, else −1
+  // Scratch of a touch: the mesh edges' other ends, and where ways to them leave the tet.
+  std::vector<Real> ends_[3], share_;
+  std::vector<int> exit_;
   // Scratch of a list's building.
   int first_point_ = 0;
   std::vector<Place> points_;  // of the body at hand, from first_point_

@@ -105,6 +105,14 @@ struct TetPlanes {
   Real normal[4][3], offset[4];  // outward unit normals and places of the faces' planes; all 0 of a flat tet
 };
 
+// A point in a tet, for finding how ways lead out of the tet.
+template <class Real>
+struct WayOut {
+  Real place[3];
+  Real normal[4][3];  // inward, of any length
+  Real height[4];     // of the point above the faces, in lengths of the normals
+};
+
 template <class Real>
 struct Kernels {
   int lanes;
@@ -116,6 +124,10 @@ struct Kernels {
   // multiples of block_size: all five arrays must be that long.
   void (*distances)(const TetPlanes<Real>&, const Real* x, const Real* y, const Real* z, int count,
                     Real* distance, int* face);
+  // Through which face (−1: none) straight ways from the point to (x y z) leave the tet, and after which
+  // share of the way. Multiples of block_size as above.
+  void (*exits)(const WayOut<Real>&, const Real* x, const Real* y, const Real* z, int count, Real* share,
+                int* face);
 };
 
 enum class Isa { sse2, avx2, avx512 };
