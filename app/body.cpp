@@ -61,13 +61,16 @@ bool up_to_date(const fs::path& folder, const Json& input) {
   }
 }
 
-// CPU seconds since the last call.
-class Stopwatch {
- public:
-  double lap() {
-    const double now = cpu_seconds(), seconds = now - last_;
+// What each stage of a body cost.
+struct Costs {
+  Json cpu_s;    // of the stage itself
+  Json peak_mb;  // of all stages up to it
+
+  void end_stage(const char* name) {
+    const double now = cpu_seconds();
+    cpu_s[name] = std::round(1e4 * (now - last_)) / 1e4;
+    peak_mb[name] = std::round(peak_memory_mb());
     last_ = now;
-    return std::round(1e4 * seconds) / 1e4;
   }
 
  private:
@@ -83,11 +86,10 @@ Json prepare_body(const BodySource& source, const PrepareSettings& settings, con
     return read_json(folder / "report.json");
   }
   log::info("{}: preparing {}", folder.string(), source.model);
-  Stopwatch watch;
-  Json seconds;
+  Costs costs;
   const meshing::ImportedModel model = source.load();
   validate(model.surface, source.model);
-  seconds["import"] = watch.lap();
+  costs.end_stage("import");
 
   make_folder(folder);  // not before: a model that cannot be read leaves nothing behind
   std::error_code ignored;
@@ -100,7 +102,7 @@ Json prepare_body(const BodySource& source, const PrepareSettings& settings, con
 
   const meshing::Decomposition decomposition =
       meshing::decompose(model.surface, {.max_shells = settings.shells, .max_concavity = settings.concavity});
-  seconds["decompose"] = watch.lap();
+  costs.end_stage("decompose");
   throw_if_stopped();
 
   std::optional<TetMesh> made_cage = source.made_cage();
@@ -113,22 +115,22 @@ Json prepare_body(const BodySource& source, const PrepareSettings& settings, con
                                {.mode = mode_of(settings.mode), .tets = settings.tets});
   }
   validate(cage.mesh, source.model + ": cage");
-  seconds["cage"] = watch.lap();
+  costs.end_stage("cage");
   throw_if_stopped();
 
   const meshing::TetQuality quality = meshing::measure_quality(cage.mesh);
   const meshing::Certificate certificate = meshing::certify(model.surface, cage.mesh);
-  seconds["certify"] = watch.lap();
+  costs.end_stage("certify");
   throw_if_stopped();
 
   const ffd::Binding binding = ffd::bind(model.surface, cage.mesh);
-  seconds["bind"] = watch.lap();
+  costs.end_stage("bind");
 
   write_ply(folder / "surface.ply", model.surface);
   write_obj(folder / "shells.obj", decomposition.shells);
   write_msh(folder / "cage.msh", cage.mesh, cage.shell_from_tet);
   ffd::write_binding(folder / "binding.npz", binding, model.surface, cage.mesh);
-  seconds["write"] = watch.lap();
+  costs.end_stage("write");
 
   std::vector<std::string> warnings = model.warnings;
   warnings.insert(warnings.end(), cage.notes.begin(), cage.notes.end());
@@ -168,7 +170,8 @@ Json prepare_body(const BodySource& source, const PrepareSettings& settings, con
   report["certificate"] = json_of(certificate);
   report["binding"] = {{"vertices_outside", binding.outside},
                        {"max_outside_distance_m", binding.max_outside_distance_m}};
-  report["cpu_seconds"] = seconds;
+  report["cpu_seconds"] = costs.cpu_s;
+  report["peak_memory_mb_after"] = costs.peak_mb;
   report["peak_memory_mb"] = std::round(peak_memory_mb());
   for (const char* name : body_files) report["files"][name] = hash_of_file(folder / name);
   write_json(folder / "report.json", report);

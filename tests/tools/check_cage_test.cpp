@@ -194,6 +194,14 @@ TEST(CheckCage, CountsAFlippedTet) {
   EXPECT_EQ(report.at("vertices_outside"), 0);  // it still holds what it held
 }
 
+TEST(CheckCage, TakesTheOtherConventionOfTurning) {
+  const SurfaceMesh m = made_sphere(8);
+  TetMesh cage = cage_of(m, 200).mesh;
+  const double expected = volume(cage);
+  cage.tets.col(0).swap(cage.tets.col(1));
+  EXPECT_NEAR(judged(m, cage, true).at("volume").get<double>(), expected, 1e-12);
+}
+
 TEST(CheckCage, CountsTheFacesOfATetThatIsThereTwice) {
   const SurfaceMesh m = made_sphere(8);
   TetMesh cage = cage_of(m, 200).mesh;

@@ -170,7 +170,10 @@ bool CageFacts::holds() const {
          boundary_pairs_crossing == 0;
 }
 
-CageFacts judge_cage(const Solid& solid, const TetMesh& mesh) {
+CageFacts judge_cage(const Solid& solid, TetMesh mesh) {
+  if (std::all_of(mesh.tets.begin(), mesh.tets.end(),
+                  [&](const Tet& t) { return orientation_of(mesh, t) < 0; }))
+    for (Tet& t : mesh.tets) std::swap(t[0], t[1]);
   CageFacts facts;
   facts.surface_vertices = solid.surface().points.size();
   facts.surface_triangles = solid.surface().triangles.size();

@@ -29,7 +29,8 @@ struct CageFacts {
   // manifold boundary that does not cross itself.
   bool holds() const;
 };
-CageFacts judge_cage(const Solid&, const TetMesh&);
+// Where all tets turn the other way round, that is the program's convention, and they are turned first.
+CageFacts judge_cage(const Solid&, TetMesh);
 
 // Tets that meet the surface, and those of them in which two pieces of it lie that only the air joins.
 // Estimated (in double precision, at sample points), and so that a doubt counts as glued:

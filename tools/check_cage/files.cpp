@@ -327,8 +327,8 @@ TetMesh read_gmsh(const std::string& file, const std::string& text) {
   TetMesh mesh;
   std::map<int, int> row_of;
   for (std::string_view word = words.next(); !word.empty(); word = words.next()) {
-    if (word == "$MeshFormat" && (words.next() != "2.2" || words.next() != "0"))
-      throw FileError(file + ": is not Gmsh 2.2 ASCII");
+    if (word == "$MeshFormat" && (!words.next().starts_with("2") || words.next() != "0"))
+      throw FileError(file + ": is not Gmsh 2 ASCII");
     if (word == "$Nodes")
       for (int n = words.count(); n > 0; --n) {
         row_of[words.integer()] = int(mesh.points.size());

@@ -29,7 +29,7 @@ struct TetMesh {
   std::vector<Point> points;
   std::vector<Tet> tets;
 };
-// .msh (Gmsh 2.2 ASCII), .mesh (Medit ASCII), .ele with the .node beside it (TetGen); linear tets, others are
+// .msh (Gmsh 2 ASCII), .mesh (Medit ASCII), .ele with the .node beside it (TetGen); linear tets, others are
 // passed over. Points stay as they are: two at one place may be meant.
 TetMesh read_tets(const std::string& file);
 
