@@ -9,6 +9,7 @@
 
 #include "core/error.h"
 #include "fem/detail/overlap.h"
+#include "fem/detail/spring_weights.h"
 #include "fem/detail/timestep.h"
 
 namespace limber::fem {
@@ -146,7 +147,9 @@ void make_springs(const Body& body, ElementTables<double>& tables) {
     tables.volumes.elements.push_back(
         {{q[0], q[1], q[2], q[3]}, {6 * v, k * scale, inverted * scale, tau * k * scale}});
   }
-  for (const auto& [edge, k] : sum_over_edges(body, [&](int t) { return 2.5 * mu * volumes[t]; })) {
+  std::vector<double> mu_volume;
+  for (const double v : volumes) mu_volume.push_back(mu * v);
+  for (const auto& [edge, k] : detail::isotropic_springs(body.cage, mu_volume)) {
     const double rest = (x.row(edge.first) - x.row(edge.second)).norm();
     tables.springs.elements.push_back(
         {{edge.first, edge.second}, {rest, k / (rest * rest), tau * k / (rest * rest)}});
