@@ -329,6 +329,24 @@ TEST(CheckCage, ReadsTheSameFromEveryForm) {
             std::string::npos);
 }
 
+TEST(CheckCage, RefusesEveryTruncatedFile) {
+  const TemporaryFolder folder;
+  const SurfaceMesh m = made_sphere(3);
+  const TetMesh cage = cage_of(m, 60).mesh;
+  write_ply(folder / "m.ply", m);
+  write_msh(folder / "c.msh", cage);
+  for (const char* name : {"m.ply", "c.msh"}) {
+    const std::string whole = read_file(folder / name);
+    for (std::size_t size = 0; size < whole.size() - 15; size += whole.size() / 40) {
+      SCOPED_TRACE(fmt::format("{} of {} bytes of {}", size, whole.size(), name));
+      std::ofstream(folder / (std::string("cut_") + name), std::ios::binary) << whole.substr(0, size);
+      const bool surface = name == std::string("m.ply");
+      const std::string file = (folder / (std::string("cut_") + name)).string();
+      run_checker(surface ? file : (folder / "m.ply").string() + " --tets " + file, 2);
+    }
+  }
+}
+
 TEST(CheckCage, CutsAPolygonInItsPlane) {
   // A prism of height 1 over an arrowhead of area 1/4. The triangle of the first three corners of each
   // polygon, and those of a fan from its first corner, leave it, which adds to the area and not to the signed

@@ -246,6 +246,9 @@ Polygons read_ply(const std::string& file, const std::string& text) {
     }
   }
   if (!header) throw FileError(file + ": has no end_header");
+  for (const Element& element : elements)
+    if (element.count > text.size() || element.properties.empty())
+      throw FileError(file + ": " + std::to_string(element.count) + " of " + element.name);
   PlyValues values(file, text, std::size_t(header.tellg()), format);
   Polygons mesh;
   for (const Element& element : elements)
@@ -258,7 +261,10 @@ Polygons read_ply(const std::string& file, const std::string& text) {
             point[std::size_t(p.name[0] - 'x')] = value;
           continue;
         }
-        std::vector<int> face(std::size_t(values.next(p.count_type)));
+        const double corners = values.next(p.count_type);
+        if (!(corners >= 0 && corners <= double(text.size())))
+          throw FileError(file + ": a face of " + std::to_string(corners) + " corners");
+        std::vector<int> face(std::size_t(corners), 0);
         for (int& v : face) v = int(values.next(p.type));
         if (element.name == "face" && p.name.starts_with("vertex_ind")) mesh.faces.push_back(std::move(face));
       }
