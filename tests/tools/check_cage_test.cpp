@@ -252,12 +252,26 @@ TEST(CheckCage, GluedIsWhatOnlyTheAirJoins) {
   const SurfaceMesh stone_in_a_hollow = joined(hollow, cube(0.1, {0.15, 0.15, 0.15}));
   EXPECT_EQ(judged(stone_in_a_hollow, one_tet(1), true).at("glued_share"), 1);
 
+  // Whichever way the triangles turn.
+  const Json turned = judged(inside_out(hollow), one_tet(1), true);
+  EXPECT_EQ(turned.at("glued_share"), 0);
+  EXPECT_NEAR(turned.at("volume_ratio").get<double>(), 1.0 / 6 / (std::pow(0.2, 3) - std::pow(0.18, 3)),
+              1e-9);
+  EXPECT_EQ(judged(inside_out(stone_in_a_hollow), one_tet(1), true).at("glued_share"), 1);
+  const auto every_other_turned = [](SurfaceMesh m) {
+    for (Eigen::Index t = 0; t < m.triangles.rows(); t += 2) std::swap(m.triangles(t, 0), m.triangles(t, 1));
+    return m;
+  };
+  EXPECT_EQ(judged(every_other_turned(hollow), one_tet(1), true).at("glued_share"), 0);
+  EXPECT_EQ(judged(every_other_turned(stone_in_a_hollow), one_tet(1), true).at("glued_share"), 1);
+
   const auto open = [](SurfaceMesh closed) {
     closed.triangles.conservativeResize(closed.triangles.rows() - 1, 3);
     return closed;
   };
   EXPECT_EQ(judged(open(apart), one_tet(1), true).at("glued_share"), 1);
   EXPECT_EQ(judged(open(hollow), one_tet(1), true).at("glued_share"), 0);
+  EXPECT_EQ(judged(inside_out(open(hollow)), one_tet(1), true).at("glued_share"), 0);
 
   // Two fingers of one hand: within the small tet only the air joins them, in the large one their root does.
   const SurfaceMesh hand = joined(joined(moved(box_at_origin({0.5, 0.2, 0.1}), {0.1, 0.1, 0.1}),

@@ -19,27 +19,27 @@ Json json_of(const CageFacts& f) {
   const auto share = [](std::size_t part, std::size_t whole) {
     return whole > 0 ? double(part) / double(whole) : 0;
   };
-  return {
-      {"holds", f.holds()},
-      {"vertices_outside", f.vertices_outside},
-      {"enclosed_share", 1 - share(f.vertices_outside, f.surface_vertices)},
-      {"triangles_crossing", f.triangles_crossing},
-      {"triangles_meeting", f.triangles_meeting},
-      {"tets", f.tets},
-      {"tets_not_positive", f.tets_not_positive},
-      {"faces_overfull", f.faces_overfull},
-      {"boundary_triangles", f.boundary_triangles},
-      {"boundary_edges_not_manifold", f.boundary_edges_not_manifold},
-      {"boundary_vertices_not_manifold", f.boundary_vertices_not_manifold},
-      {"boundary_pairs_crossing", f.boundary_pairs_crossing},
-      {"components", f.components},
-      {"min_dihedral_deg", f.min_dihedral_deg},
-      {"max_dihedral_deg", f.max_dihedral_deg},
-      {"median_dihedral_deg", f.median_dihedral_deg},
-      {"volume", f.volume},
-      {"volume_ratio", f.surface_closed && f.surface_volume > 0 ? Json(f.volume / f.surface_volume) : Json()},
-      {"tets_at_surface", f.tets_at_surface},
-      {"glued_share", share(f.tets_glued, f.tets_at_surface)}};
+  return {{"holds", f.holds()},
+          {"vertices_outside", f.vertices_outside},
+          {"enclosed_share", 1 - share(f.vertices_outside, f.surface_vertices)},
+          {"triangles_crossing", f.triangles_crossing},
+          {"triangles_meeting", f.triangles_meeting},
+          {"tets", f.tets},
+          {"tets_not_positive", f.tets_not_positive},
+          {"faces_overfull", f.faces_overfull},
+          {"boundary_triangles", f.boundary_triangles},
+          {"boundary_edges_not_manifold", f.boundary_edges_not_manifold},
+          {"boundary_vertices_not_manifold", f.boundary_vertices_not_manifold},
+          {"boundary_pairs_crossing", f.boundary_pairs_crossing},
+          {"components", f.components},
+          {"min_dihedral_deg", f.min_dihedral_deg},
+          {"max_dihedral_deg", f.max_dihedral_deg},
+          {"median_dihedral_deg", f.median_dihedral_deg},
+          {"volume", f.volume},
+          {"volume_ratio",
+           f.surface_closed && f.surface_volume != 0 ? Json(f.volume / std::abs(f.surface_volume)) : Json()},
+          {"tets_at_surface", f.tets_at_surface},
+          {"glued_share", share(f.tets_glued, f.tets_at_surface)}};
 }
 
 Json json_of(const ShellFacts& f) {

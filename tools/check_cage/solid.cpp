@@ -95,8 +95,8 @@ double Solid::volume() const {
   return six / 6;
 }
 
-int Solid::crossings(const Point& from, const Point& direction) const {
-  int sum = 0;
+Solid::Crossings Solid::crossings(const Point& from, const Point& direction) const {
+  Crossings sum;
   grid_.for_each_along(from, direction, [&](int i) {
     const Corners c = corners(std::size_t(i));
     const Point a = c[0] - from, b = c[1] - from, d = c[2] - from;
@@ -104,7 +104,9 @@ int Solid::crossings(const Point& from, const Point& direction) const {
                  w = dot(direction, cross(d, a));
     const bool outwards = u > 0 && v > 0 && w > 0, inwards = u < 0 && v < 0 && w < 0;
     // Behind the start where the start lies on the side to which the ray leaves.
-    if ((outwards || inwards) && (dot(a, cross(b, d)) > 0) == outwards) sum += outwards ? 1 : -1;
+    if (!(outwards || inwards) || (dot(a, cross(b, d)) > 0) != outwards) return;
+    ++sum.all;
+    sum.outwards_less_inwards += outwards ? 1 : -1;
   });
   return sum;
 }
@@ -112,13 +114,14 @@ int Solid::crossings(const Point& from, const Point& direction) const {
 bool Solid::inside(const Point& p) const {
   static const std::vector<Point> three = directions(3), nine = directions(9);
   if (closed_) {
-    std::array<int, 3> n{crossings(p, three[0]), crossings(p, three[1]), crossings(p, three[2])};
+    std::array<int, 3> n;
+    for (std::size_t i = 0; i < 3; ++i) n[i] = crossings(p, three[i]).outwards_less_inwards;
     std::sort(n.begin(), n.end());
-    return n[1] > 0;
+    return n[1] != 0;
   }
-  int sum = 0;
-  for (const Point& direction : nine) sum += crossings(p, direction);
-  return 2 * sum > int(nine.size());
+  std::size_t odd = 0;
+  for (const Point& direction : nine) odd += crossings(p, direction).all % 2 == 1;
+  return 2 * odd > nine.size();
 }
 
 double Solid::distance(const Point& p) const {

@@ -17,14 +17,17 @@ class Solid {
   double area() const;
   double volume() const;  // signed; of the closed surface
 
-  // Signed crossings of rays: the winding number where the surface is closed (the middle one of three rays),
-  // else the mean over nine directions, which estimates the share of the view that the surface fills. Over a
-  // half.
+  // By rays. Where the surface is closed and of one turn: the winding number (the middle one of three) is not
+  // 0; so a model that is inside out counts as well. Else: most of nine rays cross the surface an odd number
+  // of times.
   bool inside(const Point&) const;
   double distance(const Point&) const;  // to the closest point of the surface
 
  private:
-  int crossings(const Point& from, const Point& direction) const;
+  struct Crossings {
+    int all = 0, outwards_less_inwards = 0;
+  };
+  Crossings crossings(const Point& from, const Point& direction) const;
 
   Surface surface_;
   Grid grid_;
