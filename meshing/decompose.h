@@ -20,7 +20,8 @@ struct DecomposeOptions {
 struct Decomposition {
   std::vector<ConvexShell> shells;
   std::vector<std::array<int, 2>> neighbours;  // rows of shells, lower first, ascending: they share a cut
-  std::string stopped_by;          // "count", or "concavity": the bound is met, or no cut gains anything
+  std::string
+      stopped_by;  // what ruled: "concavity", the bound is met; "count"; "gain", no cut gains anything
   double sum_of_hull_volumes = 0;  // m³
   double model_volume = 0;         // m³, holes closed by fans
   // Distance from the boundary of the union of shells to the model, over its diagonal, at about 20,000 points

@@ -1,10 +1,11 @@
 #include "meshing/detail/cut_search.h"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
+#include <map>
 
 #include "core/random.h"
+#include "meshing/detail/sketch.h"
 
 namespace limber::meshing::detail {
 
@@ -14,14 +15,19 @@ namespace {
 // above, and each tells its volume at every offset.
 class Sweep {
  public:
-  Sweep(const Model&, const Part&, InsideTest&);
+  // Volumes are those of hulls that may lack `tolerance` of the part's extent.
+  Sweep(const Sketch&, const Part&, InsideTest&, double tolerance);
+  // For cuts that leave each point where `side` says below (−1) or above (1): their hulls are grown once, and
+  // only the points between (0) are still to be sorted. A segment between two points on one side must stay
+  // there.
+  template <class Side>
+  Sweep narrowed(Side side) const;
   // `offsets` ascending. Keeps the best cut so far in `best`; true when it became better.
   bool try_offsets(const Vec3& direction, const std::vector<double>& offsets, Cut& best);
   std::pair<double, double> extent(const Vec3& direction) const;
   // The nearest points' offsets on both sides of `offset`: a cut through a vertex is often the exact one.
   std::vector<double> snapped(const Plane&) const;
   Vec3 middle_of_section(const Plane&) const;
-  Eigen::Matrix3d principal_axes() const;
 
  private:
   void find_sections(const Vec3& direction, const std::vector<double>& offsets);
@@ -31,40 +37,52 @@ class Sweep {
   };
 
   InsideTest& inside_;
-  double volume_;
-  std::vector<Vec3> candidates_;           // far first
+  std::vector<Vec3> candidates_;           // those whose hull is the part's, far first
   std::vector<Vec3> points_;               // all ends of edges
   std::vector<std::array<int, 2>> edges_;  // of the polygons, each once
   std::vector<std::array<Vec3, 2>> cell_edges_;
+  GrowingHull below_, above_;  // of the points whose side is known
   GrowingHull hull_;
+  double volume_;  // of the hull of all
   // Scratch of try_offsets, an entry an offset (a slab for the points).
   std::vector<std::vector<Vec3>> slabs_, sections_;
   std::vector<std::vector<Corner>> corners_;
   std::vector<double> heights_;
 };
 
-Sweep::Sweep(const Model& model, const Part& part, InsideTest& inside)
-    : inside_(inside), volume_(part.hull_volume), candidates_(hull_candidates(model, part)) {
-  const std::vector<int> rows = points_of(part);
-  for (int r : rows) points_.push_back(model.points[std::size_t(r)]);
-  const auto local = [&](int r) { return int(std::lower_bound(rows.begin(), rows.end(), r) - rows.begin()); };
-  for (int i = 0; i < part.surface.count(); ++i) {
-    const int begin = part.surface.first[std::size_t(i)], end = part.surface.first[std::size_t(i) + 1];
-    for (int k = begin; k < end; ++k) {
-      const int a = part.surface.corners[std::size_t(k)];
-      const int b = part.surface.corners[std::size_t(k + 1 < end ? k + 1 : begin)];
-      edges_.push_back({std::min(a, b), std::max(a, b)});
-    }
-  }
-  std::sort(edges_.begin(), edges_.end());
-  edges_.erase(std::unique(edges_.begin(), edges_.end()), edges_.end());
-  for (auto& [a, b] : edges_) a = local(a), b = local(b);
+Sweep::Sweep(const Sketch& sketch, const Part& part, InsideTest& inside, double tolerance)
+    : inside_(inside), candidates_(part.corners_inside), points_(sketch.points), edges_(sketch.edges) {
+  for (std::size_t i = 0; i < points_.size(); ++i)
+    if (!sketch.buried[i]) candidates_.push_back(points_[i]);
+  sort_far_first(candidates_);
+  hull_ = rough_hull(candidates_, tolerance);
+  volume_ = hull_.volume();
+  below_ = above_ = GrowingHull(hull_.tolerance());
   for (const Cell& cell : part.cells)
     for (const auto& face : cell.faces)
       for (std::size_t k = 0; k < face.size(); ++k) {
         const int a = face[k], b = face[(k + 1) % face.size()];
         if (a < b) cell_edges_.push_back({cell.corners[std::size_t(a)], cell.corners[std::size_t(b)]});
       }
+}
+
+template <class Side>
+Sweep Sweep::narrowed(Side side) const {
+  Sweep band(*this);
+  band.candidates_.clear(), band.edges_.clear(), band.cell_edges_.clear();
+  std::vector<Vec3> below, above;
+  for (const Vec3& p : candidates_) {
+    const int s = side(p);
+    (s < 0 ? below : s > 0 ? above : band.candidates_).push_back(p);
+  }
+  band.below_.add(below), band.above_.add(above);
+  std::vector<int> sides;
+  for (const Vec3& p : points_) sides.push_back(side(p));
+  for (const auto& [a, b] : edges_)
+    if (sides[std::size_t(a)] * sides[std::size_t(b)] <= 0) band.edges_.push_back({a, b});
+  for (const auto& [a, b] : cell_edges_)
+    if (side(a) * side(b) <= 0) band.cell_edges_.push_back({a, b});
+  return band;
 }
 
 // The corners of the convex hull of points in the plane across `direction` (Andrew's monotone chain).
@@ -95,8 +113,11 @@ void keep_planar_hull(const Vec3& direction, std::vector<Vec3>& points) {
   };
   walk(flat.begin(), flat.end());
   walk(flat.rbegin(), flat.rend());
+  // Every eighth first: of the others few are then far enough outside to matter.
   std::vector<Vec3> kept;
-  for (const Flat& f : chain) kept.push_back(points[f.row]);
+  for (std::size_t i = 0; i < chain.size(); i += 8) kept.push_back(points[chain[i].row]);
+  for (std::size_t stride = 4; stride > 0; stride /= 2)
+    for (std::size_t i = stride; i < chain.size(); i += 2 * stride) kept.push_back(points[chain[i].row]);
   points.swap(kept);
 }
 
@@ -150,13 +171,13 @@ bool Sweep::try_offsets(const Vec3& direction, const std::vector<double>& offset
     }
   };
   std::vector<double> below(offsets.size());
-  hull_.clear();
+  hull_ = below_;
   for (std::size_t i = 0; i < offsets.size(); ++i) {
     hull_.add(slabs_[i]);
     add_section(i);
     below[i] = hull_.volume();
   }
-  hull_.clear();
+  hull_ = above_;
   bool better = false;
   for (std::size_t i = offsets.size(); i-- > 0;) {
     hull_.add(slabs_[i + 1]);
@@ -204,14 +225,6 @@ Vec3 Sweep::middle_of_section(const Plane& plane) const {
   return count > 0 ? Vec3(sum / count) : Vec3(plane.offset * plane.normal);
 }
 
-Eigen::Matrix3d Sweep::principal_axes() const {
-  Vec3 mean = Vec3::Zero();
-  for (const Vec3& p : points_) mean += p / double(points_.size());
-  Eigen::Matrix3d spread = Eigen::Matrix3d::Zero();
-  for (const Vec3& p : points_) spread += (p - mean) * (p - mean).transpose();
-  return Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(spread).eigenvectors();
-}
-
 std::vector<double> evenly(double low, double high, int count) {
   std::vector<double> offsets;
   for (int i = 0; i < count; ++i) offsets.push_back(low + (high - low) * (i + 1) / (count + 1));
@@ -219,30 +232,74 @@ std::vector<double> evenly(double low, double high, int count) {
 }
 
 // Offsets about the best one, each time a third as far apart; at the end the vertices next to it.
-void refine_offset(Sweep& sweep, double step, int rounds, Cut& best) {
+void refine_offset(const Sweep& sweep, double step, int rounds, Cut& best) {
+  const Vec3 normal = best.plane.normal;
+  const double middle = best.plane.offset, reach = step + on_plane;
+  Sweep band = sweep.narrowed([&](const Vec3& p) {
+    const double height = normal.dot(p) - middle;
+    return height > reach ? 1 : height < -reach ? -1 : 0;
+  });
   for (int round = 0; round < rounds; ++round, step /= 3) {
     const double t = best.plane.offset;
-    sweep.try_offsets(best.plane.normal, {t - 2 * step / 3, t - step / 3, t + step / 3, t + 2 * step / 3},
-                      best);
+    band.try_offsets(normal, {t - 2 * step / 3, t - step / 3, t, t + step / 3, t + 2 * step / 3}, best);
   }
-  const std::vector<double> snapped = sweep.snapped(best.plane);
-  if (!snapped.empty()) sweep.try_offsets(best.plane.normal, snapped, best);
+  std::vector<double> snapped = sweep.snapped(best.plane);
+  std::erase_if(snapped, [&](double offset) { return std::abs(offset - middle) > reach; });
+  if (!snapped.empty()) band.try_offsets(normal, snapped, best);
 }
 
-std::vector<Vec3> first_directions(const Eigen::Matrix3d& principal_axes, bool diagonals) {
+// Where the model has large flat faces (a machine, a piece of furniture) its concave edges lie in their
+// planes.
+std::vector<Vec3> normals_of_large_faces(const Model& model, const Part& part) {
+  constexpr double large = 0.04;  // of the part's surface, all parallel faces together
+  constexpr double same = 1e-4;
+  constexpr std::size_t most = 4;
+  std::map<std::array<long, 3>, Vec3> by_normal;  // sums of area vectors, each turned to one side
+  double total = 0;
+  for (int i = 0; i < part.surface.count(); ++i) {
+    const Vec3 face = area_vector(model, part.surface, i);
+    const double size = face.norm();
+    if (!(size > 0)) continue;
+    total += size;
+    std::array<long, 3> key;
+    int axis = 0;
+    face.cwiseAbs().maxCoeff(&axis);
+    const Vec3 turned = face[axis] < 0 ? Vec3(-face) : face;
+    for (int k = 0; k < 3; ++k) key[std::size_t(k)] = std::lround(turned[k] / size / same);
+    by_normal.try_emplace(key, Vec3::Zero()).first->second += turned;
+  }
+  std::vector<std::pair<double, Vec3>> found;
+  for (const auto& [key, sum] : by_normal)
+    if (sum.norm() > large * total) found.emplace_back(-sum.norm(), sum.normalized());
+  std::stable_sort(found.begin(), found.end(),
+                   [](const auto& a, const auto& b) { return a.first < b.first; });
+  std::vector<Vec3> normals;
+  for (const auto& [size, normal] : found)
+    if (normals.size() < most) normals.push_back(normal);
+  return normals;
+}
+
+// Those to the faces, edges and corners of a cube, the principal axes, and the normals of large flat faces.
+std::vector<Vec3> first_directions(const Model& model, const Part& part, const Sketch& sketch,
+                                   bool diagonals) {
   std::vector<Vec3> directions;
   for (int i = 14; i < 27; ++i) {
     const Vec3 d(i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1);
     if (diagonals || d.squaredNorm() == 1) directions.push_back(d.normalized());
   }
-  for (int k = 0; k < 3; ++k) directions.push_back(principal_axes.col(k));
+  const Eigen::Matrix3d axes = principal_axes(sketch.points);
+  for (int k = 0; k < 3; ++k) directions.push_back(axes.col(k));
+  const std::size_t others = directions.size();
+  for (const Vec3& normal : normals_of_large_faces(model, part))
+    if (std::none_of(directions.begin(), directions.begin() + std::ptrdiff_t(others),
+                     [&](const Vec3& d) { return d.cross(normal).norm() < 1e-9; }))
+      directions.push_back(normal);
   return directions;
 }
 
 // The share of the hull that is solid, from a few hundred places.
 double solid_share(const Part& part, InsideTest& inside) {
-  GrowingHull hull;
-  hull.add(part.hull);
+  const GrowingHull hull = rough_hull(part.hull, search_tolerance);
   Box box;
   for (const Vec3& p : part.hull) box.include(p);
   Rng rng(1, 0);
@@ -256,71 +313,111 @@ double solid_share(const Part& part, InsideTest& inside) {
   return in_hull > 0 ? double(in_solid) / in_hull : 1.0;
 }
 
-}  // namespace
+// The search is on a coarse sketch for all directions, then on a fine one for the best. Twice as many points
+// cost a third more and gain nothing that can be told from chance (docs/decomposition.md).
+constexpr int coarse_points = 500, fine_points = 3000;
+// Of hulls, as a share of the part's thickness.
+constexpr double coarse_tolerance = 2e-3, fine_tolerance = 6e-4;
+// So few points cost little, and offsets through vertices that are right or wrong (a machine) must be told
+// apart.
+constexpr double small_tolerance = 1e-6;
 
-Cut best_cut(const Model& model, const Part& part, InsideTest& inside, const CutSearch& search) {
-  Cut best;
-  if (part.hull_volume <= 0) return best;
-  Sweep sweep(model, part, inside);
-  const std::vector<Vec3> directions = first_directions(sweep.principal_axes(), search.diagonals);
-  double step = 0;
+// The best even offset for each direction, best first, on a coarse sketch.
+struct Start {
+  Cut cut;
+  double step = 0;  // between the offsets
+};
+std::vector<Start> first_cuts(Sweep& sweep, const std::vector<Vec3>& directions, int offsets) {
+  std::vector<Start> starts;
   for (const Vec3& direction : directions) {
     const auto [low, high] = sweep.extent(direction);
-    if (sweep.try_offsets(direction, evenly(low, high, search.offsets), best))
-      step = (high - low) / (search.offsets + 1);
+    Start start{{}, (high - low) / (offsets + 1)};
+    if (sweep.try_offsets(direction, evenly(low, high, offsets), start.cut)) starts.push_back(start);
   }
-  if (best.gain <= 0) return best;
-  refine_offset(sweep, step, search.refinements, best);
+  std::stable_sort(starts.begin(), starts.end(),
+                   [](const Start& a, const Start& b) { return a.cut.gain > b.cut.gain; });
+  return starts;
+}
 
-  double tilt = 0.2;  // radians
-  for (int round = 0; round < search.tilt_rounds; ++round, tilt /= 2) {
-    const Plane start = best.plane;
-    const Vec3 pivot = sweep.middle_of_section(start);
-    const Vec3 u = start.normal.unitOrthogonal(), v = start.normal.cross(u);
+// Turns the best cut about the middle of its section, four ways, each time half as far.
+void tilt(const Sweep& sweep, double step, int rounds, Cut& best) {
+  double slope = 0.2;
+  for (int round = 0; round < rounds; ++round, slope /= 2) {
+    const Vec3 normal = best.plane.normal, u = normal.unitOrthogonal(), v = normal.cross(u);
+    const Vec3 pivot = sweep.middle_of_section(best.plane);
+    // Of the turned planes about the pivot none is steeper than `slope`, and none moved by more than step
+    // / 2.
+    Sweep band = sweep.narrowed([&](const Vec3& p) {
+      const double height = normal.dot(p - pivot);
+      const double reach = slope * (p - pivot - height * normal).norm() + step * std::hypot(1.0, slope) / 2;
+      return height > reach + on_plane ? 1 : height < -reach - on_plane ? -1 : 0;
+    });
     bool better = false;
     for (const Vec3& towards : {u, Vec3(-u), v, Vec3(-v)}) {
-      const Vec3 direction = (start.normal + std::tan(tilt) * towards).normalized();
+      const Vec3 direction = (normal + slope * towards).normalized();
       const double t = direction.dot(pivot);
-      better = sweep.try_offsets(direction, {t - step / 2, t - step / 6, t + step / 6, t + step / 2}, best) ||
+      better = band.try_offsets(direction, {t - step / 2, t - step / 6, t + step / 6, t + step / 2}, best) ||
                better;
     }
     if (better) refine_offset(sweep, step / 3, 2, best);
   }
+}
+
+// Good enough to tell how much the next cut will gain.
+double quick_gain(const Model& model, const Part& part, InsideTest& inside) {
+  if (part.hull_volume <= 0) return 0;
+  const Sketch sketch = sketch_of(model, part, coarse_points);
+  Sweep sweep(sketch, part, inside, coarse_tolerance);
+  const std::vector<Start> starts = first_cuts(sweep, first_directions(model, part, sketch, false), 5);
+  return starts.empty() ? 0.0 : starts[0].cut.gain;
+}
+
+}  // namespace
+
+Cut best_cut(const Model& model, const Part& part, InsideTest& inside) {
+  constexpr int offsets = 12, refinements = 3, tilt_rounds = 3;
+  constexpr std::size_t directions_to_refine = 3;
+  if (part.hull_volume <= 0) return {};
+  const Sketch fine = sketch_of(model, part, fine_points), coarse = thinned(fine, coarse_points);
+  Sweep coarse_sweep(coarse, part, inside, coarse_tolerance);
+  std::vector<Start> starts = first_cuts(coarse_sweep, first_directions(model, part, fine, true), offsets);
+  starts.resize(std::min(starts.size(), directions_to_refine));
+  const bool small = int(fine.points.size()) <= coarse_points;
+  Sweep sweep(fine, part, inside, small ? small_tolerance : fine_tolerance);
+  Cut best;
+  double step = 0;
+  for (const auto& [start, start_step] : starts) {
+    Cut refined{start.plane, 0};  // the gain on the coarse sketch is another
+    refine_offset(sweep, start_step, refinements, refined);
+    if (refined.gain > best.gain) best = refined, step = start_step;
+  }
+  if (best.gain > 0) tilt(sweep, step, tilt_rounds, best);
   return best;
 }
 
-Cut best_cut_ahead(const Model& model, const Part& part, InsideTest& inside, const CutSearch& search) {
+Cut best_cut_ahead(const Model& model, const Part& part, InsideTest& inside) {
   constexpr double little_gain = 0.12, much_empty = 0.3;
-  Cut best = best_cut(model, part, inside, search);
+  const Cut best = best_cut(model, part, inside);
   if (part.hull_volume <= 0 || best.gain > little_gain * part.hull_volume ||
       solid_share(part, inside) > 1 - much_empty)
     return best;
-  const Sweep sweep(model, part, inside);
+  const Sketch sketch = sketch_of(model, part, coarse_points);
+  const Sweep sweep(sketch, part, inside, coarse_tolerance);
   std::vector<Plane> planes;
   if (best.gain > 0) planes.push_back(best.plane);
-  for (const Vec3& direction : first_directions(sweep.principal_axes(), true)) {
+  for (const Vec3& direction : first_directions(model, part, sketch, true)) {
     const auto [low, high] = sweep.extent(direction);
     planes.push_back({direction, 0.5 * (low + high)});
   }
-  double largest = 0;
   Cut ahead = best;
   for (const Plane& plane : planes) {
     Model scratch = model;
     const auto [below, above] = cut(scratch, part, plane, inside);
-    const CutSearch quick{.diagonals = false, .offsets = 5, .refinements = 0, .tilt_rounds = 0};
     const double gain = part.hull_volume - below.hull_volume - above.hull_volume +
-                        best_cut(scratch, below, inside, quick).gain +
-                        best_cut(scratch, above, inside, quick).gain;
-    if (gain > largest) largest = gain, ahead = {plane, 0.5 * gain};
+                        quick_gain(scratch, below, inside) + quick_gain(scratch, above, inside);
+    if (0.5 * gain > ahead.gain) ahead = {plane, 0.5 * gain, true};
   }
-  return ahead.gain > best.gain ? ahead : best;
-}
-
-Cut best_offset(const Model& model, const Part& part, InsideTest& inside, const Plane& plane, double range) {
-  Cut best{plane, -1e300};
-  Sweep sweep(model, part, inside);
-  sweep.try_offsets(plane.normal, evenly(plane.offset - range, plane.offset + range, 5), best);
-  return best;
+  return ahead;
 }
 
 }  // namespace limber::meshing::detail

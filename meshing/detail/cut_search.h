@@ -8,21 +8,14 @@ namespace limber::meshing::detail {
 struct Cut {
   Plane plane;
   double gain = 0;  // volume of the part's hull less those of the two sides' hulls; 0: no cut helps
+  bool is_first_of_two = false;  // the gain is the mean of this cut's and the next ones'
 };
 
-struct CutSearch {
-  bool diagonals = true;  // also try the directions to the edges and corners of a cube
-  int offsets = 12;       // a direction, at first
-  int refinements = 3;    // of the offset
-  int tilt_rounds = 3;    // of the direction, four ways each
-};
-
-// Directions tried first: those to the faces, edges and corners of a cube, and the part's principal axes.
-Cut best_cut(const Model&, const Part&, InsideTest&, const CutSearch&);
+// Directions are those to the faces, edges and corners of a cube, the part's principal axes, and the normals
+// of its large flat faces; the best are refined and tilted.
+Cut best_cut(const Model&, const Part&, InsideTest&);
 // As best_cut; but where no cut gains much and yet the hull is largely empty (a ring, a kettle), the one
-// after which the next cuts gain most. Its gain is then the mean of the two levels.
-Cut best_cut_ahead(const Model&, const Part&, InsideTest&, const CutSearch&);
-// The best offset within plane.offset ± range, for that direction.
-Cut best_offset(const Model&, const Part&, InsideTest&, const Plane&, double range);
+// after which the next cuts gain most. Then is_first_of_two.
+Cut best_cut_ahead(const Model&, const Part&, InsideTest&);
 
 }  // namespace limber::meshing::detail

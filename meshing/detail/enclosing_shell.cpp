@@ -3,6 +3,7 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
+#include <queue>
 
 #include "core/error.h"
 #include "meshing/convex_hull.h"
@@ -26,35 +27,43 @@ Vec3 mean_of(std::span<const Vec3> points) {
   return sum / double(points.size());
 }
 
-// How much a hull must grow about `center` to reach a point, and where.
-struct Gauge {
-  double growth;
-  Eigen::Index plane;
-};
+// How much a hull must grow about `center` to reach a point.
 class Gauges {
  public:
-  Gauges(const GrowingHull& hull, const Vec3& center) : center_(center), planes_(hull.planes()) {
-    depths_ = -(planes_.leftCols<3>() * center + planes_.col(3));
+  Gauges(const GrowingHull& hull, const Vec3& center) : center_(center) {
+    const auto planes = hull.planes();
+    const Eigen::ArrayXd depths = -(planes.leftCols<3>() * center + planes.col(3)).array();
+    x_ = planes.col(0).array() / depths, y_ = planes.col(1).array() / depths;
+    z_ = planes.col(2).array() / depths;
   }
-  Gauge at(const Vec3& p) const {
-    Gauge gauge{0, 0};
-    gauge.growth = ((planes_.leftCols<3>() * (p - center_)).array() / depths_.array()).maxCoeff(&gauge.plane);
-    return gauge;
+  double at(const Vec3& p) const {
+    const Vec3 d = p - center_;
+    return (d.x() * x_ + d.y() * y_ + d.z() * z_).maxCoeff();
+  }
+  // The row of hull.planes() that the point is the farthest beyond.
+  Eigen::Index plane_at(const Vec3& p) const {
+    const Vec3 d = p - center_;
+    Eigen::Index plane = 0;
+    (d.x() * x_ + d.y() * y_ + d.z() * z_).maxCoeff(&plane);
+    return plane;
   }
 
  private:
   Vec3 center_;
-  Eigen::Matrix<double, Eigen::Dynamic, 4> planes_;
-  Eigen::VectorXd depths_;
+  Eigen::ArrayXd x_, y_, z_;  // normals over the center's depth
 };
 
-bool holds_all(std::span<const Vec3> corners, const Vec3& center, std::span<const Vec3> points) {
+// The point found outside moves to the front: it is the likeliest next time.
+bool holds_all(std::span<const Vec3> corners, const Vec3& center, std::vector<Vec3>& points) {
   GrowingHull hull;
   hull.add(corners);
   if (hull.flat() || !hull.holds(center)) return false;
   const Gauges gauges(hull, center);
-  return std::all_of(points.begin(), points.end(),
-                     [&](const Vec3& p) { return gauges.at(p).growth < 1 + 1e-7; });
+  const auto outside =
+      std::find_if(points.begin(), points.end(), [&](const Vec3& p) { return gauges.at(p) >= 1 + 1e-7; });
+  if (outside == points.end()) return true;
+  std::iter_swap(points.begin(), outside);
+  return false;
 }
 
 // Up to six of the corners that span a volume as the whole does.
@@ -85,19 +94,26 @@ std::vector<Vec3> fewer_corners(const std::vector<Vec3>& corners, int most) {
   hull.add(first_corners(corners));
   std::vector<Vec3> chosen = hull.vertices();
   const Vec3 center = mean_of(chosen);
+  std::priority_queue<std::pair<double, std::size_t>> by_growth;  // as it was when last asked: it only falls
+  for (std::size_t i = 0; i < corners.size(); ++i) by_growth.push({1e300, i});
   while (int(chosen.size()) < most) {
     const Gauges gauges(hull, center);
-    double largest = 1 + 1e-6;
-    const Vec3* next = nullptr;
-    for (const Vec3& p : corners)
-      if (const double growth = gauges.at(p).growth; growth > largest) largest = growth, next = &p;
-    if (!next) break;
-    chosen.push_back(*next);
-    hull.add(*next);
+    std::size_t next = corners.size();
+    while (next == corners.size()) {
+      const auto [old_growth, i] = by_growth.top();
+      by_growth.pop();
+      const double growth = gauges.at(corners[i]);
+      if (growth >= by_growth.top().first) next = i;
+      by_growth.push({growth, i});
+    }
+    if (by_growth.top().first <= 1 + 1e-6) break;
+    chosen.push_back(corners[next]);
+    hull.add(corners[next]);
   }
   chosen = hull.vertices();
 
   // Raise the corners round each point that is still outside, then lower each as far as nothing comes out.
+  std::vector<Vec3> to_hold = corners;
   std::vector<double> raised(chosen.size(), 1.0);
   const auto placed = [&] {
     std::vector<Vec3> result;
@@ -108,11 +124,12 @@ std::vector<Vec3> fewer_corners(const std::vector<Vec3>& corners, int most) {
   const Gauges gauges(hull, center);
   const auto planes = hull.planes();
   for (const Vec3& p : corners) {
-    const Gauge gauge = gauges.at(p);
-    if (gauge.growth <= 1) continue;
+    const double growth = gauges.at(p);
+    if (growth <= 1) continue;
+    const Eigen::Index plane = gauges.plane_at(p);
     for (std::size_t i = 0; i < chosen.size(); ++i)
-      if (std::abs(planes.row(gauge.plane).leftCols<3>().dot(chosen[i]) + planes(gauge.plane, 3)) < 1e-9)
-        raised[i] = std::max(raised[i], gauge.growth);
+      if (std::abs(planes.row(plane).leftCols<3>().dot(chosen[i]) + planes(plane, 3)) < 1e-9)
+        raised[i] = std::max(raised[i], growth);
   }
   for (std::size_t i = 0; i < chosen.size(); ++i) {
     const double high = raised[i];
@@ -120,7 +137,7 @@ std::vector<Vec3> fewer_corners(const std::vector<Vec3>& corners, int most) {
     double low = 1.0, good = high;
     for (int step = 0; step < 5; ++step) {
       raised[i] = step == 0 ? low : 0.5 * (low + good);
-      (holds_all(placed(), center, corners) ? good : low) = raised[i];
+      (holds_all(placed(), center, to_hold) ? good : low) = raised[i];
       if (good == 1.0) break;
     }
     raised[i] = good;
@@ -130,7 +147,7 @@ std::vector<Vec3> fewer_corners(const std::vector<Vec3>& corners, int most) {
   hull.add(result);
   const Gauges last(hull, center);
   double growth = 1;
-  for (const Vec3& p : corners) growth = std::max(growth, last.at(p).growth);
+  for (const Vec3& p : corners) growth = std::max(growth, last.at(p));
   for (Vec3& p : result) p = center + growth * (p - center);
   return result;
 }

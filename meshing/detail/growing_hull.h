@@ -13,11 +13,14 @@ namespace limber::meshing::detail {
 
 class GrowingHull {
  public:
+  // Points closer than `tolerance` to the hull change nothing.
+  explicit GrowingHull(double tolerance = insert_distance);
   void clear();  // keeps the memory
-  // Points closer than insert_distance to the hull change nothing. Until four points span a volume all wait.
+  double tolerance() const { return tolerance_; }
+  //  Until four points span a volume all wait.
   void add(std::span<const Vec3> points);
   void add(const Vec3& point) { add(std::span<const Vec3>(&point, 1)); }
-  bool holds(const Vec3& point) const;  // within insert_distance; false while flat
+  bool holds(const Vec3& point) const;  // within the tolerance; false while flat
   bool flat() const { return faces_.empty(); }
   double volume() const { return volume_; }
   // The hull's corners in the order of their arrival; while flat, all points so far.
@@ -37,16 +40,20 @@ class GrowingHull {
     double noise;  // a distance below this has no certain sign
   };
   bool start();  // a tetrahedron from the waiting points
-  void insert(const Vec3& point);
+  void insert(Vec3 point);
   int new_face(int a, int b, int c);
   double distance(int face, const Vec3& p) const;
+  // The first block of planes with one that p is beyond, as the row of its first plane; nx_.size(): none.
+  std::size_t block_beyond(const Vec3& p) const;
   // Exact: points of a cut lie in one plane, and a hull whose faces disagree about them by rounding comes
   // apart.
   bool visible(int face, const Vec3& p) const;
 
+  double tolerance_, jitter_;
   std::vector<Vec3> points_, waiting_;
   std::vector<Face> faces_;
-  std::vector<double> nx_, ny_, nz_, offset_;  // unit plane of each face; a free one is nowhere visible
+  std::vector<double> nx_, ny_, nz_, offset_;  // unit plane of each face, in whole blocks; a free row is
+                                               // nowhere visible
   std::vector<int> free_;
   double volume_ = 0;
   // Scratch of insert.

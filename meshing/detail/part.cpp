@@ -1,5 +1,6 @@
 #include "meshing/detail/part.h"
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <numeric>
@@ -160,17 +161,18 @@ void add_polygon(Polygons& polygons, const std::vector<int>& loop, int triangle)
   polygons.triangle.push_back(triangle);
 }
 
-// Twice the area, along the normal.
-Vec3 area_vector(const Model& model, const int* corners, int count) {
+}  // namespace
+
+Vec3 area_vector(const Model& model, const Polygons& polygons, int polygon) {
+  const auto corner = [&](int k) -> const Vec3& {
+    return model.points[std::size_t(polygons.corners[std::size_t(k)])];
+  };
+  const int begin = polygons.first[std::size_t(polygon)], end = polygons.first[std::size_t(polygon) + 1];
   Vec3 sum = Vec3::Zero();
-  const Vec3& origin = model.points[std::size_t(corners[0])];
-  for (int k = 1; k + 1 < count; ++k)
-    sum += (model.points[std::size_t(corners[k])] - origin)
-               .cross(model.points[std::size_t(corners[k + 1])] - origin);
+  for (int k = begin + 1; k + 1 < end; ++k)
+    sum += 0.5 * (corner(k) - corner(begin)).cross(corner(k + 1) - corner(begin));
   return sum;
 }
-
-}  // namespace
 
 Model make_model(const Points& positions, const Triangles& triangles) {
   Model model;
@@ -201,20 +203,41 @@ std::vector<Vec3> hull_candidates(const Model& model, const Part& part) {
   std::vector<Vec3> candidates = part.corners_inside;
   for (int p : points_of(part))
     if (!model.buried[std::size_t(p)]) candidates.push_back(model.points[std::size_t(p)]);
+  sort_far_first(candidates);
+  return candidates;
+}
+
+void sort_far_first(std::vector<Vec3>& points) {
   Box box;
-  for (const Vec3& p : candidates) box.include(p);
+  for (const Vec3& p : points) box.include(p);
   const Vec3 center = box.center();
-  std::stable_sort(candidates.begin(), candidates.end(), [&](const Vec3& a, const Vec3& b) {
+  std::stable_sort(points.begin(), points.end(), [&](const Vec3& a, const Vec3& b) {
     return (a - center).squaredNorm() > (b - center).squaredNorm();
   });
-  return candidates;
+}
+
+Eigen::Matrix3d principal_axes(const std::vector<Vec3>& points) {
+  Vec3 mean = Vec3::Zero();
+  for (const Vec3& p : points) mean += p / double(points.size());
+  Eigen::Matrix3d spread = Eigen::Matrix3d::Zero();
+  for (const Vec3& p : points) spread += (p - mean) * (p - mean).transpose();
+  return Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(spread).eigenvectors();
+}
+
+GrowingHull rough_hull(std::vector<Vec3> points, double share) {
+  const Vec3 thin = principal_axes(points).col(0);
+  double low = 1e300, high = -1e300;
+  for (const Vec3& p : points) low = std::min(low, thin.dot(p)), high = std::max(high, thin.dot(p));
+  sort_far_first(points);
+  GrowingHull hull(share * std::max(high - low, 0.0));
+  hull.add(points);
+  return hull;
 }
 
 namespace {
 
 void find_hull(const Model& model, Part& part) {
-  GrowingHull hull;
-  hull.add(hull_candidates(model, part));
+  const GrowingHull hull = rough_hull(hull_candidates(model, part), search_tolerance);
   part.hull = hull.vertices();
   part.hull_volume = hull.volume();
 }
@@ -263,7 +286,7 @@ std::pair<Part, Part> cut(Model& model, const Part& part, const Plane& plane, In
     }
     const int triangle = part.surface.triangle[std::size_t(i)];
     if (!any_below && !any_above) {  // in the plane: with the solid that it bounds
-      const bool faces_up = area_vector(model, corners, count).dot(plane.normal) > 0;
+      const bool faces_up = area_vector(model, part.surface, i).dot(plane.normal) > 0;
       add_polygon(faces_up ? below.surface : above.surface, lower, triangle);
     }
     if (any_below) add_polygon(below.surface, lower, triangle);
@@ -288,20 +311,17 @@ std::pair<Part, Part> cut(Model& model, const Part& part, const Plane& plane, In
   return {std::move(below), std::move(above)};
 }
 
-Part unite(const std::vector<const Part*>& parts) {
-  Part united;
-  for (const Part* part : parts) {
-    for (int i = 0; i < part->surface.count(); ++i)
-      add_polygon(united.surface,
-                  {part->surface.corners.begin() + part->surface.first[std::size_t(i)],
-                   part->surface.corners.begin() + part->surface.first[std::size_t(i) + 1]},
-                  part->surface.triangle[std::size_t(i)]);
-    united.cells.insert(united.cells.end(), part->cells.begin(), part->cells.end());
-    united.corners_inside.insert(united.corners_inside.end(), part->corners_inside.begin(),
-                                 part->corners_inside.end());
-  }
-  GrowingHull hull;
-  for (const Part* part : parts) hull.add(part->hull);
+Part unite(const Part& a, const Part& b) {
+  Part united = a;
+  for (int i = 0; i < b.surface.count(); ++i)
+    add_polygon(united.surface,
+                {b.surface.corners.begin() + b.surface.first[std::size_t(i)],
+                 b.surface.corners.begin() + b.surface.first[std::size_t(i) + 1]},
+                b.surface.triangle[std::size_t(i)]);
+  united.cells.insert(united.cells.end(), b.cells.begin(), b.cells.end());
+  united.corners_inside.insert(united.corners_inside.end(), b.corners_inside.begin(), b.corners_inside.end());
+  united.hull.insert(united.hull.end(), b.hull.begin(), b.hull.end());
+  const GrowingHull hull = rough_hull(united.hull, search_tolerance);
   united.hull = hull.vertices();
   united.hull_volume = hull.volume();
   return united;

@@ -19,6 +19,8 @@ struct Plane {
   double offset = 0;
 };
 constexpr double on_plane = 1e-9;
+// What the hull of a part may lack while cuts are looked for, as a share of its thickness.
+constexpr double search_tolerance = 1e-4;
 
 // Is a point inside the solid? Asked for places near each other again and again: a grid remembers the answer
 // of voxels that the surface does not enter; in the others the winding number is asked each time.
@@ -55,7 +57,9 @@ struct Part {
   Polygons surface;
   std::vector<Cell> cells;
   std::vector<Vec3> corners_inside;  // corners of the cells that lie inside the solid
-  std::vector<Vec3> hull;            // the corners of its convex hull; all points when that is flat
+  // Of its convex hull, to within search_tolerance: the corners, all points when that is flat;
+  // the volume.
+  std::vector<Vec3> hull;
   double hull_volume = 0;
 };
 
@@ -68,15 +72,23 @@ struct Model {
 };
 
 Model make_model(const Points&, const Triangles&);
+// Its length is the polygon's area.
+Vec3 area_vector(const Model&, const Polygons&, int polygon);
 Part whole(const Model&, const Triangles&);
 // {below, above}. New points are added to the model.
 std::pair<Part, Part> cut(Model&, const Part&, const Plane&, InsideTest&);
-// Puts parts together again.
-Part unite(const std::vector<const Part*>&);
+// Puts two parts together again.
+Part unite(const Part&, const Part&);
 // Rows of Model::points that the part's surface uses, ascending.
 std::vector<int> points_of(const Part&);
 // The points whose hull is the part's, the farthest from its middle first: most others then fall into the
 // hull at the first look.
 std::vector<Vec3> hull_candidates(const Model&, const Part&);
+// By the distance from the middle of their box.
+void sort_far_first(std::vector<Vec3>&);
+// Columns from the least spread to the largest.
+Eigen::Matrix3d principal_axes(const std::vector<Vec3>&);
+// A hull that may leave points out by `share` of their extent along the first principal axis.
+GrowingHull rough_hull(std::vector<Vec3> points, double share);
 
 }  // namespace limber::meshing::detail

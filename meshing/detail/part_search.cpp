@@ -1,0 +1,213 @@
+#include "meshing/detail/part_search.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <optional>
+#include <set>
+
+#include "core/progress.h"
+#include "meshing/convex_hull.h"
+#include "meshing/detail/cut_search.h"
+
+namespace limber::meshing::detail {
+
+namespace {
+
+// More parts are cut than asked for, and the cheapest neighbours united again.
+constexpr double overcut = 1.2;
+// A cut that gains less than this, over the cube of the diagonal, is none: a hull's volume is not known
+// better.
+constexpr double least_gain = 5e-7;
+// Looking two cuts ahead is dear, so only parts of this share of the whole hull's volume may.
+constexpr double worth_looking_ahead = 0.1;
+// Two parts may touch when their boxes are no farther apart.
+constexpr double touching = 0.01;
+
+// How far the hull of some points stands off the model, at some hundred places outside the solid; `least`
+// when less.
+double hull_overshoot(const std::vector<Vec3>& corners, InsideTest& inside, const SurfaceDistance& distance,
+                      double least) {
+  constexpr double samples = 500;
+  if (rough_hull(corners, 0).flat()) return least;
+  Points rows(Eigen::Index(corners.size()), 3);
+  for (std::size_t i = 0; i < corners.size(); ++i) rows.row(Eigen::Index(i)) = corners[i].transpose();
+  const ConvexShell shell = convex_hull(rows);
+  const double area_of_shell = area(SurfaceMesh{shell.vertices, shell.triangles});
+  double farthest = least;
+  for (const BoundarySample& sample : boundary_samples({shell}, samples / area_of_shell))
+    if (const double d = distance.at(sample.point); d > farthest && !inside(sample.point)) farthest = d;
+  return farthest;
+}
+
+struct Leaf {
+  Part part;
+  Cut cut;
+  double overshoot = 0;
+};
+
+std::vector<Part> cut_up(Model& model, Part root, InsideTest& inside, const SurfaceDistance& distance,
+                         const PartLimits& limits) {
+  std::vector<Leaf> leaves;
+  const double worth = worth_looking_ahead * root.hull_volume;
+  const std::size_t wanted = limits.most == 1 ? 1 : std::size_t(std::ceil(overcut * limits.most));
+  const auto seen = [&](Part part) {
+    throw_if_stopped();
+    Leaf leaf;
+    if (wanted > 1) leaf.cut = (part.hull_volume > worth ? best_cut_ahead : best_cut)(model, part, inside);
+    if (limits.max_overshoot > 0) leaf.overshoot = hull_overshoot(part.hull, inside, distance, 0);
+    leaf.part = std::move(part);
+    return leaf;
+  };
+  leaves.push_back(seen(std::move(root)));
+  while (leaves.size() < wanted) {
+    Leaf* best = nullptr;
+    for (Leaf& leaf : leaves)
+      if (leaf.cut.gain > (best ? best->cut.gain : least_gain) &&
+          (limits.max_overshoot == 0 || leaf.overshoot > limits.max_overshoot))
+        best = &leaf;
+    if (!best) break;
+    auto [below, above] = cut(model, best->part, best->cut.plane, inside);
+    if (!best->cut.is_first_of_two &&
+        best->part.hull_volume - below.hull_volume - above.hull_volume <= least_gain) {
+      best->cut.gain = 0;  // the sketch promised too much
+      continue;
+    }
+    *best = seen(std::move(below));
+    leaves.push_back(seen(std::move(above)));
+  }
+  std::vector<Part> parts;
+  for (Leaf& leaf : leaves)
+    if (!leaf.part.hull.empty()) parts.push_back(std::move(leaf.part));
+  return parts;
+}
+
+// The hull of a part in so few corners that all pairs can be tried. What it lacks it lacks alone and united.
+struct Outline {
+  explicit Outline(std::vector<Vec3> points) {
+    constexpr double coarse = 5e-4;
+    GrowingHull hull = rough_hull(std::move(points), coarse);
+    corners = hull.vertices();
+    volume = rough_hull(corners, fine).volume();
+    for (const Vec3& p : corners) box.include(p);
+  }
+  double volume_with(const Outline& other) const { return rough_hull(corners_with(other), fine).volume(); }
+  std::vector<Vec3> corners_with(const Outline& other) const {
+    std::vector<Vec3> both = corners;
+    both.insert(both.end(), other.corners.begin(), other.corners.end());
+    return both;
+  }
+  bool near(const Outline& other) const {
+    return (box.lower.array() <= other.box.upper.array() + touching).all() &&
+           (other.box.lower.array() <= box.upper.array() + touching).all();
+  }
+  static constexpr double fine = 1e-5;
+  std::vector<Vec3> corners;
+  double volume;
+  Box box;
+};
+
+// Unites parts, cheapest first, until they are few enough; and on while it costs nothing, or, with a bound,
+// while the bound holds.
+void unite_cheapest(std::vector<Part>& parts, InsideTest& inside, const SurfaceDistance& distance,
+                    const PartLimits& limits) {
+  std::vector<std::optional<Outline>> outlines;  // none: united into another
+  for (const Part& part : parts) outlines.emplace_back(part.hull);
+  std::map<std::pair<std::size_t, std::size_t>, double> cost;
+  const auto find_costs = [&](std::size_t i, bool only_near) {
+    for (std::size_t j = 0; j < outlines.size(); ++j) {
+      const auto &a = outlines[i], &b = outlines[j];
+      if (j != i && a && b && (!only_near || a->near(*b)))
+        cost[{std::min(i, j), std::max(i, j)}] = a->volume_with(*b) - a->volume - b->volume;
+    }
+  };
+  for (std::size_t i = 0; i < outlines.size(); ++i) find_costs(i, true);
+  // Two slender parts far apart have a common hull of little volume too: no hull may stand off more than the
+  // worst did before, while there is a choice.
+  double worst = limits.max_overshoot;
+  for (const Part& part : parts) worst = std::max(worst, hull_overshoot(part.hull, inside, distance, 0));
+  std::set<std::pair<std::pair<std::size_t, std::size_t>, double>> refused;  // for that limit
+  for (std::size_t alive = outlines.size(); alive > 1; --alive) {
+    throw_if_stopped();
+    const bool too_many = alive > std::size_t(limits.most);
+    if (cost.empty() && too_many)
+      for (std::size_t i = 0; i < outlines.size(); ++i) find_costs(i, false);
+    std::vector<std::pair<double, std::pair<std::size_t, std::size_t>>> by_cost;
+    for (const auto& [pair, value] : cost) by_cost.push_back({value, pair});
+    std::sort(by_cost.begin(), by_cost.end());
+    auto chosen = std::find_if(by_cost.begin(), by_cost.end(), [&](const auto& entry) {
+      const auto& [value, pair] = entry;
+      const double limit = too_many || value <= least_gain ? worst : limits.max_overshoot;
+      if (limit == 0 || refused.contains({pair, limit})) return false;
+      const std::vector<Vec3> both = outlines[pair.first]->corners_with(*outlines[pair.second]);
+      if (hull_overshoot(both, inside, distance, limit) <= limit) return true;
+      refused.insert({pair, limit});
+      return false;
+    });
+    if (chosen == by_cost.end() && too_many) chosen = by_cost.begin();
+    if (chosen == by_cost.end()) break;
+    const auto [i, j] = chosen->second;
+    parts[i] = unite(parts[i], parts[j]);
+    outlines[i].emplace(outlines[i]->corners_with(*outlines[j]));
+    outlines[j].reset();
+    const auto changed = [i = i, j = j](const auto& entry) {
+      const auto& [a, b] = entry.first;
+      return a == i || b == i || a == j || b == j;
+    };
+    std::erase_if(cost, changed), std::erase_if(refused, changed);
+    find_costs(i, true);
+  }
+  std::vector<Part> kept;
+  for (std::size_t i = 0; i < parts.size(); ++i)
+    if (outlines[i]) kept.push_back(std::move(parts[i]));
+  parts = std::move(kept);
+}
+
+// Two neighbours that nearly fill their common hull are often better cut elsewhere: each was cut to please a
+// larger part.
+void cut_anew(Model& model, std::vector<Part>& parts, InsideTest& inside, const SurfaceDistance& distance,
+              const PartLimits& limits) {
+  constexpr double nearly_fill = 0.05;  // the share of the common hull that may be in neither
+  struct Pair {
+    double empty;
+    std::size_t a, b;
+  };
+  std::vector<Outline> outlines;
+  for (const Part& part : parts) outlines.emplace_back(part.hull);
+  std::vector<Pair> pairs;
+  for (std::size_t b = 0; b < parts.size(); ++b)
+    for (std::size_t a = 0; a < b; ++a) {
+      if (!outlines[a].near(outlines[b])) continue;
+      const double together = outlines[a].volume_with(outlines[b]);
+      const double empty = together - outlines[a].volume - outlines[b].volume;
+      if (empty < nearly_fill * together) pairs.push_back({empty / together, a, b});
+    }
+  std::stable_sort(pairs.begin(), pairs.end(),
+                   [](const Pair& p, const Pair& q) { return p.empty < q.empty; });
+  for (const auto& [empty, a, b] : pairs) {
+    throw_if_stopped();
+    const Part both = unite(parts[a], parts[b]);
+    const Cut best = best_cut(model, both, inside);
+    if (best.gain <= 0) continue;
+    auto [below, above] = cut(model, both, best.plane, inside);
+    if (below.hull_volume + above.hull_volume > parts[a].hull_volume + parts[b].hull_volume - least_gain)
+      continue;
+    const auto overshoot = [&](const Part& part) { return hull_overshoot(part.hull, inside, distance, 0); };
+    if (std::max(overshoot(below), overshoot(above)) >
+        std::max({overshoot(parts[a]), overshoot(parts[b]), limits.max_overshoot}))
+      continue;
+    parts[a] = std::move(below), parts[b] = std::move(above);
+  }
+}
+
+}  // namespace
+
+std::vector<Part> find_parts(Model& model, Part whole, InsideTest& inside, const SurfaceDistance& distance,
+                             const PartLimits& limits) {
+  std::vector<Part> parts = cut_up(model, std::move(whole), inside, distance, limits);
+  unite_cheapest(parts, inside, distance, limits);
+  cut_anew(model, parts, inside, distance, limits);
+  return parts;
+}
+
+}  // namespace limber::meshing::detail
