@@ -41,6 +41,7 @@ Json json_of(const meshing::Certificate& c) {
 meshing::CageMode mode_of(const std::string& name) {
   if (name == "fast") return meshing::CageMode::fast;
   if (name == "paper") return meshing::CageMode::paper;
+  if (name == "conform") return meshing::CageMode::conform;
   LIMBER_CHECK(name == "lattice", name);
   return meshing::CageMode::lattice;
 }

@@ -17,7 +17,7 @@ struct PrepareSettings {
   int shells = 32;
   double concavity = 0;
   int tets = 1000;
-  std::string mode = "lattice";  // "lattice", "fast", "paper"
+  std::string mode = "lattice";  // "lattice", "fast", "paper", "conform"
 };
 
 // Where a body comes from. `identity` holds all that load() and made_cage() depend on: when it and the

@@ -149,8 +149,9 @@ int run_command_line(int argc, const char* const* argv) {
   prepare_command
       .add_option(
           "--mode", prepare_options.mode,
-          "how the cage is made: lattice; fast (not shrunk to the surface); paper (Delaunay of each shell)")
-      ->check(CLI::IsMember({"lattice", "fast", "paper"}))
+          "how the cage is made: lattice; fast (not shrunk to the surface); paper (Delaunay of each shell); "
+          "conform (CGAL's Mesh_3: follows the surface, does not enclose it)")
+      ->check(CLI::IsMember({"lattice", "fast", "paper", "conform"}))
       ->capture_default_str();
   prepare_command
       .add_option("--scale", prepare_options.scale, "metres a file unit, 1e-9 … 1e9; 0.001 for millimetres")

@@ -80,10 +80,12 @@ void throw_if_stopped() {
 }
 
 double cpu_seconds() {
-  rusage usage{};
+  rusage usage{}, children{};
   getrusage(RUSAGE_SELF, &usage);
+  getrusage(RUSAGE_CHILDREN, &children);
   const auto seconds = [](const timeval& t) { return double(t.tv_sec) + 1e-6 * double(t.tv_usec); };
-  return seconds(usage.ru_utime) + seconds(usage.ru_stime);
+  return seconds(usage.ru_utime) + seconds(usage.ru_stime) + seconds(children.ru_utime) +
+         seconds(children.ru_stime);
 }
 
 double peak_memory_mb() {

@@ -27,7 +27,7 @@ int stop_signal();        // 0, or the number of the signal that arrived
 void request_stop(int);   // for tests
 void throw_if_stopped();  // throws Interrupted
 
-// Seconds of CPU time used by this process so far, and peak memory.
+// Seconds of CPU time used by this process and by those it has waited for, and its own peak memory.
 double cpu_seconds();
 double peak_memory_mb();
 

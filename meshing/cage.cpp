@@ -8,9 +8,10 @@
 #include <optional>
 
 #include "core/error.h"
-#include "meshing/detail/delaunay.h"
+#include "meshing/detail/conform.h"
 #include "meshing/detail/glued.h"
 #include "meshing/detail/lattice_cage.h"
+#include "meshing/detail/paper_cage.h"
 #include "meshing/detail/shrink_fit.h"
 #include "meshing/detail/tet_faces.h"
 #include "meshing/quality.h"
@@ -157,36 +158,43 @@ Cage lattice_cage(const SurfaceMesh& surface, const CageOptions& options) {
   return cage;
 }
 
-Cage paper_cage(const std::vector<ConvexShell>& shells) {
+Cage paper_cage(const std::vector<ConvexShell>& shells, double diagonal) {
   require(!shells.empty(), "mode paper needs convex shells; decompose the model first");
+  detail::PaperCage paper = detail::paper_cage(shells, diagonal);
+  require(paper.mesh.tets.rows() > 0, "no shell has a volume; decompose the model anew");
   Cage cage;
-  std::vector<Vec3> positions;
-  std::vector<std::array<int, 4>> tets;
-  const auto before = [](const Vec3& a, const Vec3& b) {
-    return std::lexicographical_compare(a.begin(), a.end(), b.begin(), b.end());
-  };
-  for (const ConvexShell& shell : shells)
-    for (Eigen::Index v = 0; v < shell.vertices.rows(); ++v) positions.push_back(shell.vertices.row(v));
-  std::sort(positions.begin(), positions.end(), before);
-  positions.erase(std::unique(positions.begin(), positions.end()), positions.end());
-  for (std::size_t s = 0; s < shells.size(); ++s)
-    for (std::array<int, 4> tet : detail::delaunay_tets(shells[s].vertices)) {
-      for (int& v : tet)
-        v = int(
-            std::lower_bound(positions.begin(), positions.end(), Vec3(shells[s].vertices.row(v)), before) -
-            positions.begin());
-      tets.push_back(tet);
-      cage.shell_from_tet.push_back(int(s));
-    }
-  require(!tets.empty(), "no shell has a volume; decompose the model anew");
-  cage.mesh.positions.resize(Eigen::Index(positions.size()), 3);
-  for (std::size_t v = 0; v < positions.size(); ++v) cage.mesh.positions.row(Eigen::Index(v)) = positions[v];
-  cage.mesh.tets.resize(Eigen::Index(tets.size()), 4);
-  for (std::size_t t = 0; t < tets.size(); ++t)
-    cage.mesh.tets.row(Eigen::Index(t)) << tets[t][0], tets[t][1], tets[t][2], tets[t][3];
-  cage.notes.push_back(
-      "mode paper: tets as the shells give them; the budget, the dihedrals and enclosure are not heeded");
+  cage.mesh = std::move(paper.mesh);
+  cage.shell_from_tet = std::move(paper.shell_from_tet);
+  cage.notes = std::move(paper.notes);
   return cage;
+}
+
+Cage conforming_cage(const SurfaceMesh& surface, int tets) {
+  detail::Conformed conformed = detail::conform(surface, tets);
+  Cage cage;
+  cage.mesh = std::move(conformed.mesh);
+  cage.notes.push_back("mode conform: the tets follow the surface, whose vertices lie inside and outside");
+  if (!conformed.wrapped.empty())
+    cage.notes.push_back(fmt::format(
+        "mode conform: the model {}, so the tets fill CGAL's alpha wrap of it, {:.2g} m off the surface",
+        conformed.wrapped, conformed.wrap_offset_m));
+  if (conformed.sharp_edges > 0)
+    cage.notes.push_back(fmt::format("mode conform: {} sharp edge lines are kept", conformed.sharp_edges));
+  const double share = double(cage.mesh.tets.rows()) / tets;
+  if (std::abs(share - 1) > 0.1)
+    cage.notes.push_back(fmt::format("{} tets were asked for, {} is the nearest that CGAL's mesher gave",
+                                     tets, cage.mesh.tets.rows()));
+  return cage;
+}
+
+// What lattice_cage measures on its way.
+void measure(const SurfaceMesh& surface, Cage& cage) {
+  const double unit = std::exp2(std::ilogb(bounding_box(surface.positions).diagonal()));
+  SurfaceMesh scaled = with_lone_vertices(surface);
+  scaled.positions /= unit;
+  const CageModel model(scaled);
+  cage.glued_share = detail::glued_share(model, scaled, {cage.mesh.positions / unit, cage.mesh.tets});
+  if (model.closed && volume(surface) > 0) cage.volume_ratio = volume(cage.mesh) / volume(surface);
 }
 
 }  // namespace
@@ -196,13 +204,16 @@ Cage build_cage(const SurfaceMesh& surface, const std::vector<ConvexShell>& shel
   check(options);
   validate(surface, "cage");
   require(bounding_box(surface.positions).diagonal() > 0, "all vertices of the model are one point");
-  Cage cage = options.mode == CageMode::paper ? paper_cage(shells) : lattice_cage(surface, options);
+  Cage cage = options.mode == CageMode::paper ? paper_cage(shells, bounding_box(surface.positions).diagonal())
+              : options.mode == CageMode::conform ? conforming_cage(surface, options.tets)
+                                                  : lattice_cage(surface, options);
+  if (options.mode == CageMode::paper || options.mode == CageMode::conform) measure(surface, cage);
   if (options.mode != CageMode::paper) cage.shell_from_tet = label_tets(cage.mesh, shells);
   cage.components = component_count(cage.mesh.tets);
   if (cage.components > 1)
     cage.notes.push_back(fmt::format("the cage has {} pieces, because {}", cage.components,
                                      options.mode == CageMode::paper
-                                         ? "shells that share no corner are not joined"
+                                         ? "not all neighbouring shells have a face in common"
                                          : "the model has parts that lie apart"));
   return cage;
 }

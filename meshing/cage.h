@@ -12,7 +12,8 @@ namespace limber::meshing {
 enum class CageMode {
   lattice,  // tets of a body-centred cubic lattice, warped and drawn in to the surface: encloses, always
   fast,     // the same without warp and drawing in: dihedrals of 60 and 90 degrees exactly
-  paper     // Delaunay tets of each shell, welded where shells share a corner: the baseline; promises nothing
+  paper,    // Delaunay tets of each shell, welded where shells meet: the baseline; promises nothing
+  conform   // CGAL's Mesh_3: the boundary follows the surface, so that some of its vertices lie outside
 };
 
 struct CageOptions {
@@ -27,7 +28,7 @@ struct Cage {
   TetMesh mesh;
   std::vector<int>
       shell_from_tet;    // (T) the shell that holds the tet's middle most deeply; 0 when there are no shells
-  double spacing_m = 0;  // edge of the lattice's cells; 0 in mode paper
+  double spacing_m = 0;  // edge of the lattice's cells; 0 in modes paper and conform
   int passes = 0;        // made while drawing in
   int components = 0;    // of tets joined by faces; one for a connected model
   double volume_ratio = 0;  // the cage's volume over the model's; 0 where the surface is not closed
@@ -40,7 +41,8 @@ struct Cage {
 // `surface` may be open, doubled, self-intersecting; the winding number says what is inside. It must pass
 // validate(). `shells` may be empty, except in mode paper; in the other modes they only label the tets. Same
 // input, same bytes, also when the triangles come in another order, or all coordinates times a power of two.
-// Throws InputError when an option is out of range, the model has no size, or mode paper gets no shells.
+// Throws InputError when an option is out of range, the model has no size, mode paper gets no shells, or
+// CGAL's mesher fails (mode conform).
 Cage build_cage(const SurfaceMesh& surface, const std::vector<ConvexShell>& shells, const CageOptions&);
 
 }  // namespace limber::meshing

@@ -52,7 +52,7 @@ using Model = std::variant<FileModel, MadeModel, BoxModel, PlateModel, SphereMod
 
 struct CageSpec {
   int tets = 0;      // budget of the enclosing cage; 0 when cells are given
-  std::string mode;  // "lattice", "fast" or "paper": how that cage is made
+  std::string mode;  // "lattice", "fast", "paper" or "conform": how that cage is made
   int shells = 0;    // at most so many convex shells
   // Boxes and plates without a hole: cut into nx × ny × nz cells of five tets each.
   Eigen::Vector3i cells = Eigen::Vector3i::Zero();

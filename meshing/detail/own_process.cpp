@@ -78,7 +78,10 @@ OwnProcessResult run_in_own_process(const std::function<std::string()>& work, in
   if (child == 0) be_the_child(work, cpu_seconds, answer.fd);
 
   int status = 0;
-  while (waitpid(child, &status, 0) < 0) LIMBER_CHECK(errno == EINTR, errno);
+  while (waitpid(child, &status, 0) < 0) {
+    LIMBER_CHECK(errno == EINTR, errno);
+    if (stop_signal()) kill(child, SIGKILL);
+  }
   throw_if_stopped();
   if (WIFSIGNALED(status)) {
     const int number = WTERMSIG(status);

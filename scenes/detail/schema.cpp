@@ -170,7 +170,7 @@ constexpr Key all_keys[] = {
      0,
      "\"lattice\"",
      "with tets: how the cage is made (docs/cage.md)",
-     "lattice, fast, paper",
+     "lattice, fast, paper, conform",
      ""},
     {"bodies[].cage.shells", Type::integer, from_to(1, 1000), 0, "32",
      "with tets: at most so many convex shells (docs/decomposition.md)", "", ""},
