@@ -1,4 +1,4 @@
-// Pairs of triangles that pass through each other. CGAL's box sweep and exact predicates.
+// Pairs of triangles that pass through each other: a tree of boxes, and a test of pairs without rounding.
 #pragma once
 
 #include <array>
@@ -11,7 +11,7 @@ namespace limber::meshing {
 
 struct SelfIntersections {
   std::vector<std::array<int, 2>> pairs;  // rows of triangles, the smaller first, ascending
-  bool complete = true;                   // false: stopped at `limit` pairs
+  bool complete = true;  // false: stopped at `limit` pairs, or when the boxes of too many met
 };
 
 // Neighbours count only where they meet in more than what they share: two faces of an edge when one lies
