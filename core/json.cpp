@@ -11,6 +11,8 @@ Json parse_json(const std::string& text, const std::string& what) {
     const auto at = std::min(std::size_t(error.byte), text.size());
     const auto line = 1 + std::count(text.begin(), text.begin() + std::ptrdiff_t(at), '\n');
     throw InputError(fmt::format("{}:{}: is not valid JSON: {}", what, line, error.what()));
+  } catch (const Json::out_of_range& error) {
+    throw InputError(fmt::format("{}: holds a number that no computer can: {}", what, error.what()));
   }
 }
 

@@ -152,8 +152,20 @@ SurfaceMesh read_ply(const fs::path& path) {
   return mesh;
 }
 
+namespace {
+
+// What a reader can check the rest by.
+std::string shells_header(const std::vector<ConvexShell>& shells) {
+  Eigen::Index vertices = 0, triangles = 0;
+  for (const ConvexShell& shell : shells)
+    vertices += shell.vertices.rows(), triangles += shell.triangles.rows();
+  return fmt::format("# {} convex shells, {} vertices, {} triangles\n", shells.size(), vertices, triangles);
+}
+
+}  // namespace
+
 void write_obj(const fs::path& path, const std::vector<ConvexShell>& shells) {
-  std::string text = fmt::format("# {} convex shells\n", shells.size());
+  std::string text = shells_header(shells);
   Eigen::Index first = 1;
   for (std::size_t s = 0; s < shells.size(); ++s) {
     fmt::format_to(std::back_inserter(text), "g shell_{}\n", s);
@@ -228,6 +240,11 @@ std::vector<ConvexShell> read_obj_shells(const fs::path& path) {
       }
     validate(shells[g], fmt::format("{}: shell {}", path.string(), g));
   }
+  if (const std::string header = shells_header(shells); !text.starts_with(header))
+    throw InputError(
+        fmt::format("{}: holds \"{}\" by count, but its first line says \"{}\"; it was changed or "
+                    "is not limber's, write it again",
+                    path.string(), header.substr(0, header.size() - 1), text.substr(0, text.find('\n'))));
   return shells;
 }
 

@@ -15,8 +15,8 @@ namespace limber {
 void write_ply(const fs::path&, const SurfaceMesh&);
 SurfaceMesh read_ply(const fs::path&);
 
-// OBJ with 17 digits; one group "shell_i" a shell. The reader takes v and f (triangles, v/t/n allowed) and g
-// or o.
+// OBJ with 17 digits; one group "shell_i" a shell; how many shells, vertices and triangles there are stands
+// in its first line, and "# end" in its last.
 void write_obj(const fs::path&, const std::vector<ConvexShell>&);
 std::vector<ConvexShell> read_obj_shells(const fs::path&);
 void write_obj(const fs::path&, const SurfaceMesh&);

@@ -20,23 +20,6 @@ std::size_t item_size(std::string_view dtype) {
   return 0;
 }
 
-// The .npy format, version 1.0: magic, header length, a Python dict padded to 64 bytes, then the elements.
-std::string npy_text(const NpyArray& array) {
-  std::string shape;
-  for (const std::int64_t n : array.shape) shape += fmt::format("{}, ", n);
-  std::string header = fmt::format(
-      "{{'descr': '{}', 'fortran_order': False, 'shape': ({}), }}", array.dtype,
-      array.shape.size() == 1 ? fmt::format("{},", array.shape[0])
-                              : shape.substr(0, shape.size() - std::min<std::size_t>(2, shape.size())));
-  header.append(63 - (npy_magic.size() + 2 + header.size()) % 64, ' ');
-  header += '\n';
-  std::string text(npy_magic);
-  text += char(header.size() & 255), text += char(header.size() >> 8);
-  text += header;
-  text.append(reinterpret_cast<const char*>(array.bytes.data()), array.bytes.size());
-  return text;
-}
-
 NpyArray npy_array(std::string_view text, const std::string& what) {
   const auto refuse = [&](std::string_view why) -> void {
     throw InputError(fmt::format("{}: {}", what, why));
@@ -137,9 +120,26 @@ const std::string& Npz::text(const std::string& name) const {
   return found->second;
 }
 
+// The .npy format, version 1.0: magic, header length, a Python dict padded to 64 bytes, then the elements.
+std::string npy_file(const NpyArray& array) {
+  std::string shape;
+  for (const std::int64_t n : array.shape) shape += fmt::format("{}, ", n);
+  std::string header = fmt::format(
+      "{{'descr': '{}', 'fortran_order': False, 'shape': ({}), }}", array.dtype,
+      array.shape.size() == 1 ? fmt::format("{},", array.shape[0])
+                              : shape.substr(0, shape.size() - std::min<std::size_t>(2, shape.size())));
+  header.append(63 - (npy_magic.size() + 2 + header.size()) % 64, ' ');
+  header += '\n';
+  std::string text(npy_magic);
+  text += char(header.size() & 255), text += char(header.size() >> 8);
+  text += header;
+  text.append(reinterpret_cast<const char*>(array.bytes.data()), array.bytes.size());
+  return text;
+}
+
 void write_npz(const fs::path& path, const Npz& npz) {
   std::map<std::string, std::string> entries = npz.texts;
-  for (const auto& [name, array] : npz.arrays) entries[name + ".npy"] = npy_text(array);
+  for (const auto& [name, array] : npz.arrays) entries[name + ".npy"] = npy_file(array);
 
   // The archive is built in memory, so that the file is written by write_file alone.
   zip_error_t error;

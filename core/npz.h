@@ -69,6 +69,8 @@ struct Npz {
   fs::path source;  // for messages
 };
 
+std::string npy_file(const NpyArray&);  // the bytes of its entry
+
 void write_npz(const fs::path&, const Npz&);
 // Throws InputError when it is not a zip, is cut short, fails a checksum, or holds an array of another kind.
 Npz read_npz(const fs::path&);

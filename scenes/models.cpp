@@ -16,6 +16,8 @@ template <class... Visitors>
 struct Overloaded : Visitors... {
   using Visitors::operator()...;
 };
+template <class... Visitors>
+Overloaded(Visitors...) -> Overloaded<Visitors...>;  // clang 14 (tools/fuzz) does not deduce it
 
 Eigen::Matrix3d pose_turn(const Pose& pose) {
   return Eigen::AngleAxisd(pose.angle_deg * std::numbers::pi / 180, pose.axis).toRotationMatrix();

@@ -171,6 +171,23 @@ TEST(Files, ANameThatIsTakenByAFolderIsADiskError) {
   EXPECT_EQ(std::distance(fs::directory_iterator(folder.path()), fs::directory_iterator()), 1);
 }
 
+// A shell less at the end, with the end mark in place: only the counts can tell.
+TEST(Files, ShellsAreCountedByTheFirstLine) {
+  const TemporaryFolder folder;
+  write_obj(folder / "a.obj", shells());
+  const std::string whole = read_file(folder / "a.obj");
+  const std::size_t second = whole.find("g shell_1"), end = whole.find("# end");
+  std::ofstream(folder / "less.obj") << whole.substr(0, second) << whole.substr(end);
+  EXPECT_THROW(read_obj_shells(folder / "less.obj"), InputError);
+  std::ofstream(folder / "uncounted.obj") << whole.substr(whole.find('\n') + 1);
+  EXPECT_THROW(read_obj_shells(folder / "uncounted.obj"), InputError);
+}
+
+// From the fuzzer's kind of input: a number beyond any double is no parse error to the library.
+TEST(Json, ANumberTooLargeIsAnInputError) {
+  EXPECT_THROW(parse_json("{\"a\": 1e999}", "report.json"), InputError);
+}
+
 TEST(Json, ComplaintNamesTheLine) {
   try {
     parse_json("{\n\"a\": 1,\n}", "report.json");

@@ -1,0 +1,284 @@
+#include "tests/fuzz/targets.h"
+
+#include <algorithm>
+#include <array>
+#include <fstream>
+
+#include "core/error.h"
+#include "core/hash.h"
+#include "core/json.h"
+#include "core/mesh_files.h"
+#include "core/npz.h"
+#include "ffd/binding_file.h"
+#include "meshing/detail/polygon_soup.h"
+#include "meshing/import.h"
+#include "plan/plan_file.h"
+#include "scenes/scene.h"
+#include "tests/core/temporary_folder.h"
+
+namespace limber::fuzz {
+
+namespace {
+
+// ── things to write seeds from
+// ────────────────────────────────────────────────────────────────────────────────
+
+const TemporaryFolder& folder() {
+  static const TemporaryFolder made;
+  return made;
+}
+
+TetMesh cage() {
+  TetMesh mesh{Points(5, 3), Tets(2, 4)};
+  mesh.positions << 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1, 0.25, 0.25, -1;
+  mesh.tets << 0, 1, 2, 3, 0, 2, 1, 4;
+  return mesh;
+}
+
+SurfaceMesh surface() {
+  const TetMesh mesh = cage();
+  return {0.25 * mesh.positions, boundary_triangles(mesh.tets)};
+}
+
+ConvexShell shell() {
+  const TetMesh mesh = cage();
+  return {mesh.positions.topRows(4), boundary_triangles(mesh.tets.topRows(1))};
+}
+
+plan::Plan small_plan() {
+  const State state{3, {0, 0, 0, 1, 2, 3}, {0, 0, 0, 0, 0, 1}};
+  plan::Plan made;
+  made.tree.states = {state, state};
+  made.tree.parents = {-1, 0};
+  made.tree.controls = {Control{}, Control{}};
+  made.tree.centers.push_back({0, 0, 0});
+  made.tree.centers.push_back({1, 0, 0});
+  made.tree.iterations = {0, 1};
+  made.trajectory.controls = {Control{}};
+  made.trajectory.frames = {state, state};
+  made.trajectory.end = state;
+  return made;
+}
+
+template <class Write>
+std::string written(const char* name, Write write) {
+  write(folder() / name);
+  return read_file(folder() / name);
+}
+
+// Not by write_file, which waits for the disk.
+fs::path file_of(std::string_view bytes, const char* name) {
+  std::ofstream(folder() / name, std::ios::binary) << bytes;
+  return folder() / name;
+}
+
+// ── .npz by its entries: checksums would stop a fuzzer at the door
+// ────────────────────────────────────────────────
+
+// One entry after the other: its name, a line end, two bytes of size, its content.
+std::string packed(const std::string& npz_bytes) {
+  const Npz npz = read_npz(file_of(npz_bytes, "packed.npz"));
+  std::string bytes;
+  const auto append = [&](const std::string& name, std::string_view content) {
+    bytes += name + '\n';
+    bytes += char(content.size() & 255);
+    bytes += char(content.size() >> 8);
+    bytes += content;
+  };
+  for (const auto& [name, text] : npz.texts) append(name, text);
+  for (const auto& [name, array] : npz.arrays) append(name + ".npy", npy_file(array));
+  return bytes;
+}
+
+fs::path npz_of(std::string_view bytes) {
+  Npz npz;
+  while (!bytes.empty()) {
+    const std::size_t name_end = std::min(bytes.find('\n'), bytes.size());
+    const std::string name(bytes.substr(0, name_end));
+    bytes.remove_prefix(std::min(name_end + 1, bytes.size()));
+    if (bytes.size() < 2) break;
+    const std::size_t size =
+        std::size_t((unsigned char)bytes[0]) + 256 * std::size_t((unsigned char)bytes[1]);
+    bytes.remove_prefix(2);
+    const bool plain = std::all_of(name.begin(), name.end(), [](char c) { return c > ' ' && c < 127; });
+    if (plain && !name.empty()) npz.texts[name] = std::string(bytes.substr(0, size));
+    bytes.remove_prefix(std::min(size, bytes.size()));
+  }
+  write_npz(folder() / "entries.npz", npz);
+  return folder() / "entries.npz";
+}
+
+// ── seeds of the formats that others write
+// ────────────────────────────────────────────────────────────────────────
+
+const std::vector<std::string> obj_seeds{
+    "# 4 vertices\nmtllib a.mtl\no thing\nv 0 0 0\nv 1 0 0 1\nv 0 1.5e-1 0 0.1 0.2 0.3\nv 0 0 -1\nvt 0 0\nvn "
+    "0 "
+    "0 1\ng a\nusemtl m\ns 1\nf 1/1/1 2//1 3/1\nf 1 2 4\nf -4 -1 -2\nf 2 3 \\\n 4\nl 1 2\np 1\n",
+    "v 0 0 0\nv 2 0 0\nv 2 2 0\nv 1 1 0\nv 0 2 0\nf 1 2 3 4 5\ncurv 0 1 1 2\n"};
+const std::vector<std::string> off_seeds{
+    "OFF\n# made\n4 4 6\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 2 1\n3 0 1 3\n3 1 2 3 255 0 0\n3 2 0 3\n",
+    "STCNOFF 5 1 0\n0 0 0 1\n2 0 0\n2 2 0\n1 1 0\n0 2 0\n5 0 1 2 3 4\n"};
+const std::vector<std::string> stl_seeds{
+    "solid a\nfacet normal 0 0 1\n outer loop\n  vertex 0 0 0\n  vertex 1 0 0\n  vertex 0 1 0\n "
+    "endloop\nendfacet\n"
+    "facet normal 0 0 1 outer loop vertex 0 0 0 vertex 1 0 0 vertex 0 0 1 endloop endfacet\nendsolid a\n"};
+
+template <class T>
+void append(std::string& bytes, T value) {
+  bytes.append(reinterpret_cast<const char*>(&value), sizeof value);
+}
+
+std::string binary_stl() {
+  std::string bytes = "solid, or so this says";
+  bytes.resize(80, ' ');
+  const SurfaceMesh mesh = surface();
+  append(bytes, std::uint32_t(mesh.triangles.rows()));
+  for (const auto triangle : mesh.triangles.rowwise()) {
+    for (int i = 0; i < 3; ++i) append(bytes, 0.f);
+    for (const int v : triangle)
+      for (const double x : mesh.positions.row(v)) append(bytes, float(x));
+    append(bytes, std::uint16_t(0));
+  }
+  return bytes;
+}
+
+constexpr const char* vertex_properties = "property float x\nproperty float y\nproperty float z\n";
+
+std::string ascii_ply() {
+  return std::string("ply\nformat ascii 1.0\ncomment made\nelement vertex 4\nproperty uchar red\n") +
+         vertex_properties +
+         "element face 2\nproperty list uchar int vertex_indices\nproperty float quality\nelement edge 1\n"
+         "property int vertex1\nend_header\n"
+         "9 0 0 0\n9 1 0 0\n9 0 1 0\n9 0 0 1\n3 0 1 2 0.5\n4 0 1 2 3 1\n7\n";
+}
+
+std::string strip_ply() {
+  return std::string("ply\nformat ascii 1.0\nelement vertex 4\n") + vertex_properties +
+         "element tristrips 1\nproperty list int int vertex_indices\nend_header\n"
+         "0 0 0\n1 0 0\n0 1 0\n1 1 0\n6 0 1 2 3 -1 2\n";
+}
+
+std::string big_endian_ply() {
+  std::string bytes = std::string("ply\nformat binary_big_endian 1.0\nelement vertex 3\n") +
+                      vertex_properties +
+                      "element face 1\nproperty list uchar ushort vertex_index\nend_header\n";
+  bytes += std::string("\0\0\0\0\0\0\0\0\0\0\0\0", 12);
+  bytes += std::string("\x3f\x80\0\0\0\0\0\0\0\0\0\0", 12);
+  bytes += std::string("\0\0\0\0\x3f\x80\0\0\0\0\0\0", 12);
+  return bytes + std::string("\3\0\0\0\1\0\2", 7);
+}
+
+std::vector<std::string> ply_seeds() {
+  return {ascii_ply(), strip_ply(), big_endian_ply(),
+          written("surface.ply", [](const fs::path& p) { write_ply(p, surface()); })};
+}
+
+// All at once; the importer must tell what they are. The first byte says how the file is named.
+constexpr std::array<const char*, 5> model_names{"model.obj", "model.off", "model.ply", "model.stl", "model"};
+
+std::vector<std::string> model_seeds() {
+  std::vector<std::string> seeds;
+  const std::array<std::vector<std::string>, 4> own{
+      obj_seeds, off_seeds, ply_seeds(), {stl_seeds[0], binary_stl()}};
+  for (std::size_t i = 0; i < own.size(); ++i)
+    for (const std::string& seed : own[i])
+      for (const std::size_t name : {i, std::size_t(4)}) seeds.push_back(char('0' + name) + seed);
+  return seeds;
+}
+
+void read_model(std::string_view bytes) {
+  if (bytes.empty()) return;
+  const char* name = model_names[std::size_t((unsigned char)bytes[0] - '0') % model_names.size()];
+  const meshing::ImportedModel model = meshing::import_model(file_of(bytes.substr(1), name));
+  validate(model.surface, "what import_model gives");
+  for (const meshing::Defect* none : {&model.left.degenerate_faces, &model.left.duplicate_faces,
+                                      &model.left.isolated_vertices, &model.left.non_finite_vertices})
+    LIMBER_CHECK(none->count == 0, none->places.front());
+  meshing::to_json(model).dump();
+}
+
+const char* scene_seed() {
+  return R"(name = "a"
+[world]
+bounds_m = [[0, 0, 0], [4, 2, 2]]
+[[bodies]]
+name = "ball"
+role = "robot"
+model = { sphere = { diameter_m = 0.5 } }
+cage = { tets = 300 }
+material = { youngs_modulus_pa = 6e3, density_kg_m3 = 100 }
+pose = { position_m = [0.5, 1, 1] }
+color = "#e08e45"
+[[bodies]]
+name = "plate"
+role = "obstacle"
+model = { plate = { size_m = [0.2, 2, 2], hole = { shape = "round", size_m = 0.4 } } }
+cage = { tets = 400 }
+material = { youngs_modulus_pa = 3e3, density_kg_m3 = 100 }
+pose = { position_m = [2, 1, 1] }
+fixed = "walls"
+[goal]
+center_of_mass_m = [3, 1, 1]
+radius_m = 0.25
+[planner]
+preset = "paper"
+weights = { body = 0.8, control_point = 0.1, interpolation = 0.1 }
+max_force_n = 200
+[camera]
+keyframes = [{ at = 0, eye_m = [0, 0, 9], target_m = [1, 1, 1] }]
+)";
+}
+
+std::vector<Target> made_targets() {
+  const std::string npz = written("binding.npz", [](const fs::path& p) {
+    ffd::Binding binding{Eigen::VectorXi::Zero(5), Weights::Zero(5, 4)};
+    binding.weights.col(0).setOnes();
+    ffd::write_binding(p, binding, surface(), cage());
+  });
+  const std::string plan_npz = written("plan.npz", [](const fs::path& p) {
+    plan::write_plan(p, small_plan(), {{"a", 1}});
+  });
+  const std::string report = written("report.json", [](const fs::path& p) {
+    write_json(p, to_json(meshing::clean(surface(), {.count_self_intersections = false})));
+  });
+  return {
+      {"obj", [](auto bytes) { meshing::detail::read_obj(bytes, "a.obj"); }, obj_seeds},
+      {"off", [](auto bytes) { meshing::detail::read_off(bytes, "a.off"); }, off_seeds},
+      {"ply", [](auto bytes) { meshing::detail::read_ply(bytes, "a.ply"); }, ply_seeds()},
+      {"stl_text", [](auto bytes) { meshing::detail::read_stl_text(bytes, "a.stl"); }, stl_seeds},
+      {"stl_binary", [](auto bytes) { meshing::detail::read_stl_binary(bytes, "a.stl"); }, {binary_stl()}},
+      {"model", read_model, model_seeds()},
+      {"surface",
+       [](auto bytes) { limber::read_ply(file_of(bytes, "surface.ply")); },
+       {written("surface.ply", [](const fs::path& p) { write_ply(p, surface()); })}},
+      {"shells",
+       [](auto bytes) { read_obj_shells(file_of(bytes, "shells.obj")); },
+       {written("shells.obj",
+                [](const fs::path& p) {
+                  write_obj(p, std::vector<ConvexShell>{shell(), shell()});
+                })}},
+      {"cage",
+       [](auto bytes) {
+         std::vector<int> label;
+         read_msh(file_of(bytes, "cage.msh"), &label);
+       },
+       {written("cage.msh",
+                [](const fs::path& p) {
+                  write_msh(p, cage(), {0, 7});
+                })}},
+      {"npz", [](auto bytes) { read_npz(file_of(bytes, "a.npz")); }, {npz, plan_npz}},
+      {"binding", [](auto bytes) { ffd::read_binding(npz_of(bytes), surface(), cage()); }, {packed(npz)}},
+      {"plan", [](auto bytes) { plan::read_plan(npz_of(bytes)); }, {packed(plan_npz)}},
+      {"json", [](auto bytes) { read_json(file_of(bytes, "a.json")).dump(); }, {report}},
+      {"scene", [](auto bytes) { scenes::read_scene(std::string(bytes), "scene.toml"); }, {scene_seed()}}};
+}
+
+}  // namespace
+
+const std::vector<Target>& targets() {
+  static const std::vector<Target> made = made_targets();
+  return made;
+}
+
+}  // namespace limber::fuzz

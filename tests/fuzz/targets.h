@@ -1,0 +1,22 @@
+// Every reader of limber as a function of bytes, for the fuzzer (tools/fuzz) and for the tests that run over
+// its seeds.
+#pragma once
+
+#include <functional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace limber::fuzz {
+
+struct Target {
+  std::string name;
+  // Reads the bytes as a file of its kind. InputError is an answer; anything else that is thrown is a
+  // finding.
+  std::function<void(std::string_view bytes)> read;
+  std::vector<std::string> seeds;  // good files, all of which read() takes
+};
+
+const std::vector<Target>& targets();
+
+}  // namespace limber::fuzz
