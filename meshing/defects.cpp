@@ -161,7 +161,7 @@ struct Kind {
   const char* many;
   Defect Defects::*defect;
 };
-constexpr std::array<Kind, 12> kinds{{
+constexpr std::array<Kind, 13> kinds{{
     {"n_gons", "face of more than three corners", "faces of more than three corners", &Defects::n_gons},
     {"non_finite_vertices", "infinite vertex", "infinite vertices", &Defects::non_finite_vertices},
     {"duplicate_vertices", "duplicate vertex", "duplicate vertices", &Defects::duplicate_vertices},
@@ -176,6 +176,7 @@ constexpr std::array<Kind, 12> kinds{{
      "edges between triangles that face opposite ways", &Defects::misoriented_edges},
     {"inward_components", "closed component that faces inward", "closed components that face inward",
      &Defects::inward_components},
+    {"inner_components", "component inside another", "components inside another", &Defects::inner_components},
     {"self_intersecting_pairs", "self-intersecting pair of triangles", "self-intersecting pairs of triangles",
      &Defects::self_intersecting_pairs},
 }};

@@ -36,6 +36,7 @@ struct Defects {
   Defect non_manifold_vertices;    // whose triangles form more than one fan
   Defect misoriented_edges;        // of two triangles that both run along it the same way
   Defect inward_components;        // closed, with negative volume: inside out, or a cavity
+  Defect inner_components;         // closed or nearly so, inside another: a cavity, or a solid in a solid
   Defect self_intersecting_pairs;  // of triangles
   bool self_intersections_counted = false;
   bool all_self_intersections_counted = false;  // false: the count is where counting stopped
@@ -44,9 +45,10 @@ struct Defects {
 };
 
 // Those that triangles and positions show. Vertices are the same when their rows are, so weld first.
-// Faces flatter than tolerance_m are degenerate. Self-intersections are not counted here.
+// Faces flatter than tolerance_m are degenerate. Self-intersections and inner components are not counted
+// here.
 Defects find_defects(const SurfaceMesh& welded, double tolerance_m);
-// Adds the self-intersecting pairs; as quick as the surface is clean (about 4 µs a triangle).
+// Adds the self-intersecting pairs; as quick as the surface is clean (about 1 µs a triangle).
 void count_self_intersections(const SurfaceMesh&, Defects&);
 
 // One sentence a kind that occurs: "12 boundary edges, the first: …".

@@ -91,7 +91,7 @@ PolygonSoup read_soup(const fs::path& path) {
   std::error_code error;
   if (fs::exists(path, error) && !fs::is_regular_file(path, error))
     throw InputError(fmt::format("{}: is not a file; give the path of a model", path.string()));
-  const std::string bytes = read_file(path), file = path.filename().string();
+  const std::string bytes = detail::without_byte_order_mark(read_file(path)), file = path.filename().string();
   if (bytes.empty()) throw InputError(file + ": the file is empty");
   const Recognized kind = recognize(bytes, path);
   PolygonSoup soup;
@@ -125,6 +125,7 @@ PolygonSoup read_soup(const fs::path& path) {
 // ────────────────────────────────────────────────────────────────
 
 constexpr double largest_coordinate = 1e30, smallest_diagonal_m = 1e-30;
+constexpr double most_rounding = 1e-5;  // of the diagonal, without a word
 
 void require_valid(const ImportOptions& options) {
   if (!(std::isfinite(options.scale) && options.scale > 0))
@@ -222,8 +223,8 @@ void require_some_triangle(const PolygonSoup& soup, const Triangulated& faces, s
 }
 
 // Removes what a surface can do without and turns the rest the right way round.
-void mend(SurfaceMesh& mesh, double tolerance_m, std::vector<std::string>& mended,
-          std::vector<std::string>& warnings) {
+void mend(ImportedModel& model, double tolerance_m) {
+  auto& [mesh, found, left, mended, warnings] = model;
   const int collapsed = drop_collapsed(mesh);
   if (collapsed > 0)
     mended.push_back(counted(collapsed, "face", "faces") + " whose corners fall together dropped");
@@ -238,6 +239,9 @@ void mend(SurfaceMesh& mesh, double tolerance_m, std::vector<std::string>& mende
   if (orientation.turned_components > 0)
     mended.push_back(counted(orientation.turned_components, "component", "components") +
                      " turned inside out to face outward");
+  for (const Vec3& p : orientation.inner)
+    if (++found.inner_components.count <= 5)
+      found.inner_components.places.push_back(fmt::format("at ({:.6g} {:.6g} {:.6g})", p.x(), p.y(), p.z()));
   if (orientation.cavities > 0)
     warnings.push_back(counted(orientation.cavities, "inner component faces", "inner components face") +
                        " inward and stays so: taken as a cavity");
@@ -284,7 +288,7 @@ ImportedModel finish(const PolygonSoup& soup, const ImportOptions& options, cons
   model.found.duplicate_vertices = std::move(duplicate);
   model.found.isolated_vertices = std::move(isolated);
 
-  mend(mesh, tolerance_m, model.mended, model.warnings);
+  mend(model, tolerance_m);
   if (mesh.triangles.rows() == 0)
     throw InputError(
         fmt::format("{}: none of its {} triangles has an area; is the model flattened, or the scale wrong?",
@@ -298,11 +302,18 @@ ImportedModel finish(const PolygonSoup& soup, const ImportOptions& options, cons
                       "were read",
                       unused, model.found.vertices, model.found.triangles));
   }
-  if (const double diagonal_m = bounding_box(mesh.positions).diagonal(); diagonal_m < smallest_diagonal_m)
+  const double diagonal_m = bounding_box(mesh.positions).diagonal();
+  if (diagonal_m < smallest_diagonal_m)
     throw InputError(
         fmt::format("{}: the model is only {:.3g} m large; give a larger scale", file, diagonal_m));
+  if (const double rounding_m = options.scale * soup.rounding; rounding_m > most_rounding * diagonal_m)
+    model.warnings.push_back(fmt::format(
+        "the file holds single precision, and lies so far from the origin that this rounds vertices by "
+        "{:.1g} of the model's size: move it to the origin and export it again",
+        rounding_m / diagonal_m));
 
   model.left = find_defects(mesh, tolerance_m);
+  model.left.inner_components = model.found.inner_components;
   if (options.count_self_intersections) count_self_intersections(mesh, model.left);
   for (const std::string& sentence : sentences(model.left))
     model.warnings.push_back("left as it is: " + sentence);

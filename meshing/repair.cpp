@@ -3,11 +3,13 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numbers>
+#include <memory>
 #include <set>
 #include <tuple>
 
+#include "meshing/detail/box_tree.h"
 #include "meshing/detail/edges.h"
+#include "meshing/winding_number.h"
 
 namespace limber::meshing {
 
@@ -233,14 +235,14 @@ struct Pieces {
   std::vector<char> one_sided;  // (F) said at the piece's lowest triangle
 };
 
-Pieces agreeing_pieces(const Triangles& triangles, const std::vector<EdgeUse>& uses) {
+Pieces agreeing_pieces(const Triangles& triangles) {
   struct Neighbour {
     int triangle = -1;
     bool agrees = false;
   };
   const std::size_t n = std::size_t(triangles.rows());
   std::vector<std::array<Neighbour, 3>> neighbours(n);
-  detail::for_each_edge(uses, [&](std::span<const EdgeUse> edge) {
+  detail::for_each_edge(detail::edge_uses(triangles), [&](std::span<const EdgeUse> edge) {
     if (edge.size() != 2) return;
     const bool agrees = edge[0].forward != edge[1].forward;
     neighbours[edge[0].triangle][edge[0].side] = {edge[1].triangle, agrees};
@@ -304,10 +306,11 @@ struct Solid {
 };
 
 // As many triangles run along each edge of the group one way as the other. group (F); answers (by group).
-std::vector<char> balanced_groups(const Triangles& triangles, const std::vector<int>& group, int groups) {
+std::vector<char> balanced_groups(const std::vector<EdgeUse>& uses, const std::vector<int>& group,
+                                  int groups) {
   std::vector<char> balanced(std::size_t(groups), true);
   std::vector<std::array<int, 2>> along;  // group, direction
-  detail::for_each_edge(detail::edge_uses(triangles), [&](std::span<const EdgeUse> edge) {
+  detail::for_each_edge(uses, [&](std::span<const EdgeUse> edge) {
     along.clear();
     for (const EdgeUse& use : edge) along.push_back({group[use.triangle], use.forward ? 1 : -1});
     std::sort(along.begin(), along.end());
@@ -351,33 +354,32 @@ void measure(const SurfaceMesh& mesh, Solid& solid) {
 }
 
 // A closed piece is a solid; the open pieces of a component are one together (two boxes with a common wall).
-std::vector<Solid> solids_of(const SurfaceMesh& mesh, const Pieces& pieces,
-                             const std::vector<int>& component) {
+std::vector<Solid> solids_of(const SurfaceMesh& mesh, const Pieces& pieces) {
   const int n = int(mesh.triangles.rows());
-  const std::vector<char> piece_closed = balanced_groups(mesh.triangles, pieces.piece, n);
   std::vector<int> group(std::size_t(n), 0);
-  for (int t = 0; t < n; ++t) group[t] = piece_closed[pieces.piece[t]] ? pieces.piece[t] : n + component[t];
-  const std::vector<char> group_closed = balanced_groups(mesh.triangles, group, 2 * n);
-
-  std::vector<Solid> of_group(2 * std::size_t(n));
-  for (int t = 0; t < n; ++t) of_group[group[t]].triangles.push_back(t);
+  std::vector<char> group_closed;
+  {
+    const std::vector<EdgeUse> uses = detail::edge_uses(mesh.triangles);
+    const std::vector<char> piece_closed = balanced_groups(uses, pieces.piece, n);
+    const std::vector<int> component = detail::components(mesh.triangles, uses);
+    for (int t = 0; t < n; ++t) group[t] = piece_closed[pieces.piece[t]] ? pieces.piece[t] : n + component[t];
+    group_closed = balanced_groups(uses, group, 2 * n);
+  }
+  std::vector<int> size(2 * std::size_t(n), 0), solid_of_group(2 * std::size_t(n), -1);
+  for (int t = 0; t < n; ++t)
+    if (!pieces.one_sided[pieces.piece[t]]) ++size[group[t]];
   std::vector<Solid> solids;
   for (int g = 0; g < 2 * n; ++g) {
-    if (of_group[g].triangles.empty() || pieces.one_sided[pieces.piece[of_group[g].triangles[0]]]) continue;
-    solids.push_back(std::move(of_group[g]));
+    if (size[g] == 0) continue;
+    solid_of_group[g] = int(solids.size());
+    solids.emplace_back();
     solids.back().closed = group_closed[g];
-    measure(mesh, solids.back());
+    solids.back().triangles.reserve(std::size_t(size[g]));
   }
+  for (int t = 0; t < n; ++t)
+    if (!pieces.one_sided[pieces.piece[t]]) solids[solid_of_group[group[t]]].triangles.push_back(t);
+  for (Solid& solid : solids) measure(mesh, solid);
   return solids;
-}
-
-// Solid angle of a triangle seen from p, over 4π (van Oosterom and Strackee 1983).
-double winding(const SurfaceMesh& mesh, int t, const Vec3& p) {
-  const Vec3 a = corner(mesh, t, 0) - p, b = corner(mesh, t, 1) - p, c = corner(mesh, t, 2) - p;
-  const double la = a.norm(), lb = b.norm(), lc = c.norm();
-  const double half =
-      std::atan2(a.cross(b).dot(c), la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb);
-  return half / (2 * std::numbers::pi);
 }
 
 bool shows_its_outside(const Solid& s) {
@@ -392,34 +394,83 @@ struct Surroundings {
   double winding_number = 0;
   int innermost = -1;
 };
-Surroundings surroundings(const SurfaceMesh& mesh, const std::vector<Solid>& solids, int count,
-                          const Vec3& p) {
-  Surroundings around;
-  for (int i = 0; i < count; ++i) {
-    const Box& box = solids[i].box;
-    if ((p.array() < box.lower.array()).any() || (p.array() > box.upper.array()).any()) continue;
-    double number = 0;
-    for (const int t : solids[i].triangles) number += winding(mesh, t, p);
-    around.winding_number += number;
-    if (std::abs(number) >= 0.5) around.innermost = i;
+
+// Solids, and quick answers to which of them lie round a point. A solid that was asked about stays as it is.
+class Nest {
+ public:
+  Nest(const SurfaceMesh& mesh, const std::vector<Solid>& solids)
+      : mesh_(mesh),
+        solids_(solids),
+        tree_(boxes_of(solids)),
+        asked_(solids.size(), 0),
+        quick_(solids.size()) {}
+
+  Surroundings around(const Vec3& p, int count) {
+    std::vector<int> near;
+    tree_.any([&](const Box& box) { return !holds(box, p); },
+              [&](int i) {
+                if (i < count && holds(solids_[i].box, p)) near.push_back(i);
+                return false;
+              });
+    std::sort(near.begin(), near.end());
+    Surroundings around;
+    for (const int i : near) {
+      const double number = winding_number(i, p);
+      around.winding_number += number;
+      if (std::abs(number) >= 0.5) around.innermost = i;
+    }
+    return around;
   }
-  return around;
-}
+
+ private:
+  static bool holds(const Box& box, const Vec3& p) {
+    return (p.array() >= box.lower.array()).all() && (p.array() <= box.upper.array()).all();
+  }
+  static std::vector<Box> boxes_of(const std::vector<Solid>& solids) {
+    std::vector<Box> boxes;
+    for (const Solid& solid : solids) boxes.push_back(solid.box);
+    return boxes;
+  }
+
+  double winding_number(int i, const Vec3& p) {
+    const std::vector<int>& triangles = solids_[i].triangles;
+    if (++asked_[i] <= 16) {  // a tree costs about as much
+      double number = 0;
+      for (const int t : triangles)
+        number += solid_angle_share(corner(mesh_, t, 0), corner(mesh_, t, 1), corner(mesh_, t, 2), p);
+      return number;
+    }
+    if (!quick_[i]) {
+      Triangles own(Eigen::Index(triangles.size()), 3);
+      for (std::size_t k = 0; k < triangles.size(); ++k)
+        own.row(Eigen::Index(k)) = mesh_.triangles.row(triangles[k]);
+      quick_[i] = std::make_unique<WindingNumber>(mesh_.positions, own);
+    }
+    return quick_[i]->at(p);
+  }
+
+  const SurfaceMesh& mesh_;
+  const std::vector<Solid>& solids_;
+  detail::BoxTree tree_;
+  std::vector<int> asked_;
+  std::vector<std::unique_ptr<WindingNumber>> quick_;
+};
 
 }  // namespace
 
 Orientation orient(SurfaceMesh& mesh) {
   Orientation done;
-  const std::vector<EdgeUse> uses = detail::edge_uses(mesh.triangles);
-  const Pieces pieces = agreeing_pieces(mesh.triangles, uses);
+  const Pieces pieces = agreeing_pieces(mesh.triangles);
   make_pieces_agree(mesh, pieces, done);
 
-  std::vector<Solid> solids = solids_of(mesh, pieces, detail::components(mesh.triangles, uses));
+  std::vector<Solid> solids = solids_of(mesh, pieces);
+  if (solids.empty()) return done;
   const auto sheets = std::stable_partition(solids.begin(), solids.end(), shows_its_outside);
   // The outermost first: what is right about an inner one depends on it.
   std::stable_sort(solids.begin(), sheets,
                    [](const Solid& a, const Solid& b) { return std::abs(a.volume) > std::abs(b.volume); });
   const int judged = int(sheets - solids.begin());
+  Nest nest(mesh, solids);
   std::vector<char> turned(solids.size(), false);
   double area = 0, turned_area = 0;
   for (int i = 0; i < int(solids.size()); ++i) {
@@ -427,7 +478,8 @@ Orientation orient(SurfaceMesh& mesh) {
     if (i >= judged) continue;
     const int t = solids[i].triangles[0];
     const Vec3 on_it = (corner(mesh, t, 0) + corner(mesh, t, 1) + corner(mesh, t, 2)) / 3;
-    const Surroundings around = surroundings(mesh, solids, i, on_it);
+    const Surroundings around = nest.around(on_it, i);
+    if (around.innermost >= 0) done.inner.push_back(on_it);
     // In a model that is inside out as a whole, an inner component is turned with the one round it.
     turned[i] = around.innermost >= 0 && turned[around.innermost];
     if ((solids[i].volume < 0) != bool(turned[i])) {

@@ -37,6 +37,7 @@ struct Orientation {
   int turned_components = 0;  // whole ones, inside out before
   int cavities = 0;           // facing inward, inside another: left so
   int one_sided = 0;          // pieces like a Möbius strip, that cannot be oriented
+  std::vector<Vec3> inner;    // a point on each closed or nearly closed component inside another
 };
 // Triangles joined over edges of two are made to agree, then closed and nearly closed components to face
 // outward. One inside another is turned with it, so that a model that is inside out as a whole comes out

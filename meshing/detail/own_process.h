@@ -12,8 +12,9 @@ struct OwnProcessResult {
 };
 
 // `work` runs in a forked copy of this process: it may read everything, and change nothing here. It must not
-// need other threads. An exception in it counts as not finished, with its text. Stopped after `cpu_seconds`
-// of its own time. Throws Interrupted when a stop signal came meanwhile.
+// need other threads, and what it prints is lost. An exception in it counts as not finished, with its text.
+// Stopped after `cpu_seconds` of its own time, five times that and a minute by the clock, or when it takes
+// three quarters of the machine's memory. Throws Interrupted when a stop signal came meanwhile.
 OwnProcessResult run_in_own_process(const std::function<std::string()>& work, int cpu_seconds);
 
 }  // namespace limber::meshing::detail

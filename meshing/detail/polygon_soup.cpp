@@ -1,5 +1,6 @@
 #include "meshing/detail/polygon_soup.h"
 
+#include <algorithm>
 #include <limits>
 
 #include "core/error.h"
@@ -28,6 +29,13 @@ void PolygonSoup::add_corner(int vertex) {
 }
 
 void PolygonSoup::end_polygon() { first_corner.push_back(int(corners.size())); }
+
+void PolygonSoup::note_single_precision() {
+  double farthest = 0;
+  for (const Vec3& p : positions)
+    if (p.allFinite()) farthest = std::max(farthest, p.cwiseAbs().maxCoeff());
+  rounding = farthest * 0x1p-24;
+}
 
 void PolygonSoup::require_indices(const std::string& file) const {
   for (int i = 0; i < polygon_count(); ++i)

@@ -15,12 +15,14 @@ struct PolygonSoup {
   std::vector<int> corners;  // polygon i has corners[first_corner[i]] … corners[first_corner[i + 1] − 1]
   std::vector<int> first_corner{0};
   std::vector<std::string> warnings;  // what the reader left out, as sentences
+  double rounding = 0;  // file units; how far single precision may have moved a coordinate; 0: doubles
 
   int polygon_count() const { return int(first_corner.size()) - 1; }
   // Each throws InputError when there are more than an int can number.
   int add_position(const Vec3&);
   void add_corner(int vertex);
-  void end_polygon();  // the corners added since the last one
+  void end_polygon();            // the corners added since the last one
+  void note_single_precision();  // all positions so far were floats: sets rounding
   // Throws InputError naming the first polygon that names a vertex that is not there.
   void require_indices(const std::string& file) const;
 };

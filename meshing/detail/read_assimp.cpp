@@ -1,12 +1,15 @@
 #include <assimp/mesh.h>
 #include <assimp/scene.h>
 
+#include <algorithm>
 #include <assimp/Importer.hpp>
+#include <cmath>
 #include <cstring>
 
 #include "core/error.h"
 #include "meshing/detail/own_process.h"
 #include "meshing/detail/polygon_soup.h"
+#include "meshing/detail/text_scanner.h"
 
 namespace limber::meshing::detail {
 
@@ -28,9 +31,12 @@ void add_mesh(const aiMesh& mesh, const Eigen::Matrix4d& world_from_mesh, Polygo
     throw InputError(
         fmt::format("the instances of the scene add up to more than {} vertices", most_vertices));
   const int first = int(soup.positions.size());
+  const double stretch = world_from_mesh.topLeftCorner<3, 3>().norm();
   for (unsigned v = 0; v < mesh.mNumVertices; ++v) {
     const aiVector3D& p = mesh.mVertices[v];
     soup.add_position((world_from_mesh * Eigen::Vector4d(p.x, p.y, p.z, 1)).head<3>());
+    const double rounding = stretch * 0x1p-24 * std::max({std::abs(p.x), std::abs(p.y), std::abs(p.z)});
+    if (std::isfinite(rounding)) soup.rounding = std::max(soup.rounding, rounding);
   }
   const bool mirrored = world_from_mesh.topLeftCorner<3, 3>().determinant() < 0;
   for (unsigned f = 0; f < mesh.mNumFaces; ++f) {
@@ -96,6 +102,7 @@ std::string bytes_of(const PolygonSoup& soup) {
   append(bytes, soup.positions);
   append(bytes, soup.corners);
   append(bytes, soup.first_corner);
+  append(bytes, std::vector<double>{soup.rounding});
   for (const std::string& warning : soup.warnings)
     append(bytes, std::vector<char>(warning.begin(), warning.end()));
   return bytes;
@@ -105,6 +112,7 @@ PolygonSoup soup_from(std::string_view bytes) {
   soup.positions = taken<Vec3>(bytes);
   soup.corners = taken<int>(bytes);
   soup.first_corner = taken<int>(bytes);
+  soup.rounding = taken<double>(bytes).front();
   while (!bytes.empty()) {
     const std::vector<char> warning = taken<char>(bytes);
     soup.warnings.emplace_back(warning.begin(), warning.end());
@@ -113,16 +121,17 @@ PolygonSoup soup_from(std::string_view bytes) {
 }
 
 // By the file's name first, which lets assimp find files beside it; then by content alone, for a name that
-// lies.
+// lies. UTF-16 goes in as plain text, since some of assimp's readers take it for noise, or for another model.
 std::string bytes_by_assimp(const fs::path& path) {
+  const std::string content = read_file(path), text = without_byte_order_mark(content);
+  const std::string hint = path.extension().empty() ? "" : path.extension().string().substr(1);
   Assimp::Importer importer;
-  const aiScene* scene = importer.ReadFile(path.string(), 0);
+  const aiScene* scene = nullptr;
+  if (text.size() * 2 <= content.size())
+    scene = importer.ReadFileFromMemory(text.data(), text.size(), 0, hint.c_str());
+  if (!scene) scene = importer.ReadFile(path.string(), 0);
   const std::string complaint = importer.GetErrorString();
-  std::string content;
-  if (!scene) {
-    content = read_file(path);
-    scene = importer.ReadFileFromMemory(content.data(), content.size(), 0);
-  }
+  if (!scene) scene = importer.ReadFileFromMemory(content.data(), content.size(), 0);
   if (!scene) throw InputError(complaint);
   return bytes_of(soup_of(*scene));
 }

@@ -1,3 +1,5 @@
+#include <algorithm>
+#include <array>
 #include <limits>
 
 #include "core/error.h"
@@ -21,6 +23,77 @@ int vertex_of(std::string_view corner, const TextScanner& scanner, std::size_t v
     scanner.complain(
         fmt::format("corner \"{}\" of a face: there are only {} vertices", corner.substr(0, 40), vertices));
   return int(vertex);
+}
+
+// OBJ has no counts and no end, so a file cut between two lines is a whole file. Three traces may give it
+// away: a comment that counts, vertices at the end that no face names, a last line without its end.
+
+// What a comment line says: "# 8 vertices, 12 faces", "# Vertices: 8", "#Vertex Count 8".
+struct Announced {
+  std::int64_t vertices = 0, faces = 0, triangles = 0;
+};
+
+void read_announcement(std::string_view comment, Announced& most) {
+  const auto next = [&] {
+    const std::size_t begin = std::min(comment.find_first_not_of("# \t,:;="), comment.size());
+    comment.remove_prefix(begin);
+    const std::string_view word = comment.substr(0, comment.find_first_of(" \t,:;="));
+    comment.remove_prefix(word.size());
+    return word;
+  };
+  const auto count_of = [&](std::string_view word) -> std::int64_t* {
+    std::string lower(word);
+    for (char& c : lower)
+      if (c >= 'A' && c <= 'Z') c = char(c - 'A' + 'a');
+    if (lower == "vertices" || lower == "vertex" || lower == "verts") return &most.vertices;
+    if (lower == "faces" || lower == "face" || lower == "polygons") return &most.faces;
+    return lower == "triangles" ? &most.triangles : nullptr;
+  };
+  while (true) {
+    std::string_view first = next(), second = next();
+    if (second == "Count" || second == "count") second = next();
+    std::int64_t number = 0, *count = nullptr;
+    if (parse_integer(first, number))
+      count = count_of(second);
+    else if (parse_integer(second, number))
+      count = count_of(first);
+    if (!count) return;
+    *count = std::max(*count, number);
+  }
+}
+
+Announced announced_in_comments(std::string_view text) {
+  Announced most;
+  for (std::size_t at = text.find('#'); at != std::string_view::npos; at = text.find('#', at)) {
+    const std::size_t end = std::min(text.find_first_of("\r\n", at), text.size());
+    if (at == 0 || text[at - 1] == '\n' || text[at - 1] == '\r')
+      read_announcement(text.substr(at, end - at), most);
+    at = end;
+  }
+  return most;
+}
+
+// As many as a comment says may be of a part only, so fewer in the whole file is what counts.
+void warn_of_missing(std::string_view text, std::int64_t faces, PolygonSoup& soup) {
+  const Announced most = announced_in_comments(text);
+  const std::int64_t vertices = std::int64_t(soup.positions.size()),
+                     triangles = std::int64_t(soup.corners.size()) - 2 * soup.polygon_count();
+  const auto compare = [&](std::int64_t said, std::int64_t here, const char* what) {
+    if (here < said)
+      soup.warnings.push_back(
+          fmt::format("a comment in the file speaks of {} {}, but there are {}: it may have been cut short",
+                      said, what, here));
+  };
+  compare(most.vertices, vertices, "vertices");
+  compare(most.faces, faces, "faces");
+  compare(most.triangles, triangles, "triangles");
+
+  const int last_used =
+      soup.corners.empty() ? -1 : *std::max_element(soup.corners.begin(), soup.corners.end());
+  if (last_used >= 0 && last_used + 1 < vertices)
+    soup.warnings.push_back(
+        fmt::format("no face names any of the last {} of {} vertices: the file may have been cut short",
+                    vertices - last_used - 1, vertices));
 }
 
 }  // namespace
@@ -60,6 +133,8 @@ PolygonSoup read_obj(std::string_view text, const std::string& file) {
     soup.warnings.push_back(
         fmt::format("{} free-form curves and surfaces were left out: export them as triangles", free_form));
   soup.require_indices(file);
+  warn_of_missing(text, soup.polygon_count() + too_small, soup);
+  if (scanner.ends_within_a_word()) soup.warnings.push_back(last_word_may_be_cut);
   return soup;
 }
 

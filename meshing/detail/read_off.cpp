@@ -71,6 +71,8 @@ PolygonSoup read_off(std::string_view text, const std::string& file) {
     soup.warnings.push_back(fmt::format(
         "the file announces {} vertices and {} faces; what follows them, from line {}, was not read",
         vertices, faces, at_counts.line()));
+  else if (at_counts.ends_within_a_word())
+    soup.warnings.push_back(last_word_may_be_cut);
   return soup;
 }
 

@@ -108,7 +108,11 @@ class Values {
     if (!scanner_.next_word().empty()) ++overfull_lines_;
     scanner_.next_line();
   }
+  bool binary() const { return form_ != Form::ascii; }
   int overfull_lines() const { return overfull_lines_; }
+  bool last_word_may_be_cut() {
+    return form_ == Form::ascii && !scanner_.next_line() && scanner_.ends_within_a_word();
+  }
   [[noreturn]] void complain(const std::string& what) const {
     throw InputError(fmt::format("{}: {} {} of {}: {}", file_, *element_, index_, count_, what));
   }
@@ -216,6 +220,11 @@ void read_vertices(const Element& element, Values& values, PolygonSoup& soup, co
     }
     soup.add_position(position);
   }
+  if (values.binary() &&
+      std::all_of(element.properties.begin(), element.properties.end(), [&](const Property& p) {
+        return p.type == Type::f32 || std::find(axes.begin(), axes.end(), p.name) == axes.end();
+      }))
+    soup.note_single_precision();
 }
 
 void read_faces(const Element& element, Values& values, PolygonSoup& soup) {
@@ -276,6 +285,7 @@ PolygonSoup read_ply(std::string_view bytes, const std::string& file) {
     soup.warnings.push_back(
         fmt::format("{} lines hold more numbers than the PLY header explains; the rest of each was left out",
                     values.overfull_lines()));
+  if (values.last_word_may_be_cut()) soup.warnings.push_back(last_word_may_be_cut);
   soup.require_indices(file);
   return soup;
 }

@@ -93,6 +93,7 @@ PolygonSoup read_stl_binary(std::string_view bytes, const std::string& file) {
       soup.add_corner(soup.add_position({corners[3 * c], corners[3 * c + 1], corners[3 * c + 2]}));
     soup.end_polygon();
   }
+  soup.note_single_precision();
   return soup;
 }
 

@@ -43,6 +43,18 @@ bool parse_integer(std::string_view word, std::int64_t& value) {
   return error == std::errc() && stop == word.data() + word.size();
 }
 
+std::string without_byte_order_mark(std::string bytes) {
+  if (bytes.starts_with("\xef\xbb\xbf")) return bytes.substr(3);
+  const bool little = bytes.starts_with("\xff\xfe");
+  if (!little && !bytes.starts_with("\xfe\xff")) return bytes;
+  std::string text;
+  for (std::size_t i = 2; i + 1 < bytes.size(); i += 2) {
+    const char low = bytes[i + (little ? 0 : 1)], high = bytes[i + (little ? 1 : 0)];
+    text += high == 0 && low >= 0 ? low : '?';
+  }
+  return text;
+}
+
 TextScanner::TextScanner(std::string_view text, std::string_view file, char comment)
     : text_(text), file_(file), comment_(comment) {}
 
@@ -85,6 +97,10 @@ std::int64_t TextScanner::next_integer(const char* what) {
   if (!parse_integer(word, value))
     complain(fmt::format("{}: \"{}\" is not a whole number", what, word.substr(0, 40)));
   return value;
+}
+
+bool TextScanner::ends_within_a_word() const {
+  return !text_.empty() && text_.back() != '\n' && blanks.find(text_.back()) == std::string_view::npos;
 }
 
 void TextScanner::complain(const std::string& what) const {

@@ -11,6 +11,14 @@ namespace limber::meshing::detail {
 bool parse_number(std::string_view word, double& value);
 bool parse_integer(std::string_view word, std::int64_t& value);
 
+// A byte order mark at the start is left out. UTF-16 (known by its mark) becomes one byte a character, those
+// beyond ASCII a question mark: numbers and keywords are ASCII in every format.
+std::string without_byte_order_mark(std::string bytes);
+
+// The warning where ends_within_a_word().
+inline constexpr const char* last_word_may_be_cut =
+    "the last line has no end: if the file was cut short, its last number may have lost digits";
+
 class TextScanner {
  public:
   // `comment` starts a comment that ends with the line; 0: there are none. Both must outlive the scanner.
@@ -25,6 +33,7 @@ class TextScanner {
   // short.
   [[noreturn]] void complain(const std::string& what) const;
   int line() const { return line_number_; }
+  bool ends_within_a_word() const;  // the text's last line has no end, and no blank after its last word
 
  private:
   std::string_view text_, rest_of_line_;

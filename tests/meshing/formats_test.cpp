@@ -164,6 +164,80 @@ TEST(Formats, WindowsLineEndsChangeNothing) {
   EXPECT_EQ(hash_of(imported("w.ply", with_windows_ends(as_ply(mesh, "ascii"))).surface), hash_of(mesh));
 }
 
+std::string as_utf16(const std::string& text, bool little_endian) {
+  std::string out = little_endian ? "\xff\xfe" : "\xfe\xff";
+  for (const char c : text) out += little_endian ? std::string{c, '\0'} : std::string{'\0', c};
+  return out;
+}
+
+// As Windows' editors write text. Without the mark's removal the first line of an OBJ would be lost.
+TEST(Formats, ByteOrderMarksAndUtf16ChangeNothing) {
+  const SurfaceMesh mesh = sphere(2);
+  std::string obj = as_obj(mesh);
+  obj = obj.substr(obj.find("v "));
+  const std::vector<std::pair<std::string, std::string>> texts{
+      {"m.obj", obj}, {"m.off", as_off(mesh)}, {"m.ply", as_ply(mesh, "ascii")}};
+  for (const auto& [name, text] : texts) {
+    SCOPED_TRACE(name);
+    EXPECT_EQ(hash_of(imported(name, "\xef\xbb\xbf" + text).surface), hash_of(mesh));
+    EXPECT_EQ(hash_of(imported(name, as_utf16(text, true)).surface), hash_of(mesh));
+    EXPECT_EQ(hash_of(imported(name, as_utf16(text, false)).surface), hash_of(mesh));
+  }
+  EXPECT_EQ(imported("m.stl", as_utf16(as_stl_text(mesh), true)).surface.triangles.rows(),
+            mesh.triangles.rows());
+}
+
+// OBJ has neither counts nor an end: three traces of a cut between or within lines.
+TEST(Formats, TracesOfACutObjAreSaid) {
+  const SurfaceMesh mesh = sphere(2);
+  const std::string whole = as_obj(mesh);
+  const auto without_faces = [&](int n) {
+    std::string text = whole;
+    for (int i = 0; i < n; ++i) text.erase(text.rfind('\n', text.size() - 2) + 1);
+    return text;
+  };
+  const auto warnings = [](const std::string& text) { return imported("cut.obj", text).warnings; };
+  const std::string says_faces =
+      fmt::format("# {} vertices, {} faces\n", mesh.positions.rows(), mesh.triangles.rows());
+  for (const std::string& comment :
+       {says_faces, fmt::format("#\n# Vertices: 66\n# Faces: {}\n", mesh.triangles.rows()),
+        fmt::format("#Vertex Count 66\n#Face Count {}\n", mesh.triangles.rows()),
+        fmt::format("# {} triangles in all\n", mesh.triangles.rows())}) {
+    EXPECT_THAT(warnings(comment + whole), testing::IsEmpty());
+    EXPECT_THAT(warnings(comment + without_faces(1)),
+                Contains(HasSubstr("but there are 127: it may have been cut")));
+  }
+  for (const char* comment : {"# when indexed there should be 5000 vertices\n", "# 9000 texture vertices\n",
+                              "# Vertex list\n", "# faces\n"})
+    EXPECT_THAT(warnings(comment + whole), testing::IsEmpty());
+  EXPECT_THAT(warnings(whole.substr(0, whole.find("f ")) + "v 9 9 9\n" + whole.substr(whole.find("f "))),
+              Contains(HasSubstr("no face names any of the last 1 of 67 vertices")));
+  EXPECT_THAT(warnings(whole.substr(0, whole.size() - 1)), Contains(HasSubstr("may have lost digits")));
+  EXPECT_THAT(imported("cut.off", as_off(mesh).substr(0, as_off(mesh).size() - 1)).warnings,
+              Contains(HasSubstr("may have lost digits")));
+  const std::string ply = as_ply(mesh, "ascii");
+  EXPECT_THAT(imported("cut.ply", ply.substr(0, ply.size() - 1)).warnings,
+              Contains(HasSubstr("may have lost digits")));
+}
+
+// At a million times its size and more from the origin doubles keep a model, floats melt it.
+TEST(Formats, SinglePrecisionFarFromTheOriginIsSaid) {
+  const SurfaceMesh far = moved(sphere(3), {5e6, -5e6, 5e6});
+  for (const Writer& writer : writers()) {
+    SCOPED_TRACE(writer.name);
+    const ImportedModel model = imported("far" + writer.extension, writer.write(far));
+    const bool keeps_doubles = writer.name != "binary stl";
+    EXPECT_EQ(model.surface.positions.rows() == far.positions.rows(), keeps_doubles);
+    EXPECT_EQ(model.left.boundary_edges.count + model.left.non_manifold_edges.count == 0, keeps_doubles);
+    EXPECT_THAT(imported("near" + writer.extension, writer.write(moved(sphere(3), {99, 0, 0}))).warnings,
+                testing::IsEmpty());
+    if (keeps_doubles)
+      EXPECT_THAT(model.warnings, testing::IsEmpty());
+    else
+      EXPECT_THAT(model.warnings, Contains(HasSubstr("single precision")));
+  }
+}
+
 TEST(Formats, ALyingExtensionIsSeenThrough) {
   const SurfaceMesh mesh = sphere(2);
   for (const Writer& writer : writers())
@@ -246,7 +320,7 @@ TEST(Formats, NoPrefixOfAFileIsTakenSilentlyOrCrashes) {
           EXPECT_EQ(model.surface.triangles.rows(), mesh.triangles.rows());
           EXPECT_NEAR(volume(model.surface), volume(mesh), 1e-6);
         }
-        // The last number of the file may lose its last digits without a trace.
+        // The last number of the file may lose its last digits: then the lost line end is said.
         if (says_its_size) {
           EXPECT_GT(size + 8, whole.size());
         }
@@ -304,6 +378,12 @@ TEST(Assimp, AppliesTheTransformsOfTheScene) {
   EXPECT_LT((box.lower - Vec3(-1, 0, 0)).norm(), 1e-6);
   EXPECT_LT((box.upper - Vec3(12, 2, 2)).norm(), 1e-6);
   EXPECT_THAT(model.warnings, Contains(HasSubstr("lines and points were left out")));
+}
+
+TEST(Assimp, SinglePrecisionCountsBeforeTheTransform) {
+  std::string far = gltf();
+  far.replace(far.find("[10, 0, 0]"), 10, "[1e9, 0, 0]");
+  EXPECT_THAT(imported("far.gltf", far).warnings, testing::Not(Contains(HasSubstr("single precision"))));
 }
 
 TEST(Assimp, NoPrefixOfAGltfCrashes) {

@@ -114,6 +114,29 @@ TEST(Weld, ToleranceFollowsTheModelWhereverAndHoweverLargeItIs) {
   EXPECT_EQ(far.surface.positions.rows(), sphere(2).positions.rows());
 }
 
+// Two balls that cross, a patch turned over, a hole, a doubled face: the same report in any unit, anywhere.
+TEST(Import, TheReportDoesNotDependOnUnitOrPlace) {
+  SurfaceMesh mesh = merged({sphere(3), moved(sphere(2), {0.913, 0.1, 0.2})});
+  mesh = without_triangle(mesh, 40);
+  for (const int t : {7, 8, 9}) std::swap(mesh.triangles(t, 0), mesh.triangles(t, 1));
+  mesh.triangles.row(100) = mesh.triangles.row(99);
+  const auto figures = [](const SurfaceMesh& m) {
+    const ImportedModel model = clean(m);
+    std::vector<std::int64_t> counts;
+    for (const Json& report : {to_json(model.found), to_json(model.left)})
+      for (const Json& defect : report)
+        if (defect.is_number() || defect.is_object())
+          counts.push_back(defect.is_number() ? defect.get<std::int64_t>()
+                                              : defect.at("count").get<std::int64_t>());
+    return counts;
+  };
+  const auto expected = figures(mesh);
+  EXPECT_GT(clean(mesh).left.self_intersecting_pairs.count, 10);
+  for (const double unit : {1e-9, 1e-3, 1e9}) EXPECT_EQ(figures(scaled(mesh, unit)), expected) << unit;
+  for (const double unit : {1e-9, 1.0, 1e9})
+    EXPECT_EQ(figures(scaled(moved(mesh, {1e6, -2e6, 3e6}), unit)), expected) << unit << ", far";
+}
+
 TEST(Weld, AStrayVertexFarAwayDoesNotMeltTheModel) {
   SurfaceMesh mesh = sphere(2);
   mesh.positions.row(0) << 1e12, 0, 0;
@@ -243,8 +266,31 @@ TEST(Orient, NestedShells) {
   const SurfaceMesh inner_first = merged({inner, turned_inside_out(middle), outer});
   EXPECT_EQ(hash_of(clean(inner_first).surface), hash_of(inner_first))
       << "the order in the file does not matter";
+  for (const auto& [mesh, count] : {std::pair{hollow, 1}, {kernel, 2}, {inverted_kernel, 2}, {solids, 1}}) {
+    const ImportedModel model = clean(mesh);
+    EXPECT_EQ(model.found.inner_components.count, count);
+    EXPECT_EQ(model.left.inner_components.count, count);
+    EXPECT_EQ(int(model.found.inner_components.places.size()), count);
+  }
+  EXPECT_EQ(clean(merged({outer, moved(inner, {9, 0, 0})})).found.inner_components.count, 0);
   // Inside out as a whole: the same solid again.
   EXPECT_EQ(triangles_as_points(clean(turned_inside_out(kernel)).surface), triangles_as_points(kernel));
+}
+
+// So many that a tree answers for the outer one, and boxes of boxes for which to ask.
+TEST(Orient, ManyBubblesInASolid) {
+  std::vector<SurfaceMesh> parts{scaled(sphere(3), 40)};
+  for (int i = 0; i < 60; ++i) {
+    const SurfaceMesh bubble =
+        moved(sphere(1), {double(i % 5) * 3 - 6, double(i / 5 % 4) * 3 - 5, double(i / 20) * 3});
+    parts.push_back(i % 2 ? turned_inside_out(bubble) : bubble);
+  }
+  const SurfaceMesh mesh = merged(parts);
+  const ImportedModel model = clean(mesh);
+  EXPECT_EQ(hash_of(model.surface), hash_of(mesh));
+  EXPECT_EQ(model.left.inner_components.count, 60);
+  EXPECT_EQ(model.left.inward_components.count, 30);
+  EXPECT_EQ(triangles_as_points(clean(turned_inside_out(mesh)).surface), triangles_as_points(mesh));
 }
 
 TEST(Orient, AnOpenSurfaceIsTurnedOnlyWhenItIsNearlyClosed) {
