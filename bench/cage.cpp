@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <cctype>
+#include <cmath>
 #include <string>
 #include <vector>
 
@@ -29,9 +30,10 @@ int main(int argc, char** argv) try {
       models.push_back(argument);
   }
   fmt::print(
-      "{:<24} {:>9} {:>6} {:>6} {:>7} {:>8} {:>10} {:>6} {:>6} {:>6} {:>6} {:>7} {:>6} {:>6} {:>7} {:>17}\n",
+      "{:<24} {:>9} {:>6} {:>6} {:>7} {:>8} {:>10} {:>6} {:>6} {:>6} {:>6} {:>7} {:>7} {:>6} {:>6} {:>7} "
+      "{:>17}\n",
       "model", "triangles", "budget", "tets", "outside", "crossing", "unmanifold", "min °", "max °", "median",
-      "V / V", "glued %", "pieces", "CPU s", "proof s", "hash of the cage");
+      "V / V", "glued %", "height", "pieces", "CPU s", "proof s", "hash of the cage");
   for (const std::string& path : models) {
     const SurfaceMesh surface = meshing::import_model(path, {.count_self_intersections = false}).surface;
     for (int budget : budgets) {
@@ -43,12 +45,14 @@ int main(int argc, char** argv) try {
       const double proved = cpu_seconds();
       const meshing::TetQuality q = meshing::measure_quality(cage.mesh);
       fmt::print(
-          "{:<24} {:>9} {:>6} {:>6} {:>7} {:>8} {:>10} {:>6.1f} {:>6.1f} {:>6.1f} {:>6.3f} {:>7.2f} {:>6} "
+          "{:<24} {:>9} {:>6} {:>6} {:>7} {:>8} {:>10} {:>6.1f} {:>6.1f} {:>6.1f} {:>6.3f} {:>7.2f} {:>7.3f} "
+          "{:>6} "
           "{:>6.2f} {:>7.2f}  {:016x}\n",
           fs::path(path).stem().string(), surface.triangles.rows(), budget, q.tets, c.vertices_outside,
           c.triangles_crossing, c.nonmanifold_edges + c.nonmanifold_vertices, q.min_dihedral_deg,
           q.max_dihedral_deg, q.median_min_dihedral_deg, cage.volume_ratio, 100 * cage.glued_share,
-          cage.components, built - start, proved - built, c.cage_hash);
+          q.min_height_m / (cage.spacing_m * std::sqrt(0.5)), cage.components, built - start, proved - built,
+          c.cage_hash);
       for (const std::string& note : cage.notes) fmt::print("  {}\n", note);
     }
   }

@@ -10,8 +10,9 @@
 namespace limber::meshing {
 
 enum class CageMode {
-  lattice,  // tets of a body-centred cubic lattice, warped and drawn in to the surface: encloses, always
-  fast,     // the same without warp and drawing in: dihedrals of 60 and 90 degrees exactly
+  lattice,  // tets of a body-centred cubic lattice, warped, parted at gaps, drawn in to the surface and
+            // coarsened: encloses, always
+  fast,     // the lattice's tets as they are: encloses; dihedrals of 60 and 90 degrees exactly
   paper,    // Delaunay tets of each shell, welded where shells meet: the baseline; promises nothing
   conform   // CGAL's Mesh_3: the boundary follows the surface, so that some of its vertices lie outside
 };
@@ -19,8 +20,8 @@ enum class CageMode {
 struct CageOptions {
   CageMode mode = CageMode::lattice;
   int tets = 1000;  // 24 … 200,000; met within 10 % where the lattice allows, else a note says so
-  double min_dihedral_deg = 15;   // 1 … 45, kept by every tet of mode lattice
-  double max_dihedral_deg = 165;  // 100 … 179
+  double min_dihedral_deg = 18;   // 1 … 45, kept by every tet of mode lattice
+  double max_dihedral_deg = 162;  // 100 … 179
   double gap = 0.002;  // aimed at between cage and surface, over the model's diagonal; 1e-6 … 0.1
 };
 

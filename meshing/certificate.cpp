@@ -3,8 +3,8 @@
 #include <algorithm>
 
 #include "core/hash.h"
-#include "meshing/detail/edges.h"
-#include "meshing/detail/tet_faces.h"
+#include "meshing/detail/box_tree.h"
+#include "meshing/detail/manifold.h"
 #include "meshing/quality.h"
 #include "meshing/surface_tree.h"
 
@@ -41,35 +41,6 @@ std::int64_t count_crossing(const SurfaceMesh& surface, const TetMesh& cage, con
   return crossing;
 }
 
-int count_nonmanifold_edges(const Triangles& boundary) {
-  int bad = 0;
-  detail::for_each_edge(detail::edge_uses(boundary),
-                        [&](std::span<const detail::EdgeUse> uses) { bad += uses.size() != 2; });
-  return bad;
-}
-
-// Round a vertex, triangles that share one of its edges belong to one fan.
-int count_nonmanifold_vertices(const Triangles& boundary, int vertex_count) {
-  const detail::Stars stars = detail::stars(boundary, vertex_count);
-  int bad = 0;
-  for (int v = 0; v < vertex_count; ++v) {
-    const int first = stars.first[v], count = stars.first[v + 1] - first;
-    detail::UnionFind fans(count);
-    for (int i = 0; i < count; ++i)
-      for (int j = 0; j < i; ++j) {
-        int shared = 0;
-        for (int a = 0; a < 3; ++a)
-          for (int b = 0; b < 3; ++b)
-            shared += boundary(stars.things[first + i], a) == boundary(stars.things[first + j], b);
-        if (shared >= 2) fans.join(i, j);
-      }
-    int fan_count = 0;
-    for (int i = 0; i < count; ++i) fan_count += fans.root(i) == i;
-    bad += fan_count > 1;
-  }
-  return bad;
-}
-
 int count_inverted(const TetMesh& mesh) {
   int inverted = 0;
   for (Eigen::Index t = 0; t < mesh.tets.rows(); ++t)
@@ -93,8 +64,9 @@ Certificate certify(const SurfaceMesh& surface, const TetMesh& cage) {
   c.vertices_outside = count_outside(surface.positions, cage);
   c.triangles = surface.triangles.rows();
   c.triangles_crossing = count_crossing(surface, cage, boundary);
-  c.nonmanifold_edges = count_nonmanifold_edges(boundary);
-  c.nonmanifold_vertices = count_nonmanifold_vertices(boundary, int(cage.positions.rows()));
+  const detail::ManifoldFaults faults = detail::manifold_faults(boundary, int(cage.positions.rows()));
+  c.nonmanifold_edges = int(faults.edges.size());
+  c.nonmanifold_vertices = int(faults.vertices.size());
   c.inverted_tets = count_inverted(cage);
   c.min_dihedral_deg = quality.min_dihedral_deg;
   c.max_dihedral_deg = quality.max_dihedral_deg;

@@ -46,6 +46,21 @@ std::array<double, 6> dihedral_angles(const std::array<Vec3, 4>& p) {
   return angles;
 }
 
+double smallest_height(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& d) {
+  const Vec3 ab = b - a, ac = c - a, ad = d - a, bc = c - b, bd = d - b;
+  const double twice_largest_area =
+      std::sqrt(std::max({ab.cross(ac).squaredNorm(), ab.cross(ad).squaredNorm(), ac.cross(ad).squaredNorm(),
+                          bc.cross(bd).squaredNorm()}));
+  return twice_largest_area > 0 ? std::abs(ab.cross(ac).dot(ad)) / twice_largest_area : 0;
+}
+
+bool keeps_limits(const TetLimits& limits, const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& d) {
+  if (!(signed_volume(a, b, c, d) > 0)) return false;
+  const DihedralRange range = dihedral_range(a, b, c, d);
+  return range.min_deg >= limits.dihedrals.min_deg && range.max_deg <= limits.dihedrals.max_deg &&
+         smallest_height(a, b, c, d) >= limits.min_height_m;
+}
+
 TetQuality measure_quality(const TetMesh& mesh) {
   TetQuality q;
   q.tets = int(mesh.tets.rows());
@@ -56,7 +71,7 @@ TetQuality measure_quality(const TetMesh& mesh) {
   q.volume_m3 = volume(mesh);
   if (q.tets == 0) return q;
   q.min_dihedral_deg = 180;
-  q.min_volume_m3 = 1e300;
+  q.min_volume_m3 = q.min_height_m = 1e300;
   std::vector<double> smallest;
   for (int t = 0; t < q.tets; ++t) {
     std::array<Vec3, 4> p;
@@ -65,6 +80,7 @@ TetQuality measure_quality(const TetMesh& mesh) {
     smallest.push_back(range.min_deg);
     q.min_dihedral_deg = std::min(q.min_dihedral_deg, range.min_deg);
     q.max_dihedral_deg = std::max(q.max_dihedral_deg, range.max_deg);
+    q.min_height_m = std::min(q.min_height_m, smallest_height(p[0], p[1], p[2], p[3]));
     q.min_volume_m3 = std::min(q.min_volume_m3, signed_volume(p[0], p[1], p[2], p[3]));
   }
   q.share_under_5_deg =

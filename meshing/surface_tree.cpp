@@ -247,4 +247,22 @@ std::optional<Vec3> SurfaceTree::closest_point_within(const Vec3& p, double dist
   return best;
 }
 
+double SurfaceTree::free_share(const Vec3& p, const Vec3& q) const {
+  const Vec3 way = q - p, inverse = way.cwiseInverse();
+  double free = 1;
+  const auto rejects = [&](const Box& box) {
+    const Eigen::Array3d a = (box.lower - p).cwiseProduct(inverse), b = (box.upper - p).cwiseProduct(inverse);
+    return !(a.min(b).maxCoeff() <= std::min(a.max(b).minCoeff(), free)) || a.max(b).minCoeff() < 0;
+  };
+  tree_.any(rejects, [&](int f) {
+    // Moeller and Trumbore 1997.
+    const auto [a, b, c] = corners(positions_, triangles_, f);
+    const Vec3 ab = b - a, ac = c - a, n = way.cross(ac), from_a = p - a, m = from_a.cross(ab);
+    const double det = ab.dot(n), u = from_a.dot(n) / det, v = way.dot(m) / det, t = ac.dot(m) / det;
+    if (u >= 0 && v >= 0 && u + v <= 1 && t >= 0) free = std::min(free, t);
+    return false;
+  });
+  return free;
+}
+
 }  // namespace limber::meshing

@@ -30,6 +30,9 @@ class SurfaceTree {
   Vec3 closest_point(const Vec3& p) const;
   // Nothing when it is farther than `distance`; then it is quick to say so.
   std::optional<Vec3> closest_point_within(const Vec3& p, double distance) const;
+  // Share of the way from p to q at which the soup is first met, 1 where it is not; to rounding, unlike the
+  // others.
+  double free_share(const Vec3& p, const Vec3& q) const;
 
  private:
   Points positions_;

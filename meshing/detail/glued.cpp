@@ -81,7 +81,7 @@ bool holds_strangers(const CageModel& model, const SurfaceMesh& surface, const T
   if (points.size() > max_pieces) points.erase(std::next(points.begin(), max_pieces), points.end());
 
   UnionFind bodies(int(triangles.size()));
-  constexpr std::size_t samples = 200;  // of a piece
+  constexpr std::size_t samples = 80;  // of a piece
   for (auto a = points.begin(); a != points.end(); ++a)
     for (auto b = std::next(a); b != points.end(); ++b) {
       if (bodies.root(a->first) == bodies.root(b->first)) continue;
@@ -100,17 +100,26 @@ bool holds_strangers(const CageModel& model, const SurfaceMesh& surface, const T
 
 }  // namespace
 
-double glued_share(const CageModel& model, const SurfaceMesh& surface, const TetMesh& mesh) {
-  int meeting = 0, glued = 0;
+bool is_glued(const CageModel& model, const SurfaceMesh& surface, const std::array<Vec3, 4>& tet) {
+  const std::vector<int> triangles = model.tree.triangles_meeting_tet(tet[0], tet[1], tet[2], tet[3]);
+  return !triangles.empty() && holds_strangers(model, surface, tet, triangles);
+}
+
+GluedTets glued_tets(const CageModel& model, const SurfaceMesh& surface, const TetMesh& mesh) {
+  GluedTets all{std::vector<bool>(std::size_t(mesh.tets.rows())), 0};
   for (Eigen::Index t = 0; t < mesh.tets.rows(); ++t) {
     TetCorners p;
     for (int k = 0; k < 4; ++k) p[k] = mesh.positions.row(mesh.tets(t, k));
     const std::vector<int> triangles = model.tree.triangles_meeting_tet(p[0], p[1], p[2], p[3]);
     if (triangles.empty()) continue;
-    ++meeting;
-    glued += holds_strangers(model, surface, p, triangles);
+    ++all.meeting;
+    all.glued[std::size_t(t)] = holds_strangers(model, surface, p, triangles);
   }
-  return meeting > 0 ? double(glued) / meeting : 0;
+  return all;
+}
+
+double GluedTets::share() const {
+  return meeting > 0 ? double(std::count(glued.begin(), glued.end(), true)) / meeting : 0;
 }
 
 }  // namespace limber::meshing::detail

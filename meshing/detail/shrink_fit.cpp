@@ -18,24 +18,31 @@ constexpr int approach_passes = 8;
 constexpr int final_passes = 6;
 constexpr int tries_a_vertex = 2;  // passes without success after which a vertex rests
 
-// Cosines of the sharpest and the widest dihedral of a tet; {1, −1} when its volume is not positive.
-struct Cosines {
-  double sharpest, widest;
+// Cosines of the sharpest and the widest dihedral of a tet, and its smallest height; {1, −1, 0} when its
+// volume is not positive.
+struct Shape {
+  double sharpest, widest, height;
 };
 
-Cosines cosines(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& d) {
+Shape shape_of(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& d) {
   const Vec3 ab = b - a, ac = c - a, ad = d - a, bc = c - b, bd = d - b;
   std::array<Vec3, 4> normal{bc.cross(bd), ad.cross(ac), ab.cross(ad), ac.cross(ab)};
-  if (!(normal[3].dot(ad) < 0)) return {1, -1};
-  for (Vec3& n : normal) n /= n.norm();
-  Cosines c_all{-1, 1};
+  const double six_volumes = -normal[3].dot(ad);
+  if (!(six_volumes > 0)) return {1, -1, 0};
+  double twice_largest_area = 0;
+  for (Vec3& n : normal) {
+    const double twice_area = n.norm();
+    twice_largest_area = std::max(twice_largest_area, twice_area);
+    n /= twice_area;
+  }
+  Shape shape{-1, 1, six_volumes / twice_largest_area};
   for (int i = 0; i < 4; ++i)
     for (int j = 0; j < i; ++j) {
       const double cosine = -normal[i].dot(normal[j]);
-      c_all.sharpest = std::max(c_all.sharpest, cosine);
-      c_all.widest = std::min(c_all.widest, cosine);
+      shape.sharpest = std::max(shape.sharpest, cosine);
+      shape.widest = std::min(shape.widest, cosine);
     }
-  return c_all;
+  return shape;
 }
 
 class Fitter {
@@ -44,9 +51,10 @@ class Fitter {
       : surface_(surface),
         mesh_(mesh),
         gap_(limits.gap_m),
+        height_(limits.tets.min_height_m),
         // A hair inside the limits, so that whoever measures anew finds them kept whatever the rounding.
-        sharpest_(std::cos(limits.min_dihedral_deg * radians) - 1e-9),
-        widest_(std::cos(limits.max_dihedral_deg * radians) + 1e-9),
+        sharpest_(std::cos(limits.tets.dihedrals.min_deg * radians) - 1e-9),
+        widest_(std::cos(limits.tets.dihedrals.max_deg * radians) + 1e-9),
         boundary_(boundary_triangles(mesh.tets)),
         tets_(stars(mesh.tets, int(mesh.positions.rows()))),
         triangles_(stars(boundary_, int(mesh.positions.rows()))),
@@ -74,23 +82,29 @@ class Fitter {
   }
   bool on_boundary(int v) const { return !round(triangles_, v).empty(); }
 
-  Cosines star_cosines(int v, const Vec3& p) const {
-    Cosines worst{-1, 1};
-    for (int t : round(tets_, v)) {
-      std::array<Vec3, 4> q;
-      for (int k = 0; k < 4; ++k) q[k] = mesh_.tets(t, k) == v ? p : at(mesh_.tets(t, k));
-      const Cosines c = cosines(q[0], q[1], q[2], q[3]);
-      worst.sharpest = std::max(worst.sharpest, c.sharpest), worst.widest = std::min(worst.widest, c.widest);
-      if (!keeps_limits(worst)) break;
-    }
-    return worst;
+  // A tet that is too low already must not get lower.
+  bool keeps_limits(const Shape& shape, int t) const {
+    if (shape.sharpest > sharpest_ || shape.widest < widest_) return false;
+    return shape.height >= height_ || shape.height >= shape_now(t).height;
   }
-  bool keeps_limits(const Cosines& c) const { return c.sharpest <= sharpest_ && c.widest >= widest_; }
+  Shape shape_now(int t) const {
+    return shape_of(at(mesh_.tets(t, 0)), at(mesh_.tets(t, 1)), at(mesh_.tets(t, 2)), at(mesh_.tets(t, 3)));
+  }
+  Shape shape_with(int t, int v, const Vec3& p) const {
+    std::array<Vec3, 4> q;
+    for (int k = 0; k < 4; ++k) q[k] = mesh_.tets(t, k) == v ? p : at(mesh_.tets(t, k));
+    return shape_of(q[0], q[1], q[2], q[3]);
+  }
+  bool star_keeps_limits(int v, const Vec3& p) const {
+    for (int t : round(tets_, v))
+      if (!keeps_limits(shape_with(t, v, p), t)) return false;
+    return true;
+  }
 
   // A vertex moves only inwards of all its boundary triangles: what they sweep belonged to the cage, so the
   // cage cannot come to overlap itself. (Outward sweeps gained nothing, and made limbs overlap.)
   bool may_move(int v, const Vec3& to) const {
-    if (!keeps_limits(star_cosines(v, to))) return false;
+    if (!star_keeps_limits(v, to)) return false;
     const Vec3 from = at(v);
     for (int f : round(triangles_, v)) {
       const int k = boundary_(f, 0) == v ? 0 : boundary_(f, 1) == v ? 1 : 2;
@@ -154,14 +168,22 @@ class Fitter {
       for (int k = 0; k < 4; ++k)
         if (mesh_.tets(t, k) != v) sum += at(mesh_.tets(t, k));
     const Vec3 middle = sum / (3 * double(round(tets_, v).size()));
-    const Cosines before = star_cosines(v, at(v)), after = star_cosines(v, middle);
-    if (std::max(after.sharpest, -after.widest) <= std::max(before.sharpest, -before.widest))
+    if (worst_cosine(v, middle) <= worst_cosine(v, at(v)) && star_keeps_limits(v, middle))
       mesh_.positions.row(v) = middle;
+  }
+
+  double worst_cosine(int v, const Vec3& p) const {
+    double worst = -1;
+    for (int t : round(tets_, v)) {
+      const Shape shape = shape_with(t, v, p);
+      worst = std::max({worst, shape.sharpest, -shape.widest});
+    }
+    return worst;
   }
 
   const SurfaceTree& surface_;
   TetMesh& mesh_;
-  double gap_, sharpest_, widest_;
+  double gap_, height_, sharpest_, widest_;
   Triangles boundary_;
   Stars tets_, triangles_;
   std::vector<int> failures_;

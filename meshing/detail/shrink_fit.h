@@ -2,13 +2,14 @@
 // (docs/cage.md, step 7).
 #pragma once
 
+#include "meshing/quality.h"
 #include "meshing/surface_tree.h"
 
 namespace limber::meshing::detail {
 
 struct FitLimits {
-  double gap_m;                               // aimed at between cage and surface
-  double min_dihedral_deg, max_dihedral_deg;  // kept by every tet
+  double gap_m;    // aimed at between cage and surface
+  TetLimits tets;  // kept by every tet; one that is lower already does not get lower
 };
 
 // Moves vertices of `mesh`, whose boundary must not meet the surface and whose tets must keep the limits. A
