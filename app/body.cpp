@@ -21,7 +21,8 @@ namespace {
 constexpr const char* body_files[] = {"surface.ply", "shells.obj", "cage.msh", "binding.npz"};
 
 Json json_of(const PrepareSettings& s) {
-  return {{"shells", s.shells}, {"concavity", s.concavity}, {"tets", s.tets}, {"mode", s.mode}};
+  return {{"shells", s.shells}, {"concavity", s.concavity}, {"inflate", s.inflate},
+          {"exact", s.exact},   {"tets", s.tets},           {"mode", s.mode}};
 }
 
 Json json_of(const meshing::Certificate& c) {
@@ -102,7 +103,10 @@ Json prepare_body(const BodySource& source, const PrepareSettings& settings, con
   throw_if_stopped();
 
   const meshing::Decomposition decomposition =
-      meshing::decompose(model.surface, {.max_shells = settings.shells, .max_concavity = settings.concavity});
+      meshing::decompose(model.surface, {.max_shells = settings.shells,
+                                         .max_concavity = settings.concavity,
+                                         .inflation = settings.inflate,
+                                         .exact = settings.exact});
   costs.end_stage("decompose");
   throw_if_stopped();
 
@@ -153,6 +157,7 @@ Json prepare_body(const BodySource& source, const PrepareSettings& settings, con
                        {"upper_m", {box.upper.x(), box.upper.y(), box.upper.z()}}};
   report["shells"] = {{"count", decomposition.shells.size()},
                       {"stopped_by", decomposition.stopped_by},
+                      {"inflation", settings.inflate},
                       {"sum_of_volumes_m3", decomposition.sum_of_hull_volumes},
                       {"mean_overshoot", decomposition.mean_overshoot},
                       {"max_overshoot", decomposition.max_overshoot},

@@ -16,6 +16,8 @@ namespace limber::app {
 struct PrepareSettings {
   int shells = 32;
   double concavity = 0;
+  double inflate = 0;
+  bool exact = false;
   int tets = 1000;
   std::string mode = "lattice";  // "lattice", "fast", "paper", "conform"
 };

@@ -143,6 +143,15 @@ int run_command_line(int argc, const char* const* argv) {
           "cut no further below this overshoot, share of the model's diagonal, 0 … 1; 0: only --shells rules")
       ->check(CLI::Range(0.0, 1.0))
       ->capture_default_str();
+  prepare_command
+      .add_option("--inflate", prepare_options.inflate,
+                  "inflate the shells by this share of the model's diagonal, 0 … 1")
+      ->check(CLI::Range(0.0, 1.0))
+      ->capture_default_str();
+  prepare_command.add_flag(
+      "--exact", prepare_options.exact,
+      "shells are the exact convex parts of a closed model of at most 2000 triangles, as many "
+      "as it takes; --shells and --concavity do not count");
   prepare_command.add_option("--tets", prepare_options.tets, "tets of the cage, about; 60 … 200000")
       ->check(CLI::Range(60, 200000))
       ->capture_default_str();

@@ -33,6 +33,8 @@ struct PrepareOptions {
   fs::path model, out;
   int shells = 32;       // at most so many convex shells
   double concavity = 0;  // stop cutting below this overshoot, share of the diagonal; 0: only the count rules
+  double inflate = 0;    // shells take in all that is this share of the diagonal away
+  bool exact = false;    // exact convex parts of a small closed model
   int tets = 1000;       // budget of the cage
   std::string mode = "lattice";
   double scale = 1;  // metres a file unit

@@ -18,10 +18,14 @@ Outcome prepare(const PrepareOptions& options) {
   source.load = [&] {
     return meshing::import_model(options.model, {.scale = options.scale, .y_up = options.y_up});
   };
-  Json report = prepare_body(
-      source,
-      {.shells = options.shells, .concavity = options.concavity, .tets = options.tets, .mode = options.mode},
-      options.out);
+  Json report = prepare_body(source,
+                             {.shells = options.shells,
+                              .concavity = options.concavity,
+                              .inflate = options.inflate,
+                              .exact = options.exact,
+                              .tets = options.tets,
+                              .mode = options.mode},
+                             options.out);
   std::string text = summary_of_report(report);
   if (options.exports.empty() && !options.preview) return {exit_done, report, text};
 

@@ -2,12 +2,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <numeric>
 
 #include "core/error.h"
 #include "core/progress.h"
 #include "meshing/detail/cut_search.h"
 #include "meshing/detail/enclosing_shell.h"
+#include "meshing/detail/exact_parts.h"
 #include "meshing/detail/overshoot.h"
 #include "meshing/detail/part_search.h"
 #include "meshing/detail/solid.h"
@@ -29,6 +31,9 @@ void check(const SurfaceMesh& mesh, const DecomposeOptions& options) {
   if (!(options.max_concavity >= 0) || options.max_concavity > 1)
     throw InputError(fmt::format("the concavity bound is a share of the diagonal from 0 to 1, not {}",
                                  options.max_concavity));
+  if (!(options.inflation >= 0) || options.inflation > 1)
+    throw InputError(
+        fmt::format("shells are inflated by a share of the diagonal from 0 to 1, not {}", options.inflation));
 }
 
 // The solid cut into parts, each with its shell in the user's coordinates.
@@ -41,9 +46,18 @@ class Shells {
         inside_(solid_.mesh.positions, solid_.boundary),
         distance_(solid_.filled.positions, solid_.filled.triangles),
         model_(make_model(solid_.mesh.positions, solid_.mesh.triangles)) {
-    parts_ = find_parts(model_, whole(model_, solid_.mesh.triangles), inside_, distance_,
-                        {options.max_shells, options.max_concavity * solid_.diagonal});
-    for (const Part& part : parts_) result_.shells.push_back(shell_of(part));
+    if (options.exact) {
+      exact_parts_ = exact_convex_parts(mesh);
+      for (const std::vector<Vec3>& corners : exact_parts_) {
+        std::vector<Vec3> work;
+        for (const Vec3& p : corners) work.push_back(solid_.frame.work_from_user(p));
+        result_.shells.push_back(shell_of(work, corners));
+      }
+    } else {
+      parts_ = find_parts(model_, whole(model_, solid_.mesh.triangles), inside_, distance_,
+                          {options.max_shells, options.max_concavity * solid_.diagonal});
+      for (const Part& part : parts_) result_.shells.push_back(shell_of(part));
+    }
     measure_overshoot();
   }
 
@@ -56,11 +70,15 @@ class Shells {
                : solid_.frame.user_from_work(model_.points[std::size_t(p)]);
   }
   ConvexShell shell_of(const Part&) const;
+  // Of few corners round the hull of `work`, which holds the user's points.
+  ConvexShell shell_of(const std::vector<Vec3>& work, const std::vector<Vec3>& user) const;
   void measure_overshoot();
   bool bound_is_met() const { return result_.max_overshoot <= options_.max_concavity; }
   void cut_the_worst_until_the_bound_is_met();
   void find_neighbours();
+  void inflate();
   void count_uncovered();
+  std::int64_t triangles_uncovered_by_exact_parts() const;
 
   const SurfaceMesh& mesh_;
   const DecomposeOptions& options_;
@@ -68,14 +86,22 @@ class Shells {
   InsideTest inside_;
   SurfaceDistance distance_;
   Model model_;
-  std::vector<Part> parts_;  // part p in shell p
+  // Part p is in shell p; one of the two is empty.
+  std::vector<Part> parts_;
+  std::vector<std::vector<Vec3>> exact_parts_;
   Decomposition result_;
 };
 
 ConvexShell Shells::shell_of(const Part& part) const {
+  std::vector<Vec3> points;
+  for (int p : points_of(part)) points.push_back(user_point(p));
+  return shell_of(hull_candidates(model_, part), points);
+}
+
+ConvexShell Shells::shell_of(const std::vector<Vec3>& work, const std::vector<Vec3>& user) const {
   GrowingHull hull;
-  hull.add(hull_candidates(model_, part));
-  std::vector<Vec3> corners = hull.vertices(), points;
+  hull.add(work);
+  std::vector<Vec3> corners = hull.vertices();
   if (hull.flat()) {
     hull.clear();
     hull.add(thickened(corners, solid_.flat_half_thickness));
@@ -83,9 +109,19 @@ ConvexShell Shells::shell_of(const Part& part) const {
   }
   corners = fewer_corners(corners, options_.max_vertices);
   for (Vec3& p : corners) p = solid_.frame.user_from_work(p);
-  for (int p : points_of(part)) points.push_back(user_point(p));
   const double rounding = 16 * 2.3e-16 * mesh_.positions.cwiseAbs().maxCoeff();
-  return enclosing_shell(corners, points, std::max(1e-12 * solid_.diagonal / solid_.frame.scale, rounding));
+  return enclosing_shell(corners, user, std::max(1e-12 * solid_.diagonal / solid_.frame.scale, rounding));
+}
+
+void Shells::inflate() {
+  for (ConvexShell& shell : result_.shells) {
+    std::vector<Vec3> user, work;
+    for (Eigen::Index v = 0; v < shell.vertices.rows(); ++v) {
+      user.push_back(shell.vertices.row(v));
+      work.push_back(solid_.frame.work_from_user(user.back()));
+    }
+    shell = shell_of(bevelled(work, options_.inflation * solid_.diagonal), user);
+  }
 }
 
 void Shells::measure_overshoot() {
@@ -128,12 +164,18 @@ void Shells::cut_the_worst_until_the_bound_is_met() {
   }
 }
 
-// Shells that share a point of a cut.
+// Shells that share a point of a cut, or a corner of exact parts.
 void Shells::find_neighbours() {
   std::vector<std::pair<int, int>> shell_of_point;
   for (std::size_t s = 0; s < parts_.size(); ++s)
     for (int p : points_of(parts_[s])) shell_of_point.push_back({p, int(s)});
+  std::map<std::array<double, 3>, int> number;
+  for (std::size_t s = 0; s < exact_parts_.size(); ++s)
+    for (const Vec3& p : exact_parts_[s])
+      shell_of_point.push_back(
+          {number.try_emplace({p.x(), p.y(), p.z()}, int(number.size())).first->second, int(s)});
   std::sort(shell_of_point.begin(), shell_of_point.end());
+  shell_of_point.erase(std::unique(shell_of_point.begin(), shell_of_point.end()), shell_of_point.end());
   auto& neighbours = result_.neighbours;
   for (std::size_t i = 0; i < shell_of_point.size(); ++i)
     for (std::size_t j = i; j-- > 0 && shell_of_point[j].first == shell_of_point[i].first;)
@@ -155,6 +197,10 @@ void Shells::count_uncovered() {
                 encloses(shells[s], p);
     result_.vertices_uncovered += !covered;
   }
+  if (options_.exact) {
+    result_.triangles_uncovered = triangles_uncovered_by_exact_parts();
+    return;
+  }
   const int triangles = int(mesh_.triangles.rows());
   std::vector<char> uncovered(std::size_t(triangles), 0), seen(std::size_t(triangles), 0);
   for (std::size_t s = 0; s < parts_.size(); ++s) {
@@ -170,13 +216,53 @@ void Shells::count_uncovered() {
   for (std::size_t t = 0; t < uncovered.size(); ++t) result_.triangles_uncovered += uncovered[t] || !seen[t];
 }
 
+// Cuts away from each triangle what lies in a shell. The shells overlap by far more than the rounding of
+// this.
+std::int64_t Shells::triangles_uncovered_by_exact_parts() const {
+  using Polygon = std::vector<Vec3>;
+  std::vector<Eigen::Matrix<double, Eigen::Dynamic, 4>> planes;
+  for (const ConvexShell& shell : result_.shells) planes.push_back(planes_of(shell));
+  const auto clipped = [](const Polygon& polygon, const auto& plane, double sign) {
+    Polygon kept;
+    for (std::size_t i = 0; i < polygon.size(); ++i) {
+      const Vec3 &a = polygon[i], &b = polygon[(i + 1) % polygon.size()];
+      const double da = sign * (plane.template head<3>().dot(a) + plane[3]);
+      const double db = sign * (plane.template head<3>().dot(b) + plane[3]);
+      if (da <= 0) kept.push_back(a);
+      if ((da < 0 && db > 0) || (da > 0 && db < 0)) kept.push_back(a + da / (da - db) * (b - a));
+    }
+    return kept.size() < 3 ? Polygon{} : kept;
+  };
+  std::int64_t uncovered = 0;
+  for (Eigen::Index t = 0; t < mesh_.triangles.rows(); ++t) {
+    std::vector<Polygon> left = {{mesh_.positions.row(mesh_.triangles(t, 0)),
+                                  mesh_.positions.row(mesh_.triangles(t, 1)),
+                                  mesh_.positions.row(mesh_.triangles(t, 2))}};
+    for (std::size_t s = 0; s < planes.size() && !left.empty(); ++s) {
+      std::vector<Polygon> outside;
+      for (Polygon& inner : left)
+        for (Eigen::Index f = 0; f < planes[s].rows() && !inner.empty(); ++f) {
+          const Eigen::Vector4d plane = planes[s].row(f);
+          if (Polygon beyond = clipped(inner, plane, -1); !beyond.empty())
+            outside.push_back(std::move(beyond));
+          inner = clipped(inner, plane, 1);
+        }
+      left = std::move(outside);
+    }
+    uncovered += !left.empty();
+  }
+  return uncovered;
+}
+
 Decomposition Shells::result() {
   const bool nothing_to_gain = int(parts_.size()) < options_.max_shells;
-  if (options_.max_concavity > 0) cut_the_worst_until_the_bound_is_met();
-  result_.stopped_by = options_.max_concavity > 0 && bound_is_met() ? "concavity"
-                       : nothing_to_gain                            ? "gain"
-                                                                    : "count";
+  if (options_.max_concavity > 0 && !options_.exact) cut_the_worst_until_the_bound_is_met();
+  result_.stopped_by = options_.exact                                 ? "exact"
+                       : options_.max_concavity > 0 && bound_is_met() ? "concavity"
+                       : nothing_to_gain                              ? "gain"
+                                                                      : "count";
   find_neighbours();
+  if (options_.inflation > 0) inflate();
   for (const ConvexShell& shell : result_.shells)
     result_.sum_of_hull_volumes += volume(SurfaceMesh{shell.vertices, shell.triangles});
   result_.model_volume = std::abs(volume(solid_.filled)) / std::pow(solid_.frame.scale, 3);

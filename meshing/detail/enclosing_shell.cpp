@@ -2,6 +2,7 @@
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <queue>
 
@@ -150,6 +151,22 @@ std::vector<Vec3> fewer_corners(const std::vector<Vec3>& corners, int most) {
   for (const Vec3& p : corners) growth = std::max(growth, last.at(p));
   for (Vec3& p : result) p = center + growth * (p - center);
   return result;
+}
+
+std::vector<Vec3> bevelled(const std::vector<Vec3>& corners, double distance) {
+  // The 48 corners of the polytope: where x = 1, x + y = √2 and x + y + z = √3, in every order and with every
+  // sign.
+  std::array<double, 3> corner = {1.0, std::sqrt(2.0) - 1.0, std::sqrt(3.0) - std::sqrt(2.0)};
+  std::sort(corner.begin(), corner.end());
+  std::vector<Vec3> points;
+  do {
+    for (int signs = 0; signs < 8; ++signs) {
+      const Vec3 d(signs & 1 ? corner[0] : -corner[0], signs & 2 ? corner[1] : -corner[1],
+                   signs & 4 ? corner[2] : -corner[2]);
+      for (const Vec3& p : corners) points.push_back(p + distance * d);
+    }
+  } while (std::next_permutation(corner.begin(), corner.end()));
+  return points;
 }
 
 std::vector<Vec3> thickened(const std::vector<Vec3>& points, double distance) {

@@ -12,6 +12,11 @@ namespace limber::meshing::detail {
 // all of them up to rounding, with little added volume.
 std::vector<Vec3> fewer_corners(const std::vector<Vec3>& corners, int most);
 
+// Points whose hull takes in all that is within `distance` of the hull of `corners`, and nothing farther
+// than 1.13 times that: its sum with the polytope of 26 planes (to the faces, edges and corners of a cube)
+// round a ball. That bevels every edge and corner, where planes moved outwards alone would meet in spikes.
+std::vector<Vec3> bevelled(const std::vector<Vec3>& corners, double distance);
+
 // Points in a plane, on a line or all in one place get a twin `distance` away to either side, so that they
 // span a volume.
 std::vector<Vec3> thickened(const std::vector<Vec3>& points, double distance);

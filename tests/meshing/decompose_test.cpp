@@ -220,6 +220,64 @@ TEST(Decompose, NeedlesAndPointsOnALineAreCovered) {
   expect_lawful(line, {}, decompose(line, {}));
 }
 
+// The concave edge lies in the planes of two large faces, whichever way the prism is turned.
+TEST(Decompose, ATurnedLPrismIsCutAtItsConcaveEdge) {
+  SurfaceMesh prism = made_l_prism();
+  const Eigen::Matrix3d turn = Eigen::AngleAxisd(0.7, Vec3(3, 1, 2).normalized()).toRotationMatrix();
+  prism.positions = (prism.positions * turn.transpose()).eval();
+  const Decomposition result = decompose(prism, {.max_shells = 8});
+  EXPECT_EQ(result.shells.size(), 2u);
+  EXPECT_NEAR(result.sum_of_hull_volumes, 6, 2e-5 * 6);
+}
+
+TEST(Decompose, AnInflatedShellTakesInItsSurroundingsWithoutSpikes) {
+  const SurfaceMesh prism = made_l_prism();
+  const DecomposeOptions plain{.max_shells = 2}, inflated{.max_shells = 2, .inflation = 0.05};
+  const Decomposition a = decompose(prism, plain), b = decompose(prism, inflated);
+  expect_lawful(prism, inflated, b);
+  const double distance = 0.05 * bounding_box(prism.positions).diagonal();
+  ASSERT_EQ(a.shells.size(), b.shells.size());
+  Rng rng(4, 0);
+  for (std::size_t s = 0; s < a.shells.size(); ++s) {
+    Box box = bounding_box(a.shells[s].vertices);
+    for (Eigen::Index v = 0; v < a.shells[s].vertices.rows(); ++v)
+      for (int i = 0; i < 20; ++i) {
+        const Vec3 p = Vec3(a.shells[s].vertices.row(v)) + distance * rng.direction();
+        EXPECT_TRUE(holds(b.shells[s], p.cast<long double>()));
+      }
+    // These two shells are boxes, so the distance from them is that from their bounding boxes.
+    for (Eigen::Index v = 0; v < b.shells[s].vertices.rows(); ++v) {
+      const Vec3 p = b.shells[s].vertices.row(v);
+      EXPECT_LT((box.lower - p).cwiseMax(p - box.upper).cwiseMax(0.0).norm(), 1.13 * distance);
+    }
+  }
+}
+
+TEST(Decompose, ExactPartsOfAnLAndATorusOfBoxesAreTheModel) {
+  SurfaceMesh ring = made_torus(0.3, 4, 4);  // square of square section
+  for (const SurfaceMesh& model : {made_l_prism(), ring, made_box(Vec3(1, 2, 3))}) {
+    const DecomposeOptions options{.max_shells = 1000, .exact = true};
+    const Decomposition result = decompose(model, options);
+    expect_lawful(model, options, result);
+    EXPECT_EQ(result.stopped_by, "exact");
+    EXPECT_NEAR(result.sum_of_hull_volumes, volume(model), 2e-5 * volume(model));
+    EXPECT_LT(result.max_overshoot, 1e-5);
+  }
+  EXPECT_EQ(decompose(made_box(Vec3(1, 2, 3)), {.exact = true}).shells.size(), 1u);
+  EXPECT_EQ(decompose(made_l_prism(), {.exact = true}).shells.size(), 2u);
+}
+
+TEST(Decompose, ExactPartsAreRefusedWithAReason) {
+  EXPECT_THROW(decompose(made_hemisphere(4), {.exact = true}), InputError);
+  EXPECT_THROW(decompose(made_sphere(40), {.exact = true}), InputError);  // too many triangles
+  SurfaceMesh two = made_box(Vec3(1, 1, 1));                              // two boxes that cross
+  two.positions.conservativeResize(16, 3);
+  two.positions.bottomRows(8) = two.positions.topRows(8).eval().array() + 0.5;
+  two.triangles.conservativeResize(24, 3);
+  two.triangles.bottomRows(12) = two.triangles.topRows(12).eval().array() + 8;
+  EXPECT_THROW(decompose(two, {.exact = true}), InputError);
+}
+
 TEST(Decompose, SaysWhatIsWrongWithTheInput) {
   const SurfaceMesh box = made_box(Vec3(1, 1, 1));
   EXPECT_THROW(decompose(SurfaceMesh{}, {}), InputError);
@@ -227,6 +285,7 @@ TEST(Decompose, SaysWhatIsWrongWithTheInput) {
   EXPECT_THROW(decompose(box, {.max_concavity = -0.1}), InputError);
   EXPECT_THROW(decompose(box, {.max_concavity = std::nan("")}), InputError);
   EXPECT_THROW(decompose(box, {.max_vertices = 7}), InputError);
+  EXPECT_THROW(decompose(box, {.inflation = -0.1}), InputError);
   SurfaceMesh point = box;
   point.positions.setConstant(2);
   EXPECT_THROW(decompose(point, {}), InputError);
