@@ -3,7 +3,9 @@
 
 #include <algorithm>
 #include <map>
+#include <set>
 #include <string>
+#include <utility>
 
 #include "core/random.h"
 #include "meshing/cage.h"
@@ -93,6 +95,7 @@ TEST(CageSteps, WarpKeepsItsRangeAndNeedsLessVolume) {
     const double spacing = name == "torus" ? 0.4 : 0.6;
     const TetMesh bare = lattice_mesh(model, spacing, {}), warped = lattice_mesh(model, spacing);
     expect_limits_kept(warped, {warp_range, 0});
+    expect_limits_kept(lattice_mesh(model, spacing, DihedralRange{45, 120}), {{45, 120}, 0});
     EXPECT_LT(volume(warped), 0.97 * volume(bare));
   }
 }
@@ -194,13 +197,48 @@ TEST(CageSteps, CoarseningTakesTetsAndNothingElse) {
   }
 }
 
+// Vertices − edges + triangles − tets: 1 for a ball, 0 for a ring, 2 for a hollow ball.
+int euler_characteristic(const TetMesh& mesh) {
+  std::set<std::array<int, 2>> edges;
+  std::set<std::array<int, 3>> triangles;
+  for (int t = 0; t < mesh.tets.rows(); ++t) {
+    std::array<int, 4> v{mesh.tets(t, 0), mesh.tets(t, 1), mesh.tets(t, 2), mesh.tets(t, 3)};
+    std::sort(v.begin(), v.end());
+    for (int i = 0; i < 4; ++i)
+      for (int j = 0; j < i; ++j) {
+        edges.insert({v[j], v[i]});
+        for (int k = 0; k < j; ++k) triangles.insert({v[k], v[j], v[i]});
+      }
+  }
+  return int(mesh.positions.rows()) - int(edges.size()) + int(triangles.size()) - int(mesh.tets.rows());
+}
+
+TEST(CageSteps, CoarseningKeepsHolesAndHollows) {
+  // A speck in one place of the cages: elsewhere no surface is in the way.
+  const SurfaceMesh speck = moved(box_at_origin({0.01, 0.01, 0.01}), {1, 0, 0});
+  const CageModel model(speck);
+  const SurfaceMesh ball = made_sphere(8);
+  SurfaceMesh hollow = ball;
+  hollow.positions *= 0.6;
+  hollow.triangles.col(0).swap(hollow.triangles.col(1));
+  for (const auto& [surface, expected] :
+       {std::pair{models().at("torus"), 0}, std::pair{ball, 1}, std::pair{joined(ball, hollow), 2}})
+    for (double spacing : {0.3, 0.2}) {
+      TetMesh mesh = lattice_mesh(CageModel(surface), spacing, {});
+      ASSERT_EQ(euler_characteristic(mesh), expected);
+      detail::coarsen(model, speck, {{0.5, 179.5}, 0}, 24, mesh);
+      EXPECT_EQ(euler_characteristic(mesh), expected);
+      expect_manifold(mesh);
+    }
+}
+
 TEST(CageSteps, CoarseningGluesNothing) {
-  const SurfaceMesh plates = two_plates(0.3, false);
+  const SurfaceMesh plates = two_plates(0.2, true);
   const CageModel model(plates);
-  TetMesh mesh = lattice_mesh(model, 0.2);
-  ASSERT_EQ(glued_count(model, plates, mesh), 0);
+  TetMesh mesh = drawn_in(model, detail::open_gaps(model, lattice_mesh(model, 0.12)));
+  const auto before = glued_count(model, plates, mesh);
   detail::coarsen(model, plates, {{10, 170}, 0}, 24, mesh);
-  EXPECT_EQ(glued_count(model, plates, mesh), 0);
+  EXPECT_LE(glued_count(model, plates, mesh), before);
   expect_manifold(mesh);
 }
 
