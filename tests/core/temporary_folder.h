@@ -1,4 +1,5 @@
-// A folder that lives as long as the test.
+// A folder that lives as long as the test, in memory where that can be: what is written to a disk to stay
+// there is waited for.
 #pragma once
 
 #include <stdlib.h>
@@ -13,9 +14,14 @@ namespace limber {
 class TemporaryFolder {
  public:
   TemporaryFolder() {
-    std::string name = (std::filesystem::temp_directory_path() / "limber-XXXXXX").string();
-    if (!::mkdtemp(name.data())) throw DiskError("no temporary folder can be made");
-    path_ = name;
+    const std::filesystem::path disk = std::filesystem::temp_directory_path();
+    for (const auto& where : {::getenv("TMPDIR") ? disk : std::filesystem::path("/dev/shm"), disk}) {
+      std::string name = (where / "limber-XXXXXX").string();
+      if (!::mkdtemp(name.data())) continue;
+      path_ = name;
+      return;
+    }
+    throw DiskError("no temporary folder can be made");
   }
   ~TemporaryFolder() {
     std::error_code ignored;
