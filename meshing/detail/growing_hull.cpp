@@ -153,8 +153,13 @@ void GrowingHull::insert(Vec3 p) {
   while (seed < end && (distance(seed, p) <= tolerance_ || !visible(seed, p))) ++seed;
   if (seed >= end) return;
   // Points of a cut lie in one plane, where only exact arithmetic finds signs; a little to the side, rounding
-  // does.
-  if (jitter_ > 0) p += jitter_ * offcuts[points_.size() % offcuts.size()];
+  // does. The seed may have been a sliver, whose plane a step of any length can cross: the moved point must
+  // see it.
+  if (jitter_ > 0) {
+    p += jitter_ * offcuts[points_.size() % offcuts.size()];
+    while (seed < end && (distance(seed, p) <= 0.5 * tolerance_ || !visible(seed, p))) ++seed;
+    if (seed >= end) return;
+  }
 
   // The faces seen from p, connected to the seed, and the sides that bound them.
   ++stamp_;

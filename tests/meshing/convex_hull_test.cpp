@@ -100,5 +100,25 @@ TEST(ConvexHull, OrientationSeesOneBit) {
   EXPECT_EQ(detail::orientation(Vec3::Zero(), Vec3::UnitX(), Vec3::UnitY(), Vec3::UnitZ()), 1);
 }
 
+// A rough hull moves each point a little as it takes it in; among the slivers of thin plates whose points lie
+// in rows, the face that showed the point may not see it any more.
+TEST(ConvexHull, RoughHullsOfRowsInThinPlatesStayWhole) {
+  for (double thickness : {1e-3, 1e-4, 1e-5})
+    for (std::uint64_t seed = 0; seed < 3000; ++seed) {
+      Rng rng(seed, 7);
+      const Vec3 across = rng.direction(), along = across.cross(rng.direction()).normalized(),
+                 up = across.cross(along);
+      std::vector<Vec3> points;
+      for (int i = 0; i < 60; ++i)
+        points.push_back(0.2 * (i / 4) / 15.0 * across + (i / 2 % 2) * 0.1 * along +
+                         thickness * (i % 2) * up);
+      for (std::size_t i = points.size() - 1; i > 0; --i)
+        std::swap(points[i], points[std::size_t(rng.uniform() * double(i + 1))]);
+      detail::GrowingHull hull(3e-8);
+      hull.add(points);
+      EXPECT_NEAR(hull.volume(), 0.2 * 14 / 15 * 0.1 * thickness, 1e-8) << seed;
+    }
+}
+
 }  // namespace
 }  // namespace limber::meshing
