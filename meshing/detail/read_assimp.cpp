@@ -92,7 +92,7 @@ std::vector<T> taken(std::string_view& bytes) {
   std::uint64_t size = 0;
   std::memcpy(&size, bytes.data(), sizeof size);
   std::vector<T> values(size);
-  std::memcpy(static_cast<void*>(values.data()), bytes.data() + sizeof size, sizeof(T) * size);
+  if (size > 0) std::memcpy(static_cast<void*>(values.data()), bytes.data() + sizeof size, sizeof(T) * size);
   bytes.remove_prefix(sizeof size + sizeof(T) * size);
   return values;
 }
