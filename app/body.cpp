@@ -92,14 +92,6 @@ Json prepare_body(const BodySource& source, const PrepareSettings& settings, con
   const meshing::ImportedModel model = source.load();
   validate(model.surface, source.model);
   costs.end_stage("import");
-
-  make_folder(folder);  // not before: a model that cannot be read leaves nothing behind
-  std::error_code ignored;
-  fs::remove(folder / "report.json",
-             ignored);  // what is in the folder counts again when a new report says so
-  // These would be of the body before.
-  for (const char* name : export_files) fs::remove(folder / name, ignored);
-  for (const char* name : preview_files) fs::remove(folder / name, ignored);
   throw_if_stopped();
 
   const meshing::Decomposition decomposition =
@@ -131,6 +123,13 @@ Json prepare_body(const BodySource& source, const PrepareSettings& settings, con
   const ffd::Binding binding = ffd::bind(model.surface, cage.mesh);
   costs.end_stage("bind");
 
+  make_folder(folder);  // not before: a model that is refused leaves all as it was
+  std::error_code ignored;
+  fs::remove(folder / "report.json",
+             ignored);  // what is in the folder counts again when a new report says so
+  // These would be of the body before.
+  for (const char* name : export_files) fs::remove(folder / name, ignored);
+  for (const char* name : preview_files) fs::remove(folder / name, ignored);
   write_ply(folder / "surface.ply", model.surface);
   write_obj(folder / "shells.obj", decomposition.shells);
   write_msh(folder / "cage.msh", cage.mesh, cage.shell_from_tet);

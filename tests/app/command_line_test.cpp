@@ -281,6 +281,18 @@ TEST_F(Program, PrepareReportsAndVerifyProvesAgain) {
     EXPECT_EQ(limber_program({"info", (fs::path(out()) / name).string()}).code, exit_done) << name;
 }
 
+// An open model has no exact parts, which shows after it was read.
+TEST_F(Program, ARefusedModelLeavesTheFolderAsItWas) {
+  const std::string model = (folder / "open.obj").string();
+  std::ofstream(model) << "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\n";
+  EXPECT_EQ(limber_program({"prepare", model, "-o", out("new"), "--exact"}).code, exit_bad_input);
+  EXPECT_FALSE(fs::exists(out("new")));
+  ASSERT_EQ(limber_program({"prepare", model, "-o", out(), "--tets", "100"}).code, exit_done);
+  const auto before = contents(out());
+  EXPECT_EQ(limber_program({"prepare", model, "-o", out(), "--exact"}).code, exit_bad_input);
+  EXPECT_EQ(contents(out()), before);
+}
+
 TEST_F(Program, ExportsAreWrittenAlsoOfABodyThatIsUpToDateAndGoWithIt) {
   const std::string model = (folder / "tetrahedron.obj").string();
   std::ofstream(model) << "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n";
