@@ -10,26 +10,6 @@ namespace {
 
 constexpr int preferred_lanes = 16;
 
-class FemPropagator final : public plan::Propagator {
- public:
-  explicit FemPropagator(const fem::World& world) : batch_(world, preferred_lanes), single_(world, 1) {}
-
-  void propagate(std::span<plan::Rollout> rollouts) override {
-    work_.resize(rollouts.size());
-    for (std::size_t i = 0; i < rollouts.size(); ++i)
-      work_[i].start = rollouts[i].from, work_[i].control = rollouts[i].control;
-    fem::propagate(rollouts.size() == 1 ? single_ : batch_, work_);
-    for (std::size_t i = 0; i < rollouts.size(); ++i) {
-      rollouts[i].ok = work_[i].outcome.status == fem::RunStatus::ok;
-      rollouts[i].to = std::move(work_[i].end);
-    }
-  }
-
- private:
-  fem::Batch batch_, single_;  // a path is simulated one rollout at a time; fifteen idle lanes would cost
-  std::vector<fem::Rollout> work_;
-};
-
 std::uint64_t hash_of(const fem::World& world) {
   Hasher hasher;
   hasher.value(world.robot).matrix(world.bounds_m.lower).matrix(world.bounds_m.upper).value(int(world.walls));
@@ -47,6 +27,32 @@ std::uint64_t hash_of(const fem::World& world) {
 
 }  // namespace
 
+class FemSystem::Propagator final : public plan::Propagator {
+ public:
+  explicit Propagator(const FemSystem& system)
+      : system_(system), batch_(system.world_, preferred_lanes), single_(system.world_, 1) {}
+  ~Propagator() override {
+    const std::lock_guard lock(system_.mutex_);
+    system_.cost_ += batch_.cost(), system_.cost_ += single_.cost();
+  }
+
+  void propagate(std::span<plan::Rollout> rollouts) override {
+    work_.resize(rollouts.size());
+    for (std::size_t i = 0; i < rollouts.size(); ++i)
+      work_[i].start = rollouts[i].from, work_[i].control = rollouts[i].control;
+    fem::propagate(rollouts.size() == 1 ? single_ : batch_, work_);
+    for (std::size_t i = 0; i < rollouts.size(); ++i) {
+      rollouts[i].ok = work_[i].outcome.status == fem::RunStatus::ok;
+      rollouts[i].to = std::move(work_[i].end);
+    }
+  }
+
+ private:
+  const FemSystem& system_;
+  fem::Batch batch_, single_;  // a path is simulated one rollout at a time; fifteen idle lanes would cost
+  std::vector<fem::Rollout> work_;
+};
+
 FemSystem::FemSystem(const fem::World& world) : world_(world), hash_(hash_of(world)) {}
 
 State FemSystem::start() const { return fem::rest_state(world_); }
@@ -63,7 +69,11 @@ std::uint64_t FemSystem::hash() const { return hash_; }
 bool FemSystem::acceptable(const State& state) const { return fem::inverted_tets(world_, state) == 0; }
 int FemSystem::lanes() const { return preferred_lanes; }
 std::unique_ptr<plan::Propagator> FemSystem::make_propagator() const {
-  return std::make_unique<FemPropagator>(world_);
+  return std::make_unique<Propagator>(*this);
+}
+fem::Cost FemSystem::cost() const {
+  const std::lock_guard lock(mutex_);
+  return cost_;
 }
 
 }  // namespace limber::app

@@ -1,6 +1,9 @@
 // What the planner may ask of the soft bodies: the adapter from fem::World to plan::System.
 #pragma once
 
+#include <mutex>
+
+#include "fem/cost.h"
 #include "fem/world.h"
 #include "plan/system.h"
 
@@ -20,10 +23,14 @@ class FemSystem final : public plan::System {
   bool acceptable(const State&) const override;  // no tet is inverted
   int lanes() const override;
   std::unique_ptr<plan::Propagator> make_propagator() const override;
+  fem::Cost cost() const;  // of all propagators that have ended
 
  private:
+  class Propagator;
   const fem::World& world_;
   std::uint64_t hash_;
+  mutable std::mutex mutex_;
+  mutable fem::Cost cost_;
 };
 
 }  // namespace limber::app

@@ -16,7 +16,22 @@ namespace limber::app {
 
 namespace {
 
-Json summary_of(const plan::Plan& plan, const fem::World& world, const MotionFigures& figures) {
+// Of the dynamics in this run, searching and replaying.
+Json json_of(const fem::Cost& cost) {
+  const auto per = [](double seconds, std::int64_t count) {
+    return count ? 1e6 * seconds / double(count) : 0;
+  };
+  return {{"contact_cpu_s", cost.contact_s},
+          {"controls_cpu_s", cost.controls_s},
+          {"elastic_cpu_s", cost.elastic_s},
+          {"integration_cpu_s", cost.integration_s},
+          {"contact_of_force_step", cost.steps ? cost.contact_s / cost.force_step_s() : 0},
+          {"load_us", per(cost.load_s, cost.loads)},
+          {"store_us", per(cost.store_s, cost.stores)}};
+}
+
+Json summary_of(const plan::Plan& plan, const fem::World& world, const fem::Cost& cost,
+                const MotionFigures& figures) {
   Json volumes;
   for (std::size_t b = 0; b < world.bodies.size(); ++b)
     volumes[world.bodies[b].name] = std::round(1e4 * 100 * figures.largest_volume_change[b]) / 1e4;
@@ -26,6 +41,7 @@ Json summary_of(const plan::Plan& plan, const fem::World& world, const MotionFig
           {"nodes", plan.tree.size()},
           {"distance_m", plan.best_distance_m},
           {"statistics", plan::json_of(plan.statistics)},
+          {"dynamics", json_of(cost)},
           {"dt_s", world.dt_s},
           {"motion_s", double(plan.trajectory.end.step) * world.dt_s},
           {"frames", plan.trajectory.frames.size()},
@@ -43,10 +59,11 @@ std::string text_of(const Json& s, const fs::path& file) {
   std::string volumes;
   for (const auto& [name, percent] : s.at("largest_volume_change_percent").items())
     volumes += fmt::format("{}{} {:.2f} %", volumes.empty() ? "" : ", ", name, percent.get<double>());
-  const Json& t = s.at("statistics");
+  const Json &t = s.at("statistics"), &d = s.at("dynamics");
   return fmt::format(
       "{}\n"
       "  search       {} iterations, {} nodes, {} diverged, {} rejected; {:.2f} CPU s, {:.2f} s\n"
+      "  dynamics     contact {:.2f} × the force step; a lane takes {:.1f} µs to load, {:.1f} µs to store\n"
       "  motion       {:.2f} s in {} frames, time step {:.3g} ms\n"
       "  volume       changes at most: {}\n"
       "  penetration  at most {:.4f} m, {:.2f} % of the robot's size ({})\n"
@@ -54,7 +71,8 @@ std::string text_of(const Json& s, const fs::path& file) {
       "  file         {}\n",
       s.at("explanation").get<std::string>(), t.at("iterations").get<std::int64_t>(),
       s.at("nodes").get<int>(), t.at("diverged").get<std::int64_t>(), t.at("rejected").get<std::int64_t>(),
-      t.at("cpu_s").get<double>(), t.at("wall_s").get<double>(), s.at("motion_s").get<double>(),
+      t.at("cpu_s").get<double>(), t.at("wall_s").get<double>(), d.at("contact_of_force_step").get<double>(),
+      d.at("load_us").get<double>(), d.at("store_us").get<double>(), s.at("motion_s").get<double>(),
       s.at("frames").get<int>(), 1e3 * s.at("dt_s").get<double>(), volumes,
       s.at("deepest_penetration_m").get<double>(),
       100 * s.at("deepest_penetration_of_robot_size").get<double>(),
@@ -114,7 +132,7 @@ Outcome plan(const PlanOptions& options, const scenes::Scene& scene) {
   plan::Plan plan = plan::plan(system, settings, std::move(earlier));
 
   const MotionFigures figures = measure_motion(world, plan.trajectory);
-  const Json summary = summary_of(plan, world, figures);
+  const Json summary = summary_of(plan, world, system.cost(), figures);
   write_plan_folder(options.out, plan, scene, bodies, summary);
   write_volume_plot(options.out / "volume.svg", scene, world, figures, settings.frames_per_second);
   update_manifest(options.out, "plan", summary);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "core/error.h"
 #include "fem/detail/stepper.h"
@@ -46,11 +47,13 @@ struct Batch::Impl {
     int steps_left = 0;
     State state;  // as loaded; when done, as it ended
     Outcome outcome;
+    bool stale = false;  // done, and what it ended with still takes part in the steps
   };
   const World& world;
   detail::Stepper<float> stepper;
   std::vector<Lane> lanes;
   State rest;
+  Cost cost;  // loads and stores; the rest is the stepper's
 
   Impl(const World& w, int count, InstructionSet set)
       : world(w), stepper(w, count, isa_of(set)), lanes(std::size_t(count)), rest(rest_state(w)) {
@@ -58,13 +61,21 @@ struct Batch::Impl {
   }
 
   void finish(int index) {
+    const double before = thread_cpu_s();
     Lane& lane = lanes[index];
     State end{lane.state.step + lane.control.steps, std::vector<float>(rest.positions.size()),
               std::vector<float>(rest.velocities.size())};
     stepper.store(index, end.positions.data(), end.velocities.data());
     lane.outcome = judge(world, end);
     if (lane.outcome.status == RunStatus::ok) lane.state = std::move(end);
-    stepper.load(index, rest.positions.data(), rest.velocities.data(), {}, false);
+    lane.stale = true;
+    cost.store_s += thread_cpu_s() - before, ++cost.stores;
+  }
+  // A lane that is not loaded anew goes along at rest: numbers that grow or shrink without end are slow.
+  void rest_stale_lanes() {
+    for (std::size_t l = 0; l < lanes.size(); ++l)
+      if (std::exchange(lanes[l].stale, false))
+        stepper.load(int(l), rest.positions.data(), rest.velocities.data(), {}, false);
   }
 };
 
@@ -82,8 +93,10 @@ void Batch::load(int lane, const State& state, const Control& control) {
   LIMBER_CHECK(state.velocities.size() == impl_->rest.velocities.size(), state.velocities.size(),
                impl_->rest.velocities.size());
   LIMBER_CHECK(control.steps >= 0, control.steps);
+  const double before = thread_cpu_s();
   impl_->lanes.at(std::size_t(lane)) = {control, control.steps, state, {}};
   impl_->stepper.load(lane, state.positions.data(), state.velocities.data(), control, control.steps > 0);
+  impl_->cost.load_s += thread_cpu_s() - before, ++impl_->cost.loads;
   if (control.steps == 0) impl_->finish(lane);
 }
 
@@ -92,6 +105,7 @@ int Batch::advance(int most_steps) {
   for (const auto& lane : impl_->lanes)
     if (lane.steps_left > 0) steps = std::min(steps, lane.steps_left), ++busy;
   if (busy == 0 || steps <= 0) return 0;
+  impl_->rest_stale_lanes();
   for (int s = 0; s < steps; ++s) impl_->stepper.step();
   for (int l = 0; l < lanes(); ++l) {
     auto& lane = impl_->lanes[l];
@@ -112,6 +126,12 @@ const Outcome& Batch::outcome(int lane) const {
 void Batch::store(int lane, State& state) const {
   LIMBER_CHECK(steps_left(lane) == 0, lane, steps_left(lane));
   state = impl_->lanes[lane].state;
+}
+
+Cost Batch::cost() const {
+  Cost all = impl_->stepper.cost();
+  all += impl_->cost;
+  return all;
 }
 
 void propagate(Batch& batch, std::span<Rollout> rollouts) {

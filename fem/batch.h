@@ -8,6 +8,7 @@
 #include <string>
 
 #include "core/state.h"
+#include "fem/cost.h"
 #include "fem/world.h"
 
 namespace limber::fem {
@@ -41,6 +42,7 @@ class Batch {
   // with.
   const Outcome& outcome(int lane) const;
   void store(int lane, State&) const;
+  Cost cost() const;  // so far
 
  private:
   struct Impl;

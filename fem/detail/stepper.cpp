@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "core/error.h"
 #include "fem/world.h"
@@ -129,11 +130,40 @@ void Stepper<Real>::pull_towards_goal(int lane) {
 
 template <class Real>
 void Stepper<Real>::step() {
-  for (int lane = 0; lane < lanes_; ++lane) {
-    if (contact_[lane]) contacts_.add_forces(lane, view(lane));
-    if (controls_[lane].manipulation == Manipulation::interpolation) pull_towards_goal(lane);
+  if (cost_.steps++ % Cost::sampled != 0) {
+    add_contact_forces(), find_pushes(), add_elastic_forces(), integrate();
+    return;
   }
+  double before = thread_cpu_s();
+  const auto spent = [&] {
+    const double now = thread_cpu_s();
+    return Cost::sampled * (now - std::exchange(before, now));
+  };
+  add_contact_forces(), cost_.contact_s += spent();
+  find_pushes(), cost_.controls_s += spent();
+  add_elastic_forces(), cost_.elastic_s += spent();
+  integrate(), cost_.integration_s += spent();
+}
+
+template <class Real>
+void Stepper<Real>::add_contact_forces() {
+  for (int lane = 0; lane < lanes_; ++lane)
+    if (contact_[lane]) contacts_.add_forces(lane, view(lane));
+}
+
+template <class Real>
+void Stepper<Real>::find_pushes() {
+  for (int lane = 0; lane < lanes_; ++lane)
+    if (controls_[lane].manipulation == Manipulation::interpolation) pull_towards_goal(lane);
+}
+
+template <class Real>
+void Stepper<Real>::add_elastic_forces() {
   kernels_.elastic(elements_of(tables_.elements), state_.data(), &state_[first_velocity_], f_.data());
+}
+
+template <class Real>
+void Stepper<Real>::integrate() {
   for (std::size_t b = 0; b < world_.bodies.size(); ++b) {
     const Topology::Body& body = world_.topology.bodies[b];
     if (!body.moving) continue;

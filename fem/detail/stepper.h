@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "core/state.h"
+#include "fem/cost.h"
 #include "fem/detail/contact.h"
 #include "fem/detail/kernels.h"
 
@@ -18,12 +19,17 @@ class Stepper {
   void load(int lane, const Real* positions, const Real* velocities, const Control&, bool contact);
   void store(int lane, Real* positions, Real* velocities) const;
   void step();
+  const Cost& cost() const { return cost_; }
 
  private:
   LaneView<Real> view(int lane);
   Real& x(int lane, int node, int c) { return state_[state_layout_.at(node, c) + lane]; }
   Real& v(int lane, int node, int c) { return state_[first_velocity_ + state_layout_.at(node, c) + lane]; }
   void pull_towards_goal(int lane);
+  void add_contact_forces();
+  void find_pushes();
+  void add_elastic_forces();
+  void integrate();
 
   const World& world_;
   const Tables<Real>& tables_;
@@ -38,6 +44,7 @@ class Stepper {
   std::vector<Real> speed2_, travel_;  // [body][lane]
   std::vector<Control> controls_;      // [lane]
   std::vector<bool> contact_;          // [lane]
+  Cost cost_;
 };
 
 extern template class Stepper<float>;

@@ -87,6 +87,30 @@ TEST(Batch, AHundredStepsAreFortyAndThenSixty) {
   }
 }
 
+// Steps and moves in and out of lanes are counted each; seconds add up to no more than the thread had.
+TEST(Batch, CountsWhatItSpends) {
+  const World world = build_world(testing::barriers());
+  const std::vector<Case> cases = pressed_cases(world, 6);
+  std::vector<Rollout> rollouts;
+  for (const Case& c : cases) rollouts.push_back({&c.start, c.control, {}, {}});
+  Batch batch(world, 4);
+  const double before = thread_cpu_s();
+  propagate(batch, rollouts);
+  const double all = thread_cpu_s() - before;
+  const Cost cost = batch.cost();
+  EXPECT_EQ(cost.loads, 6);
+  EXPECT_EQ(cost.stores, 6);
+  std::int64_t longest = 0, sum = 0;
+  for (const Case& c : cases)
+    longest = std::max<std::int64_t>(longest, c.control.steps), sum += c.control.steps;
+  EXPECT_GE(cost.steps, longest);
+  EXPECT_LE(cost.steps, sum);
+  for (const double part :
+       {cost.contact_s, cost.controls_s, cost.elastic_s, cost.integration_s, cost.load_s, cost.store_s})
+    EXPECT_GT(part, 0);
+  EXPECT_LT(cost.load_s + cost.store_s, all);
+}
+
 // A rollout that blows up in the middle of a contact ends with a reason, and its neighbours do not notice.
 TEST(Batch, ARolloutThatBlowsUpIsDivergedAndHarmsNobody) {
   const World world = build_world(testing::barriers());
