@@ -76,6 +76,24 @@ TEST(Library, Barriers1IsTheTableOfThePaper) {
   EXPECT_NEAR(start_box(scene.bodies[2])->lower.z() - scene.bounds_m.lower.z(), 0.8, 1e-12);
 }
 
+// The same bodies and the same search: only the cages of the plates, the name and the limit differ.
+TEST(Library, Barriers2IsBarriers1WithFinerPlates) {
+  const Scene coarse = read_scene_file(find_scene("barriers1")),
+              fine = read_scene_file(find_scene("barriers2"));
+  int tets = 0;
+  ASSERT_EQ(fine.bodies.size(), coarse.bodies.size());
+  for (std::size_t b = 0; b < fine.bodies.size(); ++b) {
+    const TetMesh cage = *made_cage(fine.bodies[b]), coarse_cage = *made_cage(coarse.bodies[b]);
+    tets += int(cage.tets.rows());
+    EXPECT_NEAR(volume(cage), volume(coarse_cage), 1e-12);
+    EXPECT_EQ(fine.bodies[b].material.youngs_modulus_pa, coarse.bodies[b].material.youngs_modulus_pa);
+    EXPECT_EQ(fine.bodies[b].pose.position_m, coarse.bodies[b].pose.position_m);
+  }
+  EXPECT_EQ(tets, 2335);
+  EXPECT_EQ(fine.planner.max_force_n, coarse.planner.max_force_n);
+  EXPECT_EQ(fine.goal.radius_m, coarse.goal.radius_m);
+}
+
 TEST(Library, BunnyGateIsNarrowerThanEitherBunny) {
   const Scene scene = read_scene_file(find_scene("bunny_gate"));
   const double gap_m = start_box(scene.bodies[2])->lower.y() - start_box(scene.bodies[1])->upper.y();
@@ -105,7 +123,8 @@ TEST(Library, UnknownSceneNamesTheNearest) {
     find_scene("bariers1");
     FAIL();
   } catch (const InputError& error) {
-    EXPECT_THAT(error.what(), HasSubstr("did you mean \"barriers1\"? known scenes: barriers1, bunny_gate"));
+    EXPECT_THAT(error.what(),
+                HasSubstr("did you mean \"barriers1\"? known scenes: barriers1, barriers2, bunny_gate"));
   }
 }
 
