@@ -94,6 +94,11 @@ std::vector<PreparedBody> read_bodies(const scenes::Scene& scene, const fs::path
   return bodies;
 }
 
+static fem::BodyKind fem_kind(const scenes::BodySpec& body) {
+  if (body.kind == scenes::Kind::deformable) return fem::BodyKind::deformable;
+  return body.role == scenes::Role::obstacle ? fem::BodyKind::immovable : fem::BodyKind::rigid;
+}
+
 fem::World build_world(const scenes::Scene& scene, const std::vector<PreparedBody>& prepared) {
   fem::WorldSpec spec;
   for (std::size_t b = 0; b < prepared.size(); ++b) {
@@ -109,7 +114,7 @@ fem::World build_world(const scenes::Scene& scene, const std::vector<PreparedBod
                          .damping_ratio = body.material.damping_ratio,
                          .friction = body.material.friction};
     fem_body.fixed_nodes = scenes::fixed_nodes(body, scene.bounds_m, prepared[b].cage.positions);
-    fem_body.rigid = body.kind == scenes::Kind::rigid;
+    fem_body.kind = fem_kind(body);
     spec.bodies.push_back(std::move(fem_body));
   }
   spec.robot = scene.robot;

@@ -21,6 +21,8 @@ using detail::Topology;
 // Share of the largest stable elastic step that is taken: contact needs the rest (docs/contact.md).
 // Neo-Hookean tets stiffen when stretched, and so need more.
 constexpr double step_safety = 1.0 / 3, neo_hookean_step_safety = 0.25;
+// Of a world in which only rigid bodies move, and so no elastic step exists.
+constexpr double rigid_step_s = 1e-3;
 // Inverted tets are pushed back with at least this many μV, which springs cannot hold against
 // (docs/dynamics.md).
 constexpr double inversion_stiffness = 6;
@@ -49,6 +51,10 @@ void check(const BodySpec& spec) {
     if (n < 0 || n >= nodes)
       throw InputError(
           fmt::format("body {}: fixed node {} does not exist; nodes are 0 to {}", spec.name, n, nodes - 1));
+  if (spec.kind == BodyKind::rigid && !spec.fixed_nodes.empty())
+    throw InputError(fmt::format(
+        "body {}: node {} of a rigid body is fixed; fix none, or make the body immovable or deformable",
+        spec.name, spec.fixed_nodes.front()));
   std::vector<bool> used(std::size_t(nodes), false);
   for (int t = 0; t < spec.cage.tets.rows(); ++t)
     for (int i = 0; i < 4; ++i) used[spec.cage.tets(t, i)] = true;
@@ -82,7 +88,8 @@ Body make_body(const BodySpec& spec) {
   body.surface = boundary_triangles(body.cage.tets);
   body.surface_nodes = vertices_of(body.surface);
   const int nodes = body.node_count();
-  body.fixed.assign(std::size_t(nodes), spec.rigid);
+  body.fixed.assign(std::size_t(nodes), spec.kind == BodyKind::immovable);
+  body.kind = spec.kind;
   for (int n : spec.fixed_nodes) body.fixed[n] = true;
   body.moving = std::find(body.fixed.begin(), body.fixed.end(), false) != body.fixed.end();
   body.node_mass_kg.assign(std::size_t(nodes), 0.0);
@@ -216,6 +223,25 @@ Vec3 rest_center(const Body& body) {
   for (int n = 0; n < body.node_count(); ++n)
     sum += body.node_mass_kg[n] * body.cage.positions.row(n).transpose();
   return sum / body.mass_kg;
+}
+
+detail::RigidTable make_rigid(const Body& body) {
+  const Vec3 center = rest_center(body);
+  detail::RigidTable table{body.node_mass_kg, {}, {}};
+  Eigen::Matrix3d spread = Eigen::Matrix3d::Zero();
+  for (int n = 0; n < body.node_count(); ++n) {
+    const Vec3 place = body.cage.positions.row(n).transpose() - center;
+    table.place.insert(table.place.end(), place.data(), place.data() + 3);
+    spread += body.node_mass_kg[n] * place * place.transpose();
+  }
+  const auto put = [](const Eigen::Matrix3d& m, double* six) {
+    for (int i = 0; i < 3; ++i)
+      for (int j = i; j < 3; ++j) *six++ = m(i, j);
+  };
+  put(spread.inverse(), table.sums.inverse_spread);
+  put((spread.trace() * Eigen::Matrix3d::Identity() - spread).inverse(), table.sums.inverse_inertia);
+  table.sums.inverse_mass = 1 / body.mass_kg;
+  return table;
 }
 
 double mean_edge(const Body& body) {
@@ -392,7 +418,7 @@ void choose_step(double max_dt_s, World& world) {
   const auto stiffest =
       std::min_element(world.bodies.begin(), world.bodies.end(),
                        [&](const Body& a, const Body& b) { return step_of(a) < step_of(b); });
-  world.contact_dt_s = float(step_of(*stiffest));
+  world.contact_dt_s = float(std::isfinite(step_of(*stiffest)) ? step_of(*stiffest) : rigid_step_s);
   world.dt_s = max_dt_s > 0 ? std::min(world.contact_dt_s, double(float(max_dt_s))) : world.contact_dt_s;
   if (!(world.dt_s >= 1e-7))
     throw InputError(fmt::format(
@@ -417,6 +443,7 @@ World build_world(const WorldSpec& spec) {
 
   auto& tables = world.tables64;
   world.topology.bodies.resize(world.bodies.size());
+  world.rigid_tables.resize(world.bodies.size());
   world.nodes = 0;
   int tets = 0;
   for (const bool moving : {true, false}) {
@@ -427,7 +454,8 @@ World build_world(const WorldSpec& spec) {
       world.nodes += body.node_count(), tets += int(body.cage.tets.rows());
       append_nodes(body, tables);
       append_topology(body, int(b), world.topology);
-      if (!moving) continue;
+      if (body.kind == BodyKind::rigid) world.rigid_tables[b] = make_rigid(body);
+      if (!moving || body.kind == BodyKind::rigid) continue;
       ElementTables<double> elements;
       body.material.model == MaterialModel::springs ? make_springs(body, elements)
                                                     : make_neo_hookean(body, elements);

@@ -27,12 +27,18 @@ struct Material {
   double friction = 0.2;        // 0 … 2, Coulomb; a pair has the geometric mean, a wall the body's own
 };
 
+enum class BodyKind {
+  deformable,
+  rigid,     // moves as one piece, by gravity, contact and controls
+  immovable  // no node ever moves
+};
+
 struct BodySpec {
   std::string name;
   TetMesh cage;  // the rest shape, where the body starts
   Material material;
-  std::vector<int> fixed_nodes;  // rows of cage.positions that never move
-  bool rigid = false;            // static: no node ever moves. (All nodes fixed means the same.)
+  std::vector<int> fixed_nodes;          // rows of cage.positions that never move
+  BodyKind kind = BodyKind::deformable;  // all nodes fixed means immovable too; rigid bodies have none fixed
 };
 
 struct WorldSpec {
@@ -48,6 +54,7 @@ struct WorldSpec {
 struct Body {
   std::string name;
   Material material;
+  BodyKind kind;
   bool moving;        // false: static, not part of State
   TetMesh cage;       // rest; positions rounded to float32, as the simulation has them
   int first_node;     // the body's row 0 among the world's nodes; for moving bodies also among those of State
@@ -57,7 +64,7 @@ struct Body {
   std::vector<bool> fixed;           // (N)
   std::vector<double> node_mass_kg;  // (N) density × a quarter of each adjacent tet's rest volume
   double mass_kg, rest_volume_m3;
-  double elastic_dt_limit_s;  // largest stable step of the damped elastic body; infinite when static
+  double elastic_dt_limit_s;  // largest stable step of the damped elastic body; infinite unless deformable
   int node_count() const { return int(cage.positions.rows()); }
 };
 
@@ -77,12 +84,13 @@ struct World {
   detail::Tables<float> tables;     // what the float32 steppers read
   detail::Tables<double> tables64;  // the same for the double reference
   detail::Topology topology;
+  std::vector<detail::RigidTable> rigid_tables;  // a body; empty unless it is rigid
 };
 
 // Throws InputError naming body and element: a cage that is not valid, a node in no tet, a fixed node that
-// does not exist, a material out of range, a robot that is missing or cannot move, a body outside the bounds,
-// two bodies that overlap at the start (and how deep), coordinates too large for float32, a step too small to
-// be of use.
+// does not exist or belongs to a rigid body, a material out of range, a robot that is missing or cannot move,
+// a body outside the bounds, two bodies that overlap at the start (and how deep), coordinates too large for
+// float32, a step too small to be of use.
 World build_world(const WorldSpec&);
 
 // All moving bodies in their rest shapes and places, at rest.

@@ -98,6 +98,21 @@ struct Motion {
   Real* speed2;         // out: largest |v|² of the new velocities, [lane]
 };
 
+// A rigid body at rest, seen from its centre of mass; the order of six numbers is xx xy xz yy yz zz.
+struct RigidBody {
+  const double* mass;        // of its nodes
+  const double* place;       // (3 a node) x y z
+  double inverse_mass;       // of all
+  double inverse_spread[6];  // (Σ m X Xᵀ)⁻¹
+  double inverse_inertia[6];
+};
+// motion.speed2 is that of the way the nodes went in the step.
+template <class Real>
+struct RigidMotion {
+  Motion<Real> motion;
+  RigidBody body;
+};
+
 // A tet for finding points near it.
 template <class Real>
 struct TetPlanes {
@@ -120,6 +135,8 @@ struct Kernels {
   void (*elastic)(const Elements<Real>&, const Real* x, const Real* v, Real* f);
   // v += dt (f/m + g + push), x += dt v, f = 0.
   void (*integrate)(const Motion<Real>&, Real* x, Real* v, Real* f);
+  // The same for a body whose nodes keep their distances. They are drawn onto the nearest rigid place first.
+  void (*move_rigid)(const RigidMotion<Real>&, Real* x, Real* v, Real* f);
   // How far points are outside of the planes, at most, and of which; huge outside of the box. Works on
   // multiples of block_size: all five arrays must be that long.
   void (*distances)(const TetPlanes<Real>&, const Real* x, const Real* y, const Real* z, int count,

@@ -177,7 +177,11 @@ void Stepper<Real>::integrate() {
                         &upper_[3 * b * lanes_],
                         &speed2_[b * lanes_]};
     for (int c = 0; c < 3; ++c) motion.gravity[c] = Real(world_.gravity_m_s2[c]);
-    kernels_.integrate(motion, state_.data(), &state_[first_velocity_], f_.data());
+    Real *const x = state_.data(), *const v = &state_[first_velocity_];
+    if (world_.bodies[b].kind == BodyKind::rigid)
+      kernels_.move_rigid({motion, world_.rigid_tables[b].body()}, x, v, f_.data());
+    else
+      kernels_.integrate(motion, x, v, f_.data());
     for (int lane = 0; lane < lanes_; ++lane)
       travel_[b * lanes_ + lane] += motion.dt * std::sqrt(speed2_[b * lanes_ + lane]);
   }

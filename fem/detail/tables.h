@@ -48,6 +48,17 @@ struct Tables {
   std::vector<Real> skin;           // a body: share of its mean edge by which contact candidates may be old
 };
 
+// What RigidBody points to.
+struct RigidTable {
+  std::vector<double> mass, place;
+  RigidBody body() const {
+    RigidBody b = sums;
+    b.mass = mass.data(), b.place = place.data();
+    return b;
+  }
+  RigidBody sums;  // without the pointers
+};
+
 // Connectivity for contact, world nodes and world tets. Face i of a tet is opposite its node i.
 struct Topology {
   struct Tet {

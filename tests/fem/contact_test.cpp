@@ -80,7 +80,8 @@ WorldSpec two_bodies(TetMesh a, TetMesh b, double friction = 0) {
   Material material;
   material.friction = friction;
   WorldSpec spec;
-  spec.bodies = {{"a", std::move(a), material, {}, false}, {"b", std::move(b), material, {}, false}};
+  spec.bodies = {{"a", std::move(a), material, {}, BodyKind::deformable},
+                 {"b", std::move(b), material, {}, BodyKind::deformable}};
   spec.bounds_m = {Vec3::Constant(-20), Vec3::Constant(20)};
   spec.walls = false;
   return spec;
@@ -195,7 +196,7 @@ TEST(Contact, ACollisionKeepsMomentum) {
 // A cube at rest on the floor: every bottom node carries its share, so depth = g h²/β · (all mass)/(mass of
 // the bottom nodes).
 TEST(Contact, RestingDepthFollowsTheStiffnessRule) {
-  WorldSpec spec = testing::alone({"cube", cube({0, 0, 0.5}, 1, 2), {}, {}, false});
+  WorldSpec spec = testing::alone({"cube", cube({0, 0, 0.5}, 1, 2), {}, {}, BodyKind::deformable});
   spec.bounds_m = {Vec3(-5, -5, 0), Vec3(5, 5, 10)};
   spec.walls = true;
   spec.gravity_m_s2 = {0, 0, -10};
@@ -229,9 +230,10 @@ TEST(Contact, FrictionHoldsAndSlidesOnASlope) {
       material.damping_ratio = 0.3;
       material.friction = friction;
       WorldSpec spec;
-      spec.bodies = {{"slider", cube({1, 0, 0.25}, 0.5, 2), material, {}, false}};
+      spec.bodies = {{"slider", cube({1, 0, 0.25}, 0.5, 2), material, {}, BodyKind::deformable}};
       if (!on_floor)
-        spec.bodies.push_back({"slope", grid({0, -1, -0.5}, {6, 2, 0.5}, 12, 4, 1), material, {}, true});
+        spec.bodies.push_back(
+            {"slope", grid({0, -1, -0.5}, {6, 2, 0.5}, 12, 4, 1), material, {}, BodyKind::immovable});
       spec.bounds_m = {Vec3(-20, -20, on_floor ? 0 : -20), Vec3(20, 20, 20)};
       spec.gravity_m_s2 = 10 * Vec3(std::sin(angle), 0, -std::cos(angle));
       const World world = build_world(spec);
@@ -260,7 +262,7 @@ TEST(Contact, NothingPassesThroughUpToAStatedSpeed) {
   for (const double speed : {1.0, 4.0, 8.0}) {
     SCOPED_TRACE(speed);
     WorldSpec spec = two_bodies(cube({0, 0, 0}, 1, 3), grid({1, -1.5, -1.1}, {0.35, 3, 2.2}, 2, 6, 4));
-    spec.bodies[1].rigid = true;
+    spec.bodies[1].kind = BodyKind::immovable;
     const World world = build_world(spec);
     State state = rest_state(world);
     for (int n = 0; n < world.moving_nodes; ++n) state.velocities[3 * n] = float(speed);

@@ -19,7 +19,9 @@ using testing::cube;
 using testing::grid;
 using testing::nodes_where;
 
-BodySpec soft(TetMesh mesh, Material material = {}) { return {"soft", std::move(mesh), material, {}, false}; }
+BodySpec soft(TetMesh mesh, Material material = {}) {
+  return {"soft", std::move(mesh), material, {}, BodyKind::deformable};
+}
 
 constexpr MaterialModel both_models[] = {MaterialModel::springs, MaterialModel::neo_hookean};
 

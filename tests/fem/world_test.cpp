@@ -34,7 +34,8 @@ TEST(World, EveryComplaintNamesBodyAndElement) {
   EXPECT_EQ(spoiled([](WorldSpec&) {}), "taken");
   EXPECT_THAT(spoiled([](WorldSpec& s) { s.bodies.clear(); }), HasSubstr("no body"));
   EXPECT_THAT(spoiled([](WorldSpec& s) { s.robot = 3; }), HasSubstr("robot"));
-  EXPECT_THAT(spoiled([](WorldSpec& s) { s.bodies[0].rigid = true; }), HasSubstr("no node that can move"));
+  EXPECT_THAT(spoiled([](WorldSpec& s) { s.bodies[0].kind = BodyKind::immovable; }),
+              HasSubstr("no node that can move"));
   EXPECT_THAT(spoiled([](WorldSpec& s) { s.bounds_m.upper.x() = -1; }), HasSubstr("bounds_m"));
   EXPECT_THAT(spoiled([&](WorldSpec& s) { s.gravity_m_s2.x() = nan; }), HasSubstr("gravity_m_s2"));
   EXPECT_THAT(spoiled([](WorldSpec& s) { s.max_dt_s = -1; }), HasSubstr("max_dt_s"));
@@ -81,15 +82,16 @@ TEST(World, EveryComplaintNamesBodyAndElement) {
 TEST(World, SeesAnOverlapOfEdgesAlone) {
   WorldSpec spec;
   spec.bounds_m = {Vec3::Constant(-5), Vec3::Constant(5)};
-  spec.bodies = {{"bar", testing::grid({-2, -0.1, -0.1}, {4, 0.2, 0.2}, 2, 1, 1), {}, {}, false},
-                 {"rod", testing::grid({0.3, -2, -0.05}, {0.2, 4, 0.2}, 1, 1, 1), {}, {}, false}};
+  spec.bodies = {
+      {"bar", testing::grid({-2, -0.1, -0.1}, {4, 0.2, 0.2}, 2, 1, 1), {}, {}, BodyKind::deformable},
+      {"rod", testing::grid({0.3, -2, -0.05}, {0.2, 4, 0.2}, 1, 1, 1), {}, {}, BodyKind::deformable}};
   EXPECT_THAT(complaint(spec), HasSubstr("bar and rod overlap"));
 }
 
 // Mass, volume and the place of static bodies behind the moving ones.
 TEST(World, StaticBodiesComeLastAndAreNoPartOfState) {
   WorldSpec spec = testing::barriers();
-  spec.bodies[1].rigid = true;
+  spec.bodies[1].kind = BodyKind::immovable;
   const World world = build_world(spec);
   EXPECT_EQ(world.bodies[0].first_node, 0);
   EXPECT_EQ(world.bodies[2].first_node, world.bodies[0].node_count());

@@ -79,7 +79,7 @@ inline WorldSpec barriers(int fineness = 1, const Material& material = {}) {
   WorldSpec spec;
   spec.bounds_m = {Vec3(0, 0, 0), Vec3(10, 3, 3)};
   const int n = fineness == 1 ? 3 : 5;
-  spec.bodies.push_back({"robot", cube({1, 1.5, 1.5}, 1, n), material, {}, false});
+  spec.bodies.push_back({"robot", cube({1, 1.5, 1.5}, 1, n), material, {}, BodyKind::deformable});
   for (const double x : {3.3, 6.3}) {
     const bool floor = x < 5;
     TetMesh plate = fineness == 1 ? grid({x, 0, floor ? 0 : 0.8}, {0.35, 3, 2.2}, 2, 6, 4)
@@ -87,7 +87,8 @@ inline WorldSpec barriers(int fineness = 1, const Material& material = {}) {
     const auto fixed = nodes_where(plate, [&](const Vec3& p) {
       return p.y() < 1e-9 || p.y() > 3 - 1e-9 || (floor ? p.z() < 1e-9 : p.z() > 3 - 1e-9);
     });
-    spec.bodies.push_back({floor ? "floor_plate" : "ceiling_plate", plate, material, fixed, false});
+    spec.bodies.push_back(
+        {floor ? "floor_plate" : "ceiling_plate", plate, material, fixed, BodyKind::deformable});
   }
   return spec;
 }
