@@ -20,6 +20,8 @@ std::uint64_t hash_of(const fem::World& world) {
     for (const double v :
          {m.youngs_modulus_pa, m.poisson_ratio, m.density_kg_m3, m.damping_ratio, m.friction})
       hasher.value(v);
+    for (const auto* of_tets : {&body.youngs_modulus_from_tet_pa, &body.density_from_tet_kg_m3})
+      for (const double v : *of_tets) hasher.value(v);
     for (const bool fixed : body.fixed) hasher.value(int(fixed));
   }
   return hasher.digest();

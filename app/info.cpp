@@ -1,6 +1,7 @@
 #include "app/body.h"
 #include "app/commands.h"
 #include "app/plan_folder.h"
+#include "app/preview.h"
 #include "core/error.h"
 #include "core/hash.h"
 #include "core/mesh_files.h"
@@ -56,15 +57,49 @@ Json info_of_model(const fs::path& path) {
   return json;
 }
 
+// What a person needs to choose a part by its shell: where it is, how large, which colour in the pictures.
+Json info_of_shells(const PreparedBody& body, const std::vector<ConvexShell>& shells) {
+  std::vector<int> tets(shells.size(), 0);
+  for (const int shell : body.shell_from_tet) ++tets.at(std::size_t(shell));
+  Json list = Json::array();
+  for (std::size_t s = 0; s < shells.size(); ++s) {
+    const Box box = bounding_box(shells[s].vertices);
+    const Vec3 middle = box.center(), size = box.size(), color = 255 * shell_color(s);
+    list.push_back({{"shell", s},
+                    {"middle_m", {middle.x(), middle.y(), middle.z()}},
+                    {"size_m", {size.x(), size.y(), size.z()}},
+                    {"volume_m3", volume(SurfaceMesh{shells[s].vertices, shells[s].triangles})},
+                    {"tets", tets[s]},
+                    {"color", fmt::format("#{:02x}{:02x}{:02x}", int(color.x() + 0.5), int(color.y() + 0.5),
+                                          int(color.z() + 0.5))}});
+  }
+  return list;
+}
+
+Outcome info_of_body(const fs::path& folder) {
+  const PreparedBody body = read_body(folder);
+  Json json = body.report;
+  json["shell_list"] = info_of_shells(body, read_obj_shells(folder / "shells.obj"));
+  std::string text = summary_of_report(body.report);
+  const auto place = [](const Json& v) {
+    return fmt::format("({:8.4g} {:8.4g} {:8.4g})", v[0].get<double>(), v[1].get<double>(),
+                       v[2].get<double>());
+  };
+  text +=
+      "  shell        middle, m                     size, m                       tets  in "
+      "preview-shells.png\n";
+  for (const Json& s : json.at("shell_list"))
+    text += fmt::format("  {:5}        {}  {}  {:5}  {}\n", s.at("shell").get<int>(), place(s.at("middle_m")),
+                        place(s.at("size_m")), s.at("tets").get<int>(), s.at("color").get<std::string>());
+  return {exit_done, json, text};
+}
+
 }  // namespace
 
 Outcome info(const fs::path& path) {
   if (fs::is_directory(path)) {
     if (fs::exists(path / "plan.npz")) return outcome_of(read_plan_folder(path).summary);
-    if (fs::exists(path / "report.json")) {
-      const Json report = read_body(path).report;
-      return {exit_done, report, summary_of_report(report)};
-    }
+    if (fs::exists(path / "report.json")) return info_of_body(path);
     throw InputError(
         fmt::format("{}: holds neither plan.npz nor report.json; nothing here is limber's", path.string()));
   }

@@ -34,19 +34,6 @@ render::Camera camera_for(const Box& box) {
   return render::frame_automatically(box, toward_eye, double(width_px) / height_px, 26, 1);
 }
 
-// Colours that stay apart: hues by the golden ratio, three kinds of strength.
-Vec3 shell_color(std::size_t i) {
-  constexpr std::array<std::array<double, 2>, 3> strength{{{0.55, 0.90}, {0.75, 0.72}, {0.38, 0.95}}};
-  const double hue = 6 * std::fmod(0.08 + 0.618033988749895 * double(i), 1.0);
-  const auto [saturation, value] = strength[i % strength.size()];
-  Vec3 color;
-  for (int c = 0; c < 3; ++c) {  // red is strongest at hue 0, green at 2, blue at 4
-    const double apart = std::abs(std::remainder(hue - 2 * c, 6.0));
-    color[c] = value * (1 - saturation * std::clamp(apart - 1, 0.0, 1.0));
-  }
-  return color;
-}
-
 // By the smallest dihedral of a tet.
 struct Grade {
   double from_deg;
@@ -242,6 +229,19 @@ render::Image8 picture_of_dihedrals(const PreparedBody& body) {
 }
 
 }  // namespace
+
+// Colours that stay apart: hues by the golden ratio, three kinds of strength.
+Vec3 shell_color(std::size_t i) {
+  constexpr std::array<std::array<double, 2>, 3> strength{{{0.55, 0.90}, {0.75, 0.72}, {0.38, 0.95}}};
+  const double hue = 6 * std::fmod(0.08 + 0.618033988749895 * double(i), 1.0);
+  const auto [saturation, value] = strength[i % strength.size()];
+  Vec3 color;
+  for (int c = 0; c < 3; ++c) {  // red is strongest at hue 0, green at 2, blue at 4
+    const double apart = std::abs(std::remainder(hue - 2 * c, 6.0));
+    color[c] = value * (1 - saturation * std::clamp(apart - 1, 0.0, 1.0));
+  }
+  return color;
+}
 
 void write_previews(const PreparedBody& body, const std::vector<ConvexShell>& shells,
                     const fs::path& folder) {

@@ -12,6 +12,9 @@ namespace limber::app {
 inline constexpr const char* preview_files[] = {"preview-shells.png", "preview-cage.png", "preview-cut.png",
                                                 "preview-dihedrals.png"};
 
+// sRGB, 0 … 1: the colour in which preview-shells.png and preview-cage.png show shell i.
+Vec3 shell_color(std::size_t i);
+
 // Writes preview_files into the folder.
 void write_previews(const PreparedBody&, const std::vector<ConvexShell>&, const fs::path& folder);
 

@@ -94,10 +94,49 @@ std::vector<PreparedBody> read_bodies(const scenes::Scene& scene, const fs::path
   return bodies;
 }
 
-static fem::BodyKind fem_kind(const scenes::BodySpec& body) {
+namespace {
+
+fem::BodyKind kind_of(const scenes::BodySpec& body) {
   if (body.kind == scenes::Kind::deformable) return fem::BodyKind::deformable;
   return body.role == scenes::Role::obstacle ? fem::BodyKind::immovable : fem::BodyKind::rigid;
 }
+
+// What the parts of a body say, tet by tet.
+void set_parts(const scenes::BodySpec& body, const PreparedBody& prepared, fem::BodySpec& out) {
+  if (body.parts.empty()) return;
+  const Tets& tets = prepared.cage.tets;
+  const int shells = prepared.report.at("shells").at("count").get<int>();
+  out.youngs_modulus_from_tet_pa.assign(std::size_t(tets.rows()), body.material.youngs_modulus_pa);
+  out.density_from_tet_kg_m3.assign(std::size_t(tets.rows()), body.material.density_kg_m3);
+  for (const scenes::PartSpec& part : body.parts) {
+    if (part.shell && *part.shell >= shells)
+      throw InputError(
+          fmt::format("{}: bodies.{}.parts: there is no shell {}; the body has {}, numbered from 0 (limber "
+                      "info on its folder "
+                      "shows them)",
+                      part.where, body.name, *part.shell, shells));
+    int chosen = 0;
+    for (int t = 0; t < tets.rows(); ++t) {
+      Vec3 middle = Vec3::Zero();
+      for (int i = 0; i < 4; ++i) middle += prepared.cage.positions.row(tets(t, i)).transpose() / 4;
+      const bool in_box = (middle.array() >= part.box_m.lower.array()).all() &&
+                          (middle.array() <= part.box_m.upper.array()).all();
+      if (part.shell ? prepared.shell_from_tet[std::size_t(t)] != *part.shell : !in_box) continue;
+      ++chosen;
+      if (part.youngs_modulus_pa) out.youngs_modulus_from_tet_pa[std::size_t(t)] = *part.youngs_modulus_pa;
+      if (part.density_kg_m3) out.density_from_tet_kg_m3[std::size_t(t)] = *part.density_kg_m3;
+    }
+    if (chosen == 0)
+      throw InputError(
+          fmt::format("{}: bodies.{}.parts: {}; {}", part.where, body.name,
+                      part.shell ? fmt::format("no tet of the cage has its middle in shell {}", *part.shell)
+                                 : std::string("no tet of the cage has its middle in that box"),
+                      part.shell ? "ask for more tets, fewer shells, or give a box_m"
+                                 : "enlarge or move it, or ask for more tets"));
+  }
+}
+
+}  // namespace
 
 fem::World build_world(const scenes::Scene& scene, const std::vector<PreparedBody>& prepared) {
   fem::WorldSpec spec;
@@ -114,7 +153,8 @@ fem::World build_world(const scenes::Scene& scene, const std::vector<PreparedBod
                          .damping_ratio = body.material.damping_ratio,
                          .friction = body.material.friction};
     fem_body.fixed_nodes = scenes::fixed_nodes(body, scene.bounds_m, prepared[b].cage.positions);
-    fem_body.kind = fem_kind(body);
+    fem_body.kind = kind_of(body);
+    set_parts(body, prepared[b], fem_body);
     spec.bodies.push_back(std::move(fem_body));
   }
   spec.robot = scene.robot;

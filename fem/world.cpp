@@ -29,7 +29,7 @@ constexpr double inversion_stiffness = 6;
 
 constexpr int tet_edges[6][2] = {{0, 1}, {0, 2}, {0, 3}, {1, 2}, {1, 3}, {2, 3}};
 
-void require_range(const BodySpec& spec, const char* name, double value, double lower, double upper,
+void require_range(const BodySpec& spec, const std::string& name, double value, double lower, double upper,
                    const char* text) {
   if (!(value >= lower && value <= upper))
     throw InputError(fmt::format("body {}: {} is {}; it must be {}", spec.name, name, value, text));
@@ -38,12 +38,26 @@ void require_range(const BodySpec& spec, const char* name, double value, double 
 void check(const BodySpec& spec) {
   validate(spec.cage, fmt::format("body {}: cage", spec.name));
   const Material& m = spec.material;
-  require_range(spec, "youngs_modulus_pa", m.youngs_modulus_pa, 1e-3, 1e13, "from 0.001 to 1e13");
+  const auto require_modulus = [&](const std::string& name, double value) {
+    require_range(spec, name, value, 1e-3, 1e13, "from 0.001 to 1e13");
+  };
+  const auto require_density = [&](const std::string& name, double value) {
+    require_range(spec, name, value, 1e-6, 1e6, "from 1e-6 to 1e6");
+  };
+  const std::size_t tets = std::size_t(spec.cage.tets.rows());
+  const auto &moduli = spec.youngs_modulus_from_tet_pa, &densities = spec.density_from_tet_kg_m3;
+  LIMBER_CHECK(moduli.empty() || moduli.size() == tets, moduli.size(), tets);
+  LIMBER_CHECK(densities.empty() || densities.size() == tets, densities.size(), tets);
+  for (std::size_t t = 0; t < moduli.size(); ++t)
+    require_modulus(fmt::format("youngs_modulus_pa of tet {}", t), moduli[t]);
+  for (std::size_t t = 0; t < densities.size(); ++t)
+    require_density(fmt::format("density_kg_m3 of tet {}", t), densities[t]);
+  require_modulus("youngs_modulus_pa", m.youngs_modulus_pa);
   if (m.model == MaterialModel::springs)
     require_range(spec, "poisson_ratio", m.poisson_ratio, 0.25, 0.495, "from 0.25 to 0.495 for springs");
   else
     require_range(spec, "poisson_ratio", m.poisson_ratio, 0, 0.495, "from 0 to 0.495");
-  require_range(spec, "density_kg_m3", m.density_kg_m3, 1e-6, 1e6, "from 1e-6 to 1e6");
+  require_density("density_kg_m3", m.density_kg_m3);
   require_range(spec, "damping_ratio", m.damping_ratio, 0, 1, "from 0 to 1");
   require_range(spec, "friction", m.friction, 0, 2, "from 0 to 2");
   const int nodes = int(spec.cage.positions.rows());
@@ -94,13 +108,20 @@ Body make_body(const BodySpec& spec) {
   body.moving = std::find(body.fixed.begin(), body.fixed.end(), false) != body.fixed.end();
   body.node_mass_kg.assign(std::size_t(nodes), 0.0);
   body.rest_volume_m3 = volume(body.cage);
+  const std::size_t tets = std::size_t(spec.cage.tets.rows());
+  body.youngs_modulus_from_tet_pa = spec.youngs_modulus_from_tet_pa;
+  body.youngs_modulus_from_tet_pa.resize(tets, body.material.youngs_modulus_pa);
+  body.density_from_tet_kg_m3 = spec.density_from_tet_kg_m3;
+  body.density_from_tet_kg_m3.resize(tets, body.material.density_kg_m3);
   body.mass_kg = body.material.density_kg_m3 * body.rest_volume_m3;
   body.elastic_dt_limit_s = std::numeric_limits<double>::infinity();
   const auto& x = body.cage.positions;
   for (int t = 0; t < body.cage.tets.rows(); ++t) {
     const auto q = body.cage.tets.row(t);
     const double v = signed_volume(x.row(q[0]), x.row(q[1]), x.row(q[2]), x.row(q[3]));
-    for (int i = 0; i < 4; ++i) body.node_mass_kg[q[i]] += body.material.density_kg_m3 * v / 4;
+    const double density = body.density_from_tet_kg_m3[t];
+    body.mass_kg += (density - body.material.density_kg_m3) * v;
+    for (int i = 0; i < 4; ++i) body.node_mass_kg[q[i]] += density * v / 4;
   }
   return body;
 }
@@ -115,10 +136,10 @@ std::vector<double> tet_volumes(const TetMesh& mesh) {
   return volumes;
 }
 
-// k_d = τ k everywhere, so that the lowest longitudinal mode of a cube of the body's volume has the damping
-// ratio asked for.
-double damping_time(const Body& body) {
-  const double speed = std::sqrt(body.material.youngs_modulus_pa / body.material.density_kg_m3);
+// k_d = τ k, so that the lowest longitudinal mode of a cube of the body's volume and all of this tet's stuff
+// has the damping ratio asked for.
+double damping_time(const Body& body, int tet) {
+  const double speed = std::sqrt(body.youngs_modulus_from_tet_pa[tet] / body.density_from_tet_kg_m3[tet]);
   const double frequency = M_PI * speed / std::cbrt(body.rest_volume_m3);
   return 2 * body.material.damping_ratio / frequency;
 }
@@ -126,38 +147,57 @@ double damping_time(const Body& body) {
 struct Lame {
   double mu, lambda;
 };
-Lame lame_of(const Material& m) {
-  return {m.youngs_modulus_pa / (2 * (1 + m.poisson_ratio)),
-          m.youngs_modulus_pa * m.poisson_ratio / ((1 + m.poisson_ratio) * (1 - 2 * m.poisson_ratio))};
+Lame lame_of(const Body& body, int tet) {
+  const double young = body.youngs_modulus_from_tet_pa[tet], poisson = body.material.poisson_ratio;
+  return {young / (2 * (1 + poisson)), young * poisson / ((1 + poisson) * (1 - 2 * poisson))};
 }
 
-// Each edge once, with the sum over its tets of what `of_tet` gives them.
+// Each edge once, with what its tets are together: the sum of `of_tet`, or the least.
+enum class Together { sum, least };
+using OverEdges = std::map<std::pair<int, int>, double>;
 template <class OfTet>
-std::map<std::pair<int, int>, double> sum_over_edges(const Body& body, const OfTet& of_tet) {
-  std::map<std::pair<int, int>, double> sums;
+OverEdges over_edges(const Body& body, Together how, const OfTet& of_tet) {
+  OverEdges values;
   for (int t = 0; t < body.cage.tets.rows(); ++t)
-    for (const auto& [i, j] : tet_edges)
-      sums[std::minmax(body.cage.tets(t, i), body.cage.tets(t, j))] += of_tet(t);
-  return sums;
+    for (const auto& [i, j] : tet_edges) {
+      const auto [at, is_new] =
+          values.try_emplace(std::minmax(body.cage.tets(t, i), body.cage.tets(t, j)), of_tet(t));
+      if (!is_new)
+        at->second = how == Together::sum ? at->second + of_tet(t) : std::min(at->second, of_tet(t));
+    }
+  return values;
+}
+
+// An edge between parts has most of its stiffness from the stiffest, and so its damping time.
+OverEdges damping_times(const Body& body) {
+  return over_edges(body, Together::least, [&](int t) { return damping_time(body, t); });
 }
 
 // The energies of `springs` on the body's own node numbers. Sources and derivations: docs/dynamics.md.
 void make_springs(const Body& body, ElementTables<double>& tables) {
-  const auto [mu, lambda] = lame_of(body.material);
-  const double tau = damping_time(body);
   const auto& x = body.cage.positions;
   const std::vector<double> volumes = tet_volumes(body.cage);
   for (int t = 0; t < body.cage.tets.rows(); ++t) {
+    const auto [mu, lambda] = lame_of(body, t);
+    const double tau = damping_time(body, t);
     const auto q = body.cage.tets.row(t);
     const double v = volumes[t], k = (lambda - mu) * v, scale = 1 / (36 * v * v);
     const double inverted = std::max(0.0, inversion_stiffness * mu * v - k);
     tables.volumes.elements.push_back(
         {{q[0], q[1], q[2], q[3]}, {6 * v, k * scale, inverted * scale, tau * k * scale}});
   }
+  // Shares are fitted as if the body were all of one stuff: where parts meet, an affine strain has to leave a
+  // pull. Then an edge gets the mean stiffness of its tets.
+  const double young = body.youngs_modulus_from_tet_pa[0], mu = lame_of(body, 0).mu;
   std::vector<double> mu_volume;
   for (const double v : volumes) mu_volume.push_back(mu * v);
-  for (const auto& [edge, k] : detail::isotropic_springs(body.cage, mu_volume)) {
+  const OverEdges volume_round = over_edges(body, Together::sum, [&](int t) { return volumes[t]; });
+  const OverEdges stiffness_round = over_edges(
+      body, Together::sum, [&](int t) { return body.youngs_modulus_from_tet_pa[t] / young * volumes[t]; });
+  const OverEdges taus = damping_times(body);
+  for (const auto& [edge, share] : detail::isotropic_springs(body.cage, mu_volume)) {
     const double rest = (x.row(edge.first) - x.row(edge.second)).norm();
+    const double k = share * (stiffness_round.at(edge) / volume_round.at(edge)), tau = taus.at(edge);
     tables.springs.elements.push_back(
         {{edge.first, edge.second}, {rest, k / (rest * rest), tau * k / (rest * rest)}});
   }
@@ -166,13 +206,13 @@ void make_springs(const Body& body, ElementTables<double>& tables) {
 // The same of `neo_hookean`. Its μ and λ are not Lamé's, but give them at small strain; its damping is that
 // of springs.
 void make_neo_hookean(const Body& body, ElementTables<double>& tables) {
-  const auto [lame_mu, lame_lambda] = lame_of(body.material);
-  const double mu = 4.0 / 3 * lame_mu, lambda = lame_lambda + 5.0 / 6 * lame_mu;
-  const double tau = damping_time(body);
   const auto& x = body.cage.positions;
   const std::vector<double> volumes = tet_volumes(body.cage);
   for (int t = 0; t < body.cage.tets.rows(); ++t) {
     const auto q = body.cage.tets.row(t);
+    const auto [lame_mu, lame_lambda] = lame_of(body, t);
+    const double mu = 4.0 / 3 * lame_mu, lambda = lame_lambda + 5.0 / 6 * lame_mu;
+    const double tau = damping_time(body, t);
     const double v = volumes[t], scale = 1 / (36 * v * v);
     Eigen::Matrix3d edges;
     for (int i = 0; i < 3; ++i) edges.col(i) = x.row(q[i + 1]) - x.row(q[0]);
@@ -184,8 +224,10 @@ void make_neo_hookean(const Body& body, ElementTables<double>& tables) {
           {m(0, 0), m(0, 1), m(0, 2), m(1, 1), m(1, 2), m(2, 2)},
           mu * v}});
   }
-  for (const auto& [edge, k] : sum_over_edges(body, [&](int t) { return 2.5 * lame_mu * volumes[t]; })) {
-    const double rest = (x.row(edge.first) - x.row(edge.second)).norm();
+  const OverEdges taus = damping_times(body);
+  for (const auto& [edge, k] :
+       over_edges(body, Together::sum, [&](int t) { return 2.5 * lame_of(body, t).mu * volumes[t]; })) {
+    const double rest = (x.row(edge.first) - x.row(edge.second)).norm(), tau = taus.at(edge);
     tables.dashpots.elements.push_back({{edge.first, edge.second}, {tau * k / (rest * rest)}});
   }
 }

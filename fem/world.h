@@ -39,6 +39,8 @@ struct BodySpec {
   Material material;
   std::vector<int> fixed_nodes;          // rows of cage.positions that never move
   BodyKind kind = BodyKind::deformable;  // all nodes fixed means immovable too; rigid bodies have none fixed
+  // (T) each, or empty: the material's everywhere.
+  std::vector<double> youngs_modulus_from_tet_pa = {}, density_from_tet_kg_m3 = {};
 };
 
 struct WorldSpec {
@@ -62,7 +64,9 @@ struct Body {
   Triangles surface;  // boundary faces, rows of cage.positions
   std::vector<int> surface_nodes;    // rows of cage.positions, ascending
   std::vector<bool> fixed;           // (N)
-  std::vector<double> node_mass_kg;  // (N) density × a quarter of each adjacent tet's rest volume
+  std::vector<double> node_mass_kg;  // (N) a quarter of each adjacent tet's
+  std::vector<double> youngs_modulus_from_tet_pa,
+      density_from_tet_kg_m3;  // (T) the material's, or a part's own
   double mass_kg, rest_volume_m3;
   double elastic_dt_limit_s;  // largest stable step of the damped elastic body; infinite unless deformable
   int node_count() const { return int(cage.positions.rows()); }

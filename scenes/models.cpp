@@ -140,7 +140,7 @@ std::vector<int> fixed_nodes(const BodySpec& body, const Box& bounds_m, const Po
   std::vector<bool> box_holds_one(body.fixed.boxes_m.size());
   for (int n = 0; n < int(cage_positions.rows()); ++n) {
     const Vec3 p = cage_positions.row(n);
-    bool held = body.kind == Kind::rigid || (body.fixed.walls && on_wall(p));
+    bool held = (body.kind == Kind::rigid && body.role == Role::obstacle) || (body.fixed.walls && on_wall(p));
     for (std::size_t b = 0; b < body.fixed.boxes_m.size(); ++b)
       if (in(body.fixed.boxes_m[b], p)) held = box_holds_one[b] = true;
     if (held) nodes.push_back(n);

@@ -34,7 +34,7 @@ std::array<int, 2> plate_plane(const Vec3& size_m);
 void transform(const Eigen::Affine3d& map, Points& positions);
 
 // Rows of `cage_positions` (in the world, at the start) that the scene holds fixed, ascending; all of a rigid
-// body. Throws InputError naming the body when it asks for fixed nodes and no node is where it says.
+// obstacle. Throws InputError naming the body when it asks for fixed nodes and no node is where it says.
 std::vector<int> fixed_nodes(const BodySpec&, const Box& bounds_m, const Points& cage_positions);
 
 }  // namespace limber::scenes

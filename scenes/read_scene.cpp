@@ -261,19 +261,55 @@ CageSpec read_cage(const Node& table, const Model& model, const std::string& bod
   return cage;
 }
 
-MaterialSpec read_material(const Node& body_table, Kind kind, const std::string& body) {
+MaterialSpec read_material(const Node& body_table, Kind kind, Role role, const std::string& body) {
+  constexpr double any_modulus_pa = 1e6;
   const Node* table = body_table.find("material");
   if (!table && kind == Kind::deformable)
     complain(body_table, fmt::format("{} is deformable and lacks a material; add for example material = "
                                      "{{ youngs_modulus_pa = 5e3, density_kg_m3 = 100 }}",
                                      body));
+  if (!table && role != Role::obstacle)
+    complain(body_table, fmt::format("{} is rigid, moves and lacks a material; add for example material = "
+                                     "{{ density_kg_m3 = 100 }}",
+                                     body));
+  if (table && kind == Kind::deformable && !table->find("youngs_modulus_pa"))
+    complain(*table,
+             fmt::format(
+                 "{}.material lacks \"youngs_modulus_pa\" (Pa; stiffness); add for example youngs_modulus_pa "
+                 "= 5e3",
+                 body));
   if (!table) {  // it never deforms: any sound material does
     const Key& friction = *find_key("bodies[].material.friction");
-    return {"springs", 1e6, 0.45, 1000, 0.05, as_number(parse_set_value(std::string(friction.fallback), ""))};
+    return {"springs", any_modulus_pa, 0.45,
+            1000,      0.05,           as_number(parse_set_value(std::string(friction.fallback), ""))};
   }
-  return {text(*table, "model"),           number(*table, "youngs_modulus_pa"),
+  return {text(*table, "model"),           maybe_number(*table, "youngs_modulus_pa").value_or(any_modulus_pa),
           number(*table, "poisson_ratio"), number(*table, "density_kg_m3"),
           number(*table, "damping_ratio"), number(*table, "friction")};
+}
+
+std::vector<PartSpec> read_parts(const Array& tables, const BodySpec& body, const std::string& body_name) {
+  std::vector<PartSpec> parts;
+  for (const Node& table : tables) {
+    const std::string what = fmt::format("{}.parts[{}]", body_name, parts.size());
+    PartSpec part;
+    const Node *shell = table.find("shell"), *region = table.find("box_m");
+    if ((shell != nullptr) == (region != nullptr))
+      complain(table, fmt::format("{} has {}; give either shell = N or box_m = [[x, y, z], [x, y, z]]", what,
+                                  shell ? "both shell and box_m" : "neither shell nor box_m"));
+    if (shell) part.shell = int(as_number(*shell));
+    if (region) part.box_m = box(table, "box_m");
+    part.youngs_modulus_pa = maybe_number(table, "youngs_modulus_pa");
+    part.density_kg_m3 = maybe_number(table, "density_kg_m3");
+    if (!part.youngs_modulus_pa && !part.density_kg_m3)
+      complain(table, fmt::format("{} changes nothing; give youngs_modulus_pa or density_kg_m3", what));
+    if (part.youngs_modulus_pa && body.kind == Kind::rigid)
+      complain(child(table, "youngs_modulus_pa"),
+               fmt::format("{}.youngs_modulus_pa is of no use: {} is rigid; remove it", what, body_name));
+    part.where = table.where.text();
+    parts.push_back(std::move(part));
+  }
+  return parts;
 }
 
 FixedSpec read_fixed(const Node& node) {
@@ -319,18 +355,21 @@ BodySpec read_body(const Node& table, const Box& bounds) {
   const std::string what = "bodies." + body.name;
   body.role = read_role(text(table, "role"));
   body.kind = text(table, "kind") == "rigid" ? Kind::rigid : Kind::deformable;
-  if (body.kind == Kind::rigid && body.role != Role::obstacle)
-    complain(child(table, "kind"),
-             fmt::format("{} is rigid, but its role is {}; rigid bodies do not move: make it "
-                         "deformable, or role = \"obstacle\"",
-                         what, text(table, "role")));
   body.model = read_model(child(table, "model"), what);
   body.cage = read_cage(child(table, "cage"), body.model, what);
-  body.material = read_material(table, body.kind, what);
+  body.material = read_material(table, body.kind, body.role, what);
+  body.parts = read_parts(list(table, "parts"), body, what);
   const Node& pose = child(table, "pose");
   body.pose = {vector(pose, "position_m"), direction(pose, "axis", (what + ".pose.axis").c_str()),
                number(pose, "angle_deg"), text(pose, "anchor")};
   body.fixed = read_fixed(child(table, "fixed"));
+  if (body.kind == Kind::rigid && body.role != Role::obstacle &&
+      (body.fixed.walls || !body.fixed.boxes_m.empty()))
+    complain(child(table, "fixed"),
+             fmt::format(
+                 "{} is rigid and moves, so no node of it can be fixed; remove fixed, or make it deformable, "
+                 "or role = \"obstacle\"",
+                 what));
   body.color_srgb = read_body_color(table, body.role);
   check_inside(body, bounds, child(pose, "position_m"), what);
   body.where = child(pose, "position_m").where.text();

@@ -14,7 +14,10 @@
 namespace limber::scenes {
 
 enum class Role { robot, obstacle, free };
-enum class Kind { deformable, rigid };  // rigid things do not move; robots and free bodies are deformable
+enum class Kind {
+  deformable,
+  rigid
+};  // a rigid obstacle does not move; other rigid bodies move as one piece
 
 // A model file, brought to our axes (z up, x to the front) and to metres; its own origin is kept.
 struct FileModel {
@@ -63,6 +66,15 @@ struct MaterialSpec {
   double youngs_modulus_pa = 0, poisson_ratio = 0, density_kg_m3 = 0, damping_ratio = 0, friction = 0;
 };
 
+// What differs from the material in part of a body.
+struct PartSpec {
+  std::optional<int>
+      shell;  // the tets of this convex shell, as `limber info` and shells.obj number them; else
+  Box box_m;  // the tets with their middle in this box, in world coordinates at the start
+  std::optional<double> youngs_modulus_pa, density_kg_m3;  // one at least
+  std::string where;                                       // its place in the text, for complaints
+};
+
 struct Pose {
   Vec3 position_m = Vec3::Zero();  // where the anchor of the turned model goes
   Vec3 axis = Vec3::UnitZ();       // unit
@@ -82,7 +94,9 @@ struct BodySpec {
   Kind kind = Kind::deformable;
   Model model;
   CageSpec cage;
-  MaterialSpec material;  // of a rigid body only friction counts; the rest may be filled in
+  MaterialSpec
+      material;  // of a rigid body friction and, where it moves, density count; the rest is filled in
+  std::vector<PartSpec> parts;  // a later one rules where two meet
   Pose pose;
   FixedSpec fixed;
   Vec3 color_srgb = Vec3::Zero();  // 0 … 1

@@ -118,6 +118,73 @@ TEST_F(Program, RunFilmsASceneVerifyAgreesAndASecondRunChangesNothing) {
   }
 }
 
+// The same cube as one piece: every manipulation still makes sense, so a plan is found and keeps its
+// promises.
+TEST_F(Program, ARigidRobotIsPlannedAndVerified) {
+  const std::vector<std::string> sets{"--set", "bodies.robot.kind=rigid", "--set",
+                                      "bodies.robot.material={ density_kg_m3 = 100 }"};
+  std::vector<std::string> plan{"plan", scene(), "-o", out(), "--json"};
+  plan.insert(plan.end(), sets.begin(), sets.end());
+  const Result planned = limber_program(plan);
+  ASSERT_EQ(planned.code, exit_done) << planned.err;
+  EXPECT_LT(planned.json().at("largest_volume_change_percent").at("robot").get<double>(), 1e-3);
+  // It sets no time step of its own.
+  const Json soft =
+      limber_program({"plan", scene(), "-o", out("soft"), "--iterations", "1", "--json"}).json();
+  EXPECT_GE(planned.json().at("dt_s").get<double>(), soft.at("dt_s").get<double>());
+  const Result verified = limber_program({"verify", out()});
+  EXPECT_EQ(verified.code, exit_done) << verified.out;
+}
+
+// The shells that `info` lists are those that a scene may name as parts; together they have all tets.
+TEST_F(Program, PartsAreChosenByTheShellsThatInfoLists) {
+  std::ofstream(folder / "ell.obj")
+      << "v 0 0 0\nv 1 0 0\nv 1 0.3 0\nv 0.3 0.3 0\nv 0.3 1 0\nv 0 1 0\n"
+         "v 0 0 0.4\nv 1 0 0.4\nv 1 0.3 0.4\nv 0.3 0.3 0.4\nv 0.3 1 0.4\nv 0 1 0.4\n"
+         "f 4 3 2 1\nf 6 5 4 1\nf 7 8 9 10\nf 7 10 11 12\n"
+         "f 1 2 8 7\nf 2 3 9 8\nf 3 4 10 9\nf 4 5 11 10\nf 5 6 12 11\nf 6 1 7 12\n";
+  const std::string file =
+      scene(replaced("{ box = { size_m = [0.4, 2, 0.9] } }\ncage = { cells = [2, 4, 2] }",
+                     "{ file = \"ell.obj\" }\ncage = { tets = 200, shells = 2 }\n"
+                     "parts = [{ shell = 1, youngs_modulus_pa = 2e4 }]"));
+  const auto plan = [&](const std::string& name, const std::vector<std::string>& sets) {
+    std::vector<std::string> words{"plan",
+                                   file,
+                                   "-o",
+                                   out(name),
+                                   "--iterations",
+                                   "3",
+                                   "--json",
+                                   "--set",
+                                   "bodies.block.fixed=[]",
+                                   "--set",
+                                   "bodies.block.pose.position_m=[2, 0.5, 0.5]"};
+    for (const std::string& set : sets) words.insert(words.end(), {"--set", set});
+    return limber_program(words);
+  };
+  const Result stiff = plan("out", {});
+  ASSERT_EQ(stiff.code, exit_no_plan) << stiff.err;
+  const Json info = limber_program({"info", out("out") + "/bodies/block", "--json"}).json();
+  const int shells = info.at("shells").at("count");
+  ASSERT_EQ(shells, 2);
+  ASSERT_EQ(int(info.at("shell_list").size()), shells);
+  int tets = 0;
+  for (const Json& shell : info.at("shell_list")) tets += shell.at("tets").get<int>();
+  EXPECT_EQ(tets, info.at("cage").at("tets").get<int>());
+
+  const Result softer = plan("out", {"bodies.block.parts.0.youngs_modulus_pa=5e3"});
+  EXPECT_GT(softer.json().at("dt_s").get<double>(), 1.3 * stiff.json().at("dt_s").get<double>());
+
+  const Result none = plan("out", {"bodies.block.parts.0.shell=7"});
+  EXPECT_EQ(none.code, exit_bad_input);
+  EXPECT_NE(none.err.find(fmt::format("there is no shell 7; the body has {}", shells)), std::string::npos)
+      << none.err;
+  const Result empty =
+      plan("out", {"bodies.block.parts=[{ box_m = [[0, 0, 0], [1, 1, 1]], density_kg_m3 = 5 }]"});
+  EXPECT_EQ(empty.code, exit_bad_input);
+  EXPECT_NE(empty.err.find("no tet of the cage has its middle in that box"), std::string::npos) << empty.err;
+}
+
 TEST_F(Program, TheSameSeedGivesTheSameBytesForAnyThreadCount) {
   std::vector<Json> results;
   for (const char* threads : {"1", "2", "2"})

@@ -88,6 +88,25 @@ TEST(ReadScene, ReadsWhatIsWritten) {
   EXPECT_EQ(s.text, good);
 }
 
+TEST(ReadScene, ReadsPartsAndRigidRobots) {
+  const Scene s = read_scene(replaced(good, "role = \"obstacle\"\n",
+                                      "role = \"obstacle\"\nparts = [{ shell = 3, youngs_modulus_pa = 9e3 }, "
+                                      "{ box_m = [[2, 0, 0], [4, 1, 1]], "
+                                      "density_kg_m3 = 50 }]\n"),
+                             "s.toml",
+                             {"bodies.gate.parts.1.density_kg_m3=70", "bodies.robot.kind=rigid",
+                              "bodies.robot.material={ density_kg_m3 = 300 }"});
+  ASSERT_EQ(s.bodies[1].parts.size(), 2U);
+  const PartSpec &shell = s.bodies[1].parts[0], &box = s.bodies[1].parts[1];
+  EXPECT_EQ(shell.shell, 3);
+  EXPECT_EQ(shell.youngs_modulus_pa, 9e3);
+  EXPECT_FALSE(shell.density_kg_m3 || box.shell || box.youngs_modulus_pa);
+  EXPECT_EQ(box.box_m.upper, Vec3(4, 1, 1));
+  EXPECT_EQ(box.density_kg_m3, 70);
+  EXPECT_EQ(s.bodies[0].kind, Kind::rigid);
+  EXPECT_EQ(s.bodies[0].material.density_kg_m3, 300);
+}
+
 TEST(ReadScene, PresetDecidesOnlyWhatIsNotWritten) {
   EXPECT_EQ(read_scene(good, "").planner.max_duration_s, 1);
   EXPECT_EQ(read_scene(good, "", {"planner.preset=fast"}).planner.max_duration_s, 3);
@@ -144,7 +163,26 @@ TEST(ReadScene, ComplainsWithLineAndColumn) {
       {"role = \"obstacle\"", "role = \"robot\"", "\"robot\"\nmodel = { plate", "two robots, robot and gate"},
       {"role = \"robot\"", "role = \"free\"", "[[bodies]]", "there is no robot"},
       {"role = \"robot\"", "role = \"robt\"", "\"robt\"", "did you mean \"robot\"?"},
-      {"role = \"robot\"", "role = \"robot\"\nkind = \"rigid\"", "\"rigid\"", "rigid bodies do not move"},
+      {"role = \"robot\"", "role = \"robot\"\nkind = \"rigid\"", "role", "no complaint"},
+      {"role = \"obstacle\"", "role = \"free\"\nkind = \"rigid\"", "[\"walls\"",
+       "bodies.gate is rigid and moves, so no node of it can be fixed"},
+      {"material = { youngs_modulus_pa = 5e3, density_kg_m3 = 100 }\n", "kind = \"rigid\"\n", "[[bodies]]",
+       "bodies.robot is rigid, moves and lacks a material"},
+      {"pose = { position_m = [1, 1.5, 1.5] }\n",
+       "pose = { position_m = [1, 1.5, 1.5] }\nparts = [{ shell = 1, box_m = [[0, 0, 0], [1, 1, 1]] }]\n",
+       "{ shell", "both shell and box_m"},
+      {"pose = { position_m = [1, 1.5, 1.5] }\n",
+       "pose = { position_m = [1, 1.5, 1.5] }\nparts = [{ density_kg_m3 = 7 }]\n", "{ density_kg_m3 = 7",
+       "neither shell nor box_m"},
+      {"pose = { position_m = [1, 1.5, 1.5] }\n",
+       "pose = { position_m = [1, 1.5, 1.5] }\nparts = [{ shell = 1 }]\n", "{ shell", "changes nothing"},
+      {"pose = { position_m = [1, 1.5, 1.5] }\n",
+       "pose = { position_m = [1, 1.5, 1.5] }\nparts = [{ shell = -1, youngs_modulus_pa = 3 }]\n", "-1",
+       "it must be ≥ 0 and ≤ 999"},
+      {"pose = { position_m = [1, 1.5, 1.5] }\n",
+       "pose = { position_m = [1, 1.5, 1.5] }\nkind = \"rigid\"\nparts = [{ shell = 1, youngs_modulus_pa = 3 "
+       "}]\n",
+       "3 }]", "bodies.robot is rigid; remove it"},
       {"material = { youngs_modulus_pa = 5e3, density_kg_m3 = 100 }\n", "", "[[bodies]]", "lacks a material"},
       {"youngs_modulus_pa = 5e3, ", "", "{ density", "bodies.robot.material lacks \"youngs_modulus_pa\""},
       {"radius_m = 0.25\n", "", "[goal]", "goal lacks \"radius_m\""},
@@ -283,6 +321,7 @@ std::string another_value(const Key& key) {
       {"bodies[].model.sphere.diameter_m", "0.8"},
       {"bodies[].model.sphere.triangle_m", "0.2"},
       {"bodies[].fixed", "[]"},
+      {"bodies[].parts[].box_m", "[[0, 0, 0], [1, 2, 2]]"},
       {"bodies[].fixed[].box_m", "[[2, 0, 0], [4, 2, 2]]"},
       {"bodies[].cage.cells", "[2, 2, 2]"},
       {"bodies[].model.up", "\"+y\""},
@@ -342,12 +381,17 @@ TEST(Keys, EveryKeyChangesTheScene) {
         key.path == "bodies[].cage.shells")
       sets = {tets_robot};
     if (key.path == "bodies[].pose.axis") sets = {"bodies.robot.pose.angle_deg=90"};
+    if (key.parent() == "bodies[].parts[]")
+      sets = {key.name() == "box_m"
+                  ? "bodies.robot.parts=[{ box_m = [[0, 0, 0], [1, 1, 1]], density_kg_m3 = 1 }]"
+                  : "bodies.robot.parts=[{ shell = 0, density_kg_m3 = 1 }]"};
     std::string path = replaced(std::string(key.path) + " ", " ", "");
     const std::string body = plate || fixed || key.path == "bodies[].kind" || key.path == "bodies[].role"
                                  ? "bodies.gate"
                                  : "bodies.robot";
     if (path.starts_with("bodies[]")) path = replaced(path, "bodies[]", body);
     if (fixed && path.ends_with(".box_m")) path = replaced(path, "[]", ".1");
+    if (path.find("parts[]") != path.npos) path = replaced(path, "parts[]", "parts.0");
     if (path.find("keyframes[]") != path.npos) path = replaced(path, "keyframes[]", "keyframes.0");
     const std::string before = all_of(read_scene(good, "s", sets));
     sets.push_back(path + "=" + another_value(key));
@@ -418,6 +462,9 @@ std::string all_of(const Scene& s) {
                      body.pose.angle_deg, body.pose.anchor, v(body.color_srgb));
     t += fmt::format(" {}", body.fixed.walls);
     for (const Box& box : body.fixed.boxes_m) t += b(box);
+    for (const PartSpec& part : body.parts)
+      t += fmt::format(" {} {} {} {}", part.shell.value_or(-1), b(part.box_m),
+                       part.youngs_modulus_pa.value_or(-1), part.density_kg_m3.value_or(-1));
     t += "\n";
   }
   const PlannerSpec& p = s.planner;

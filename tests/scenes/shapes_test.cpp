@@ -247,6 +247,8 @@ TEST(Models, FixedNodesLieWhereTheSceneSays) {
   body.fixed = {};
   body.kind = Kind::rigid;
   EXPECT_EQ(fixed_nodes(body, bounds, cage).size(), std::size_t(cage.rows()));
+  body.role = Role::free;  // moves
+  EXPECT_TRUE(fixed_nodes(body, bounds, cage).empty());
 }
 
 }  // namespace
