@@ -1,7 +1,10 @@
 #include "fem/observe.h"
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
+#include <map>
 
+#include "fem/detail/contact.h"
 #include "fem/detail/overlap.h"
 #include "fem/reference.h"
 
@@ -56,11 +59,56 @@ double elastic_energy_j(const World& world, const State& state) {
   return elastic_energy_j(world, reference_state(state));
 }
 
+double elastic_energy_j(const World& world, const State& state, int body) {
+  return elastic_energy_j(world, reference_state(state), body);
+}
+
 double kinetic_energy_j(const World& world, const State& state) {
   double energy = 0;
-  for (int n = 0; n < world.moving_nodes; ++n)
-    energy += 0.5 * world.tables64.node_mass[n] * velocity(state, n).squaredNorm();
+  for (int b = 0; b < int(world.bodies.size()); ++b) energy += kinetic_energy_j(world, state, b);
   return energy;
+}
+
+double kinetic_energy_j(const World& world, const State& state, int index) {
+  const Body& body = world.bodies.at(std::size_t(index));
+  double energy = 0;
+  for (int n = 0; n < body.node_count() && body.moving; ++n)
+    energy += 0.5 * body.node_mass_kg[n] * velocity(state, body.first_node + n).squaredNorm();
+  return energy;
+}
+
+Strains strains(const World& world, const State& state, int index) {
+  const Body& body = world.bodies.at(std::size_t(index));
+  const Points now = body_positions(world, state, index);
+  const auto edges_of = [&](const Points& p, int tet) {
+    Eigen::Matrix3d edges;
+    for (int i = 0; i < 3; ++i)
+      edges.col(i) = p.row(body.cage.tets(tet, i + 1)) - p.row(body.cage.tets(tet, 0));
+    return edges;
+  };
+  Strains result;
+  for (int t = 0; t < body.cage.tets.rows(); ++t) {
+    const Eigen::Matrix3d gradient = edges_of(now, t) * edges_of(body.cage.positions, t).inverse();
+    const Eigen::Matrix3d green = 0.5 * (gradient.transpose() * gradient - Eigen::Matrix3d::Identity());
+    const Eigen::Matrix3d deviator = green - green.trace() / 3 * Eigen::Matrix3d::Identity();
+    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(green, Eigen::EigenvaluesOnly);
+    result.largest.push_back(solver.eigenvalues().cwiseAbs().maxCoeff());
+    result.von_mises.push_back(std::sqrt(2.0 / 3 * deviator.squaredNorm()));
+  }
+  return result;
+}
+
+std::vector<double> volume_changes(const World& world, const State& state, int index) {
+  const TetMesh& rest = world.bodies.at(std::size_t(index)).cage;
+  const Points now = body_positions(world, state, index);
+  const auto volume_of = [&](const Points& p, int t) {
+    const auto q = rest.tets.row(t);
+    return signed_volume(p.row(q[0]), p.row(q[1]), p.row(q[2]), p.row(q[3]));
+  };
+  std::vector<double> changes;
+  for (int t = 0; t < rest.tets.rows(); ++t)
+    changes.push_back(volume_of(now, t) / volume_of(rest.positions, t) - 1);
+  return changes;
 }
 
 int inverted_tets(const World& world, const State& state) {
@@ -98,6 +146,57 @@ Penetration deepest_penetration(const World& world, const State& state) {
     }
   }
   return deepest;
+}
+
+std::vector<ContactForce> contact_forces(const World& world, const State& state) {
+  std::vector<float> x = world.tables.rest_positions, v(x.size(), 0.f), f(x.size(), 0.f);
+  std::copy(state.positions.begin(), state.positions.end(), x.begin());
+  std::copy(state.velocities.begin(), state.velocities.end(), v.begin());
+  const std::size_t bodies = world.bodies.size();
+  std::vector<float> lower, upper, travel(bodies, 0.f);
+  for (int b = 0; b < int(bodies); ++b) {
+    const Box box = bounding_box(body_positions(world, state, b));
+    for (int c = 0; c < 3; ++c) lower.push_back(float(box.lower[c])), upper.push_back(float(box.upper[c]));
+  }
+  constexpr detail::Layout rows{3, 1};
+  const detail::LaneView<float> view{x.data(), v.data(),     f.data(),     rows,         rows,
+                                     1,        lower.data(), upper.data(), travel.data()};
+  std::vector<detail::Exerted<float>> exerted;
+  detail::Contacts<float> contacts(world, detail::kernels<float>(detail::best_isa(), 1), 1);
+  contacts.tell(&exerted);
+  contacts.add_forces(0, view);
+
+  const auto body_of = [&](int node) {
+    for (int b = 0;; ++b)
+      if (node < world.topology.bodies[std::size_t(b)].last_node &&
+          node >= world.topology.bodies[std::size_t(b)].first_node)
+        return b;
+  };
+  std::vector<ContactForce> forces;
+  for (const auto& e : exerted) {
+    ContactForce force{body_of(e.node[0]), e.against < 0 ? -1 : body_of(e.against), Vec3::Zero(),
+                       Vec3::Zero(), double(e.depth)};
+    for (int c = 0; c < 3; ++c) {
+      force.force_n[c] = double(e.force[c]);
+      for (int i = 0; i < 2; ++i) force.place_m[c] += double(e.share[i] * x[3 * e.node[i] + c]);
+    }
+    forces.push_back(force);
+  }
+  return forces;
+}
+
+std::vector<PairForce> pair_forces(const std::vector<ContactForce>& forces) {
+  std::map<std::pair<int, int>, PairForce> pairs;
+  for (const ContactForce& f : forces) {
+    const bool turned = f.other >= 0 && f.other < f.body;
+    const int body = turned ? f.other : f.body, other = turned ? f.body : f.other;
+    PairForce& pair = pairs.try_emplace({body, other}, PairForce{body, other, Vec3::Zero(), 0}).first->second;
+    pair.force_n += turned ? Vec3(-f.force_n) : f.force_n;
+    ++pair.contacts;
+  }
+  std::vector<PairForce> sums;
+  for (const auto& [key, pair] : pairs) sums.push_back(pair);
+  return sums;
 }
 
 }  // namespace limber::fem

@@ -17,7 +17,19 @@ double mean_speed_m_s(const World&, const State&,
                       int body);  // mass-weighted mean of |v|; 0 for a static body
 
 double elastic_energy_j(const World&, const State&);
+double elastic_energy_j(const World&, const State&, int body);  // 0 unless it is deformable
 double kinetic_energy_j(const World&, const State&);
+double kinetic_energy_j(const World&, const State&, int body);
+
+// Of each tet of a body, (T): Green's strain G = (FᵀF − 1)/2, F = E E0⁻¹ from the edges E. `largest` is its
+// largest absolute principal value; `von_mises` = √(⅔ G′:G′), G′ its deviator, so that a small stretch e at
+// constant volume has von_mises e. (Bonet and Wood, Nonlinear Continuum Mechanics for Finite Element
+// Analysis.)
+struct Strains {
+  std::vector<double> largest, von_mises;
+};
+Strains strains(const World&, const State&, int body);
+std::vector<double> volume_changes(const World&, const State&, int body);  // (T) V/V0 − 1 of each tet
 
 int inverted_tets(const World&, const State&);  // of all moving bodies: volume ≤ 0
 
@@ -29,5 +41,22 @@ struct Penetration {
   Vec3 place_m = Vec3::Zero();
 };
 Penetration deepest_penetration(const World&, const State&);
+
+// The forces of contact and walls in the step that starts here, by the code that steps and in its float32:
+// they sum to what moves the bodies. Ordered by pair, then as contact finds them.
+struct ContactForce {
+  int body, other;  // whose point is inside whom; other −1: a wall
+  Vec3 place_m;     // of the point
+  Vec3 force_n;     // on `body`; −force_n on `other`
+  double depth_m;
+};
+std::vector<ContactForce> contact_forces(const World&, const State&);
+
+struct PairForce {
+  int body, other;  // body < other, or other −1: the walls
+  Vec3 force_n;     // on `body`, the sum
+  int contacts;
+};
+std::vector<PairForce> pair_forces(const std::vector<ContactForce>&);  // by (body, other), each pair once
 
 }  // namespace limber::fem

@@ -24,6 +24,16 @@ std::vector<double> elastic_forces(const World& world, const ReferenceState& sta
 }
 
 double elastic_energy_j(const World& world, const ReferenceState& state) {
+  double energy = 0;
+  for (int b = 0; b < int(world.bodies.size()); ++b) energy += elastic_energy_j(world, state, b);
+  return energy;
+}
+
+double elastic_energy_j(const World& world, const ReferenceState& state, int index) {
+  const Body& body = world.bodies.at(std::size_t(index));
+  const auto is_own = [&](int node) {
+    return node >= body.first_node && node < body.first_node + body.node_count();
+  };
   const auto& elements = world.tables64.elements;
   const auto at = [](const std::vector<double>& x, int n) { return Eigen::Map<const Vec3>(&x[3 * n]); };
   const auto volume6 = [&](const std::vector<double>& x, const int* node) {
@@ -36,11 +46,14 @@ double elastic_energy_j(const World& world, const ReferenceState& state) {
   const auto& x = state.positions;
   double energy = 0;
   for (const auto& [node, law] : elements.springs.elements) {
+    if (!is_own(node[0])) continue;
     const double stretch = (at(x, node[1]) - at(x, node[0])).norm() - law.rest_length;
     energy += 0.5 * law.stiffness * stretch * stretch;
   }
-  for (const auto& [node, law] : elements.volumes.elements) energy += of_volume(volume6(x, node), law);
+  for (const auto& [node, law] : elements.volumes.elements)
+    if (is_own(node[0])) energy += of_volume(volume6(x, node), law);
   for (const auto& [node, law] : elements.neo_hookeans.elements) {
+    if (!is_own(node[0])) continue;
     // At rest its two parts hold each other in balance; only what is above that counts.
     const double at_rest = of_volume(volume6(world.tables64.rest_positions, node), law.volume);
     Eigen::Matrix3d edges, metric;

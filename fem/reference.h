@@ -21,5 +21,6 @@ void advance(const World&, const Control&, ReferenceState&);
 // they are at rest.
 std::vector<double> elastic_forces(const World&, const ReferenceState&);
 double elastic_energy_j(const World&, const ReferenceState&);
+double elastic_energy_j(const World&, const ReferenceState&, int body);
 
 }  // namespace limber::fem

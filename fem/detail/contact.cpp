@@ -516,6 +516,9 @@ void Contacts<Real>::respond(const LaneView<Real>& view, Real friction, const To
   for (int i = 0; i < 6; ++i)
     if (tables_.inverse_mass[node[i]] > 0)
       for (int c = 0; c < 3; ++c) view.f[view.force.at(node[i], c)] += share[i] * force[c];
+  if (told_)
+    told_->push_back(
+        {{node[0], node[1]}, {share[0], share[1]}, corner[0], touch.depth, {force[0], force[1], force[2]}});
 }
 
 template <class Real>
@@ -538,6 +541,7 @@ void Contacts<Real>::add_wall_forces(const LaneView<Real>& view, int body) const
                            tables_.pair_friction[body * bodies_ + body], force))
           continue;
         for (int c = 0; c < 3; ++c) view.f[view.force.at(n, c)] += force[c];
+        if (told_) told_->push_back({{n, n}, {1, 0}, -1, depth, {force[0], force[1], force[2]}});
       }
     }
 }

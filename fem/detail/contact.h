@@ -42,6 +42,15 @@ struct Touch {
   bool known;         // depth and direction are set
 };
 
+// A force that a contact or a wall gave, for those who ask.
+template <class Real>
+struct Exerted {
+  int node[2];    // of the point it acts on, with
+  Real share[2];  // these shares
+  int against;    // a node of the other body; −1: a wall
+  Real depth, force[3];
+};
+
 template <class Real>
 class Contacts {
  public:
@@ -49,6 +58,8 @@ class Contacts {
   void forget(int lane);  // the lane holds another state now
   // Adds the forces of all contacts and walls to view.f.
   void add_forces(int lane, const LaneView<Real>& view);
+  // From now on add_forces also appends to this list, unless null.
+  void tell(std::vector<Exerted<Real>>* list) { told_ = list; }
   // The touches of bodies a and b, a < b: points of a in b, then those of b in a, each ascending. For tests
   // and observables; valid until the next call.
   const std::vector<Touch<Real>>& find(int lane, const LaneView<Real>& view, int a, int b);
@@ -112,6 +123,7 @@ class Contacts {
   const Tables<Real>& tables_;
   const Kernels<Real>& kernels_;
   int bodies_;
+  std::vector<Exerted<Real>>* told_ = nullptr;
   Real step_;  // the step from which stiffness follows
   std::vector<std::pair<int, int>> pairs_;
   std::vector<List> lists_;  // [lane × pairs + pair]

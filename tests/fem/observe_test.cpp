@@ -1,0 +1,145 @@
+// What observables say, against what moves the bodies and against closed forms.
+#include "fem/observe.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "core/random.h"
+#include "fem/batch.h"
+#include "tests/fem/worlds.h"
+
+namespace limber::fem {
+namespace {
+
+using testing::alone;
+using testing::ball;
+using testing::cube;
+
+// x ← A x for all nodes of a body alone in its world.
+State deformed(const World& world, const Eigen::Matrix3d& map) {
+  State state = rest_state(world);
+  for (int n = 0; n < world.moving_nodes; ++n) {
+    Eigen::Map<Vec3f> p(&state.positions[3 * n]);
+    p = (map * p.cast<double>()).cast<float>();
+  }
+  return state;
+}
+
+// A rotation strains nothing; a stretch s along an axis has principal Green strain (s² − 1)/2, whatever turn
+// follows; a small shear γ has von Mises strain γ/√3; a stretch at constant volume its own size.
+TEST(Observe, StrainsOfAffineMapsAreThoseOfTheBook) {
+  const World world = build_world(alone({"ball", ball({0, 0, 0}, 0.5, 3), {}, {}}));
+  const Eigen::Matrix3d turn = Eigen::AngleAxisd(1.2, Vec3(1, 2, -1).normalized()).toRotationMatrix();
+  const auto each = [&](const Eigen::Matrix3d& map, const auto& check) {
+    const State state = deformed(world, turn * map);
+    const Strains s = strains(world, state, 0);
+    ASSERT_EQ(int(s.largest.size()), world.bodies[0].cage.tets.rows());
+    const std::vector<double> changes = volume_changes(world, state, 0);
+    for (std::size_t t = 0; t < s.largest.size(); ++t) {
+      check(s.largest[t], s.von_mises[t]);
+      EXPECT_NEAR(changes[t], map.determinant() - 1, 1e-5);
+    }
+  };
+  each(Eigen::Matrix3d::Identity(), [](double largest, double von_mises) {
+    EXPECT_LT(largest, 2e-6);
+    EXPECT_LT(von_mises, 2e-6);
+  });
+  each(Vec3(1.3, 1, 1).asDiagonal(), [](double largest, double von_mises) {
+    EXPECT_NEAR(largest, (1.3 * 1.3 - 1) / 2, 1e-5);
+    EXPECT_NEAR(von_mises, 2.0 / 3 * (1.3 * 1.3 - 1) / 2, 1e-5);
+  });
+  each(Vec3(0.5, 1, 1).asDiagonal(), [](double largest, double) { EXPECT_NEAR(largest, 0.375, 1e-5); });
+  Eigen::Matrix3d shear = Eigen::Matrix3d::Identity();
+  shear(0, 1) = 0.01;
+  each(shear, [](double largest, double von_mises) {
+    EXPECT_NEAR(von_mises, 0.01 / std::sqrt(3.0), 1e-5);
+    EXPECT_NEAR(largest, 0.005, 3e-5);
+  });
+  const double e = 0.01;
+  each(Vec3(1 + e, 1 / std::sqrt(1 + e), 1 / std::sqrt(1 + e)).asDiagonal(),
+       [&](double, double von_mises) { EXPECT_NEAR(von_mises, e, 1e-4); });
+}
+
+// Two soft cubes, a rigid one and a static block pressed together in a corner of the room, under gravity.
+World pile() {
+  Material material;
+  material.friction = 0.4;
+  WorldSpec spec;
+  spec.bodies = {{"left", cube({-0.52, 0, 0.5}, 1, 3), material, {}},
+                 {"right", cube({0.52, 0.1, 0.5}, 1, 2), material, {}},
+                 {"top", cube({0, 0, 1.33}, 0.6, 2), material, {}, BodyKind::rigid},
+                 {"block", cube({1.45, 0, 0.5}, 0.8, 2), material, {}, BodyKind::immovable}};
+  spec.bounds_m = {Vec3(-1.03, -2, 0), Vec3(3, 2, 4)};
+  spec.gravity_m_s2 = {4, 0.5, -10};
+  return build_world(spec);
+}
+
+// In one step a body's momentum gains h (contact + walls + gravity): the forces told are those that act, and
+// nothing else does.
+TEST(Observe, ContactForcesAreWhatMovesTheBodies) {
+  const World world = pile();
+  Control coast;
+  coast.steps = 40;
+  State state = rest_state(world);
+  int contacts = 0, walls = 0, between_moving = 0;
+  for (int look = 0; look < 20; ++look) {
+    SCOPED_TRACE(look);
+    state = propagate(world, state, coast).end;
+    Control one;
+    one.steps = 1;
+    const State next = propagate(world, state, one).end;
+    const std::vector<ContactForce> forces = contact_forces(world, state);
+    std::vector<Vec3> sum(world.bodies.size(), Vec3::Zero());
+    for (const PairForce& pair : pair_forces(forces)) {
+      EXPECT_TRUE(pair.other < 0 || pair.body < pair.other);
+      sum[std::size_t(pair.body)] += pair.force_n;
+      if (pair.other >= 0) sum[std::size_t(pair.other)] -= pair.force_n;
+      contacts += pair.contacts, walls += pair.other<0, between_moving += pair.other> 0 && pair.other < 3;
+    }
+    for (std::size_t b = 0; b < 3; ++b) {
+      const Body& body = world.bodies[b];
+      Vec3 gained = Vec3::Zero();
+      for (int n = 0; n < body.node_count(); ++n)
+        for (int c = 0; c < 3; ++c) {
+          const std::size_t k = std::size_t(3 * (body.first_node + n) + c);
+          gained[c] += body.node_mass_kg[n] * (double(next.velocities[k]) - double(state.velocities[k]));
+        }
+      const Vec3 expected = world.dt_s * (sum[b] + body.mass_kg * world.gravity_m_s2);
+      EXPECT_LT((gained - expected).norm(), 1e-5 * body.mass_kg) << body.name;  // m/s, of about 1
+    }
+    for (const ContactForce& f : forces) {
+      EXPECT_GT(f.depth_m, 0);
+      EXPECT_LT((f.place_m - Vec3(0, 0, 1)).norm(), 4);
+    }
+  }
+  EXPECT_GT(contacts, 100);
+  EXPECT_GT(walls, 10);
+  EXPECT_GT(between_moving, 10);
+}
+
+// The bodies' energies are those of the world, each that of the body alone.
+TEST(Observe, EnergiesOfBodiesSumToTheWorlds) {
+  const World world = pile();
+  Control coast;
+  coast.steps = 300;
+  const State state = propagate(world, rest_state(world), coast).end;
+  double elastic = 0, kinetic = 0;
+  for (int b = 0; b < 4; ++b)
+    elastic += elastic_energy_j(world, state, b), kinetic += kinetic_energy_j(world, state, b);
+  EXPECT_NEAR(elastic, elastic_energy_j(world, state), 1e-12 * elastic);
+  EXPECT_NEAR(kinetic, kinetic_energy_j(world, state), 1e-12 * kinetic);
+  EXPECT_GT(elastic_energy_j(world, state, 0), 0);
+  EXPECT_EQ(elastic_energy_j(world, state, 2), 0);  // rigid
+  EXPECT_EQ(kinetic_energy_j(world, state, 3), 0);  // static
+
+  const World single =
+      build_world(alone({"left", cube({-0.52, 0, 0.5}, 1, 3), world.bodies[0].material, {}}));
+  State part = rest_state(single);
+  const std::size_t first = std::size_t(3 * world.bodies[0].first_node);
+  std::copy_n(state.positions.begin() + std::ptrdiff_t(first), part.positions.size(), part.positions.begin());
+  EXPECT_NEAR(elastic_energy_j(world, state, 0), elastic_energy_j(single, part), 1e-9 * elastic);
+}
+
+}  // namespace
+}  // namespace limber::fem
