@@ -59,13 +59,14 @@ Eigen::Matrix3d metres_from_model(const BodySpec& body, const Points& positions,
   return model->height_m ? to_height(turn, *model->height_m) : Eigen::Matrix3d(turn * model->scale);
 }
 
-Points corners(const Vec3& size_m) {
+Points corners(const Box& box) {
   Points made(8, 3);
   for (int i = 0; i < 8; ++i)
-    made.row(i) << (i & 1 ? 0.5 : -0.5) * size_m.x(), (i & 2 ? 0.5 : -0.5) * size_m.y(),
-        (i & 4 ? 0.5 : -0.5) * size_m.z();
+    for (int a = 0; a < 3; ++a) made(i, a) = (i >> a & 1 ? box.upper : box.lower)[a];
   return made;
 }
+
+Box centered(const Vec3& size_m) { return {-size_m / 2, size_m / 2}; }
 
 const Vec3* box_size(const Model& model) {
   if (const auto* box = std::get_if<BoxModel>(&model)) return &box->size_m;
@@ -88,14 +89,17 @@ std::optional<SurfaceMesh> made_surface(const BodySpec& body) {
                                        [](const MadeModel&) { return std::optional(make_bunny()); },
                                        [](const BoxModel& m) { return std::optional(make_box(m)); },
                                        [](const PlateModel& m) { return std::optional(make_plate(m)); },
-                                       [](const SphereModel& m) { return std::optional(make_sphere(m)); }},
+                                       [](const SphereModel& m) { return std::optional(make_sphere(m)); },
+                                       [](const BlocksModel& m) { return std::optional(make_blocks(m)); }},
                             body.model);
-  if (body.cage.tets == 0) surface->positions *= 1 - 1e-6;
+  if (body.cage.tets == 0 && body.cage.cell_m == 0) surface->positions *= 1 - 1e-6;
   return surface;
 }
 
 std::optional<TetMesh> made_cage(const BodySpec& body) {
   if (body.cage.tets > 0) return std::nullopt;
+  if (const auto* blocks = std::get_if<BlocksModel>(&body.model))
+    return make_blocks_cage(*blocks, body.cage.cell_m);
   const Vec3* size_m = box_size(body.model);
   LIMBER_CHECK(size_m, body.name);
   return make_box_cage(*size_m, body.cage.cells);
@@ -112,12 +116,17 @@ Eigen::Affine3d world_from_model(const BodySpec& body, const Points& model_posit
 
 std::optional<Box> start_box(const BodySpec& body) {
   Box bounds;
-  if (const Vec3* size_m = box_size(body.model))
-    bounds = turned_bounds(pose_turn(body.pose), corners(*size_m));
-  else if (const auto* sphere = std::get_if<SphereModel>(&body.model))
-    bounds = {Vec3::Constant(-sphere->diameter_m / 2), Vec3::Constant(sphere->diameter_m / 2)};
-  else
+  if (const Vec3* size_m = box_size(body.model)) {
+    bounds = turned_bounds(pose_turn(body.pose), corners(centered(*size_m)));
+  } else if (const auto* sphere = std::get_if<SphereModel>(&body.model)) {
+    bounds = centered(Vec3::Constant(sphere->diameter_m));
+  } else if (const auto* blocks = std::get_if<BlocksModel>(&body.model)) {
+    Box solids;
+    for (const Box& solid : blocks->solids) solids.include(solid);
+    bounds = turned_bounds(pose_turn(body.pose), corners(solids));
+  } else {
     return std::nullopt;
+  }
   const Vec3 shift = body.pose.position_m - anchor_of(body.pose.anchor, bounds);
   return Box{bounds.lower + shift, bounds.upper + shift};
 }

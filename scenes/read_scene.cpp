@@ -6,6 +6,7 @@
 #include "scenes/detail/schema.h"
 #include "scenes/models.h"
 #include "scenes/scene.h"
+#include "scenes/shapes.h"
 
 namespace limber::scenes {
 
@@ -49,10 +50,8 @@ Eigen::Vector2d vector2(const Node& table, std::string_view key) {
   const Array& a = list(table, key);
   return {as_number(a[0]), as_number(a[1])};
 }
-Box box(const Node& table, std::string_view key) {
-  const Array& corners = list(table, key);
-  return {as_vector(corners[0]), as_vector(corners[1])};
-}
+Box as_box(const Node& node) { return {as_vector((*node.array())[0]), as_vector((*node.array())[1])}; }
+Box box(const Node& table, std::string_view key) { return as_box(child(table, key)); }
 Vec3 as_color(const std::string& rrggbb) {
   const auto channel = [&](std::size_t at) { return std::stoi(rrggbb.substr(at, 2), nullptr, 16) / 255.0; };
   return {channel(1), channel(3), channel(5)};
@@ -193,6 +192,34 @@ PlateModel read_plate(const Node& table, const std::string& what) {
   return model;
 }
 
+std::vector<Box> read_boxes(const Node& table, std::string_view key) {
+  std::vector<Box> boxes;
+  for (const Node& node : list(table, key)) boxes.push_back(as_box(node));
+  return boxes;
+}
+
+BlocksModel read_blocks(const Node& table, const std::string& what) {
+  constexpr std::size_t most_boxes = 32;
+  BlocksModel model{read_boxes(table, "solids"), read_boxes(table, "holes"), number(table, "bevel_m"), 0};
+  if (model.solids.empty() || model.solids.size() + model.holes.size() > most_boxes)
+    complain(child(table, "solids"),
+             fmt::format("{} has {} solids and {} holes; write one solid at least, and at "
+                         "most {} boxes in all",
+                         what, model.solids.size(), model.holes.size(), most_boxes));
+  if (const std::string fault = fault_of(model); !fault.empty())
+    complain(table, fmt::format("{}: {}; move the boxes until it is one body", what, fault));
+  Box bounds;
+  for (const Box& solid : model.solids) bounds.include(solid);
+  model.triangle_m = triangle_edge(table, bounds.size());
+  check_fineness(table, bounds.size(), model.triangle_m);
+  if (const double cells = (bounds.size() / model.triangle_m).prod(), most = 3e7; cells > most)
+    complain(
+        child(table, "triangle_m"),
+        fmt::format("triangle_m = {} would make a grid of {:.0f} cells, more than {:.0f}; write a larger one",
+                    model.triangle_m, cells, most));
+  return model;
+}
+
 FileModel read_file_model(const Node& table, const std::string& what) {
   FileModel model;
   model.file = text(table, "file");
@@ -214,13 +241,12 @@ FileModel read_file_model(const Node& table, const std::string& what) {
 Model read_model(const Node& table, const std::string& body) {
   const std::string what = body + ".model";
   const auto given = [&](std::string_view key) { return table.find(key) != nullptr; };
-  const int kinds =
-      given("file") + given("box") + given("plate") + given("sphere") + (given("made") && !given("file"));
+  const int kinds = given("file") + given("box") + given("plate") + given("blocks") + given("sphere") +
+                    (given("made") && !given("file"));
   if (kinds != 1)
-    complain(table,
-             fmt::format(
-                 "{} has {} of file, made, box, plate, sphere; give exactly one (made may stand beside file)",
-                 what, kinds == 0 ? "none" : "more than one"));
+    complain(table, fmt::format("{} has {} of file, made, box, plate, blocks, sphere; give exactly one (made "
+                                "may stand beside file)",
+                                what, kinds == 0 ? "none" : "more than one"));
   for (const char* key : {"scale", "up", "front"})
     if (given(key) && !given("file"))
       complain(*table.find(key), fmt::format("{}.{} goes with file only; remove it", what, key));
@@ -230,6 +256,7 @@ Model read_model(const Node& table, const std::string& body) {
   if (given("made")) return MadeModel{text(table, "made"), maybe_number(table, "height_m").value_or(1)};
   if (given("box")) return read_box(child(table, "box"), what + ".box");
   if (given("plate")) return read_plate(child(table, "plate"), what + ".plate");
+  if (given("blocks")) return read_blocks(child(table, "blocks"), what + ".blocks");
   const Node& sphere = child(table, "sphere");
   const double d = number(sphere, "diameter_m");
   const SphereModel model{d, triangle_edge(sphere, Vec3::Constant(d))};
@@ -237,16 +264,33 @@ Model read_model(const Node& table, const std::string& body) {
   return model;
 }
 
+void check_cell_size(const Node& node, double cell_m, const Model& model, const std::string& body) {
+  const auto* blocks = std::get_if<BlocksModel>(&model);
+  if (!blocks)
+    complain(node, fmt::format("{}.cage.cell_m goes with model.blocks only; write tets = N instead", body));
+  double cells = 0;
+  for (const Box& solid : blocks->solids) cells += (solid.size() / cell_m).array().ceil().prod();
+  if (const double most = 40'000; cells > most)
+    complain(node,
+             fmt::format("{}.cage.cell_m makes {:.0f} cells; write a larger one, for at most {:.0f} cells",
+                         body, cells, most));
+}
+
 CageSpec read_cage(const Node& table, const Model& model, const std::string& body) {
   CageSpec cage;
   cage.mode = text(table, "mode");
   cage.shells = integer(table, "shells");
-  const Node* cells = table.find("cells");
-  if ((cells != nullptr) == (table.find("tets") != nullptr))
-    complain(table, fmt::format("{}.cage has {}; give either tets = N or cells = [nx, ny, nz]", body,
-                                cells ? "both tets and cells" : "neither tets nor cells"));
-  if (!cells) {
+  const Node *cells = table.find("cells"), *cell_m = table.find("cell_m"), *tets = table.find("tets");
+  if ((cells != nullptr) + (cell_m != nullptr) + (tets != nullptr) != 1)
+    complain(table, fmt::format("{}.cage has {} of tets, cells and cell_m; give exactly one, as tets = 300",
+                                body, cells || cell_m || tets ? "more than one" : "none"));
+  if (tets) {
     cage.tets = integer(table, "tets");
+    return cage;
+  }
+  if (cell_m) {
+    cage.cell_m = number(table, "cell_m");
+    check_cell_size(*cell_m, cage.cell_m, model, body);
     return cage;
   }
   const auto* plate = std::get_if<PlateModel>(&model);
@@ -255,9 +299,9 @@ CageSpec read_cage(const Node& table, const Model& model, const std::string& bod
         *cells,
         fmt::format("{}.cage.cells needs a box, or a plate without a hole; write tets = N instead", body));
   cage.cells = as_vector(*cells).cast<int>();
-  if (const int tets = 5 * cage.cells.prod(), most = 200'000; tets > most)
+  if (const int made = 5 * cage.cells.prod(), most = 200'000; made > most)
     complain(*cells,
-             fmt::format("{}.cage.cells make {} tets; write fewer cells, at most {} tets", body, tets, most));
+             fmt::format("{}.cage.cells make {} tets; write fewer cells, at most {} tets", body, made, most));
   return cage;
 }
 

@@ -51,14 +51,20 @@ struct SphereModel {  // its origin is its centre
   double diameter_m = 1;
   double triangle_m = 0;
 };
-using Model = std::variant<FileModel, MadeModel, BoxModel, PlateModel, SphereModel>;
+struct BlocksModel {  // all that is in a solid and in no hole; its origin is that of these boxes' coordinates
+  std::vector<Box> solids, holes;
+  double bevel_m = 0;
+  double triangle_m = 0;
+};
+using Model = std::variant<FileModel, MadeModel, BoxModel, PlateModel, SphereModel, BlocksModel>;
 
 struct CageSpec {
-  int tets = 0;      // budget of the enclosing cage; 0 when cells are given
+  int tets = 0;      // budget of the enclosing cage; 0 when cells or cell_m are given
   std::string mode;  // "lattice", "fast", "paper" or "conform": how that cage is made
   int shells = 0;    // at most so many convex shells
   // Boxes and plates without a hole: cut into nx × ny × nz cells of five tets each.
   Eigen::Vector3i cells = Eigen::Vector3i::Zero();
+  double cell_m = 0;  // blocks: longest edge of a cell; 0: not given
 };
 
 struct MaterialSpec {

@@ -7,7 +7,7 @@
 #include <numbers>
 #include <unordered_map>
 
-#include "core/error.h"
+#include "scenes/detail/surface_builder.h"
 #include "scenes/models.h"
 
 namespace limber::scenes {
@@ -15,33 +15,6 @@ namespace limber::scenes {
 namespace {
 
 constexpr int arc_steps = 6;  // segments of a quarter circle of a rounded edge
-
-struct Builder {
-  std::vector<Vec3> positions;
-  std::vector<Eigen::Vector3i> triangles;
-
-  int add(const Vec3& p) {
-    positions.push_back(p);
-    return int(positions.size()) - 1;
-  }
-  void quad(int a, int b, int c, int d, bool other_diagonal) {
-    if (other_diagonal) {
-      triangles.emplace_back(b, c, d);
-      triangles.emplace_back(b, d, a);
-    } else {
-      triangles.emplace_back(a, b, c);
-      triangles.emplace_back(a, c, d);
-    }
-  }
-  SurfaceMesh mesh() const {
-    SurfaceMesh made{Points(positions.size(), 3), Triangles(triangles.size(), 3)};
-    for (std::size_t v = 0; v < positions.size(); ++v) made.positions.row(Eigen::Index(v)) = positions[v];
-    for (std::size_t f = 0; f < triangles.size(); ++f) made.triangles.row(Eigen::Index(f)) = triangles[f];
-    return made;
-  }
-};
-
-int pieces(double length, double longest) { return std::max(1, int(std::ceil(length / longest - 1e-9))); }
 
 // Coordinates of the grid lines of a box along one axis: even inside, and over a bevel spaced so that
 // make_box turns them into even steps of the arc.
@@ -72,7 +45,7 @@ SurfaceMesh make_box(const BoxModel& box) {
   std::array<std::vector<double>, 3> lines;
   for (int i = 0; i < 3; ++i) lines[std::size_t(i)] = grid_lines(box.size_m[i], box.bevel_m, box.triangle_m);
   const Vec3 inner = (box.size_m / 2).array() - box.bevel_m;
-  Builder builder;
+  SurfaceBuilder builder;
   std::map<std::array<int, 3>, int> vertex_from_lines;
   for (int axis = 0; axis < 3; ++axis)
     for (const bool upper : {false, true}) {
@@ -201,7 +174,7 @@ SurfaceMesh make_plate(const PlateModel& plate) {
     widest_face = std::max(widest_face, (on_rim(ray, bevel) - on_hole(hole, ray, bevel)).norm());
   const std::vector<Station> stations = stations_round(plate.box.size_m[w], bevel, widest_face, longest);
 
-  Builder builder;
+  SurfaceBuilder builder;
   for (const Vec2& ray : rays)
     for (const Station& s : stations) {
       const Vec2 flat =
@@ -226,7 +199,7 @@ SurfaceMesh make_plate(const PlateModel& plate) {
 
 SurfaceMesh make_sphere(const SphereModel& sphere) {
   const double g = std::numbers::phi;
-  Builder builder;
+  SurfaceBuilder builder;
   for (const double s : {-1.0, 1.0})
     for (const double t : {-g, g}) {
       builder.add(Vec3(0, s, t).normalized());
@@ -264,37 +237,6 @@ SurfaceMesh make_sphere(const SphereModel& sphere) {
   }
   for (Vec3& p : builder.positions) p *= radius;
   return builder.mesh();
-}
-
-TetMesh make_box_cage(const Vec3& size_m, const Eigen::Vector3i& cells) {
-  LIMBER_CHECK((size_m.array() > 0).all() && (cells.array() > 0).all(), size_m.x(), size_m.y(), size_m.z(),
-               cells.x(), cells.y(), cells.z());
-  const auto node = [&](int i, int j, int k) { return (k * (cells.y() + 1) + j) * (cells.x() + 1) + i; };
-  TetMesh cage{Points(node(0, 0, cells.z() + 1), 3), Tets(5 * cells.prod(), 4)};
-  for (int k = 0; k <= cells.z(); ++k)
-    for (int j = 0; j <= cells.y(); ++j)
-      for (int i = 0; i <= cells.x(); ++i)
-        for (int a = 0; a < 3; ++a) {
-          const int at = std::array{i, j, k}[std::size_t(a)];
-          cage.positions(node(i, j, k), a) = size_m[a] * (2.0 * at - cells[a]) / (2.0 * cells[a]);
-        }
-
-  // Corner c of a cell lies at (c & 1, c >> 1 & 1, c >> 2). One tet in the middle, one at each of four
-  // corners.
-  constexpr int even[5][4] = {{0, 3, 5, 6}, {1, 0, 5, 3}, {2, 0, 3, 6}, {4, 0, 6, 5}, {7, 3, 5, 6}};
-  constexpr int odd[5][4] = {{1, 2, 4, 7}, {0, 1, 2, 4}, {3, 1, 7, 2}, {5, 1, 4, 7}, {6, 2, 7, 4}};
-  Eigen::Index t = 0;
-  for (int k = 0; k < cells.z(); ++k)
-    for (int j = 0; j < cells.y(); ++j)
-      for (int i = 0; i < cells.x(); ++i)
-        for (const auto& corners : (i + j + k) % 2 ? odd : even) {
-          for (int c = 0; c < 4; ++c)
-            cage.tets(t, c) = node(i + (corners[c] & 1), j + (corners[c] >> 1 & 1), k + (corners[c] >> 2));
-          const auto p = [&](int c) { return Vec3(cage.positions.row(cage.tets(t, c))); };
-          if (signed_volume(p(0), p(1), p(2), p(3)) < 0) std::swap(cage.tets(t, 2), cage.tets(t, 3));
-          ++t;
-        }
-  return cage;
 }
 
 }  // namespace limber::scenes

@@ -15,6 +15,17 @@ SurfaceMesh make_box(const BoxModel&);
 // With a hole: rings of points round the hole from its wall over one face, the rim, and the other face.
 SurfaceMesh make_plate(const PlateModel&);
 
+// Blocks, their edges rounded with radius bevel_m where they stand out; in the coordinates of the model. A
+// millionth of its size inside its cage.
+SurfaceMesh make_blocks(const BlocksModel&);
+
+// The cells between all faces of solids and holes, those in holes left out, five tets each; no cell is longer
+// than cell_m, and there are two at least through a solid.
+TetMesh make_blocks_cage(const BlocksModel&, double cell_m);
+
+// What keeps blocks from being one closed manifold, in a few words; empty when nothing does.
+std::string fault_of(const BlocksModel&);
+
 // A geodesic sphere: an icosahedron whose faces are cut in four until no edge is longer than triangle_m.
 SurfaceMesh make_sphere(const SphereModel&);
 

@@ -82,7 +82,7 @@ constexpr Key all_keys[] = {
      {},
      0,
      required,
-     "what is seen: exactly one of file, made, box, plate, sphere",
+     "what is seen: exactly one of file, made, box, plate, blocks, sphere",
      "",
      ""},
     {"bodies[].model.file",
@@ -147,6 +147,19 @@ constexpr Key all_keys[] = {
      "m; diameter, or side of the square", "", ""},
     {"bodies[].model.plate.hole.center_m", Type::vector, any, 2, "[0, 0]",
      "m; from the plate's middle, along its two longer axes in the order x, y, z", "", ""},
+    {"bodies[].model.blocks",
+     Type::table,
+     {},
+     0,
+     may_lack,
+     "boxes with boxes cut out, in coordinates of their own",
+     "",
+     ""},
+    {"bodies[].model.blocks.solids", Type::boxes, any, 0, required, "m; they hang together by faces", "", ""},
+    {"bodies[].model.blocks.holes", Type::boxes, any, 0, "[]", "m; cut out of all solids", "", ""},
+    {"bodies[].model.blocks.bevel_m", Type::number, at_least_zero, 0, "0.0",
+     "m; radius of the rounded edges, at most half of the least way between two faces", "", ""},
+    {"bodies[].model.blocks.triangle_m", Type::number, positive, 0, may_lack, "m; as of a box", "", ""},
     {"bodies[].model.sphere", Type::table, {}, 0, may_lack, "a sphere", "", ""},
     {"bodies[].model.sphere.diameter_m", Type::number, positive, 0, required, "m", "", ""},
     {"bodies[].model.sphere.triangle_m", Type::number, positive, 0, may_lack,
@@ -157,13 +170,17 @@ constexpr Key all_keys[] = {
      {},
      0,
      required,
-     "the coarse tets that are simulated: either tets or cells",
+     "the coarse tets that are simulated: one of tets, cells and cell_m",
      "",
      ""},
     {"bodies[].cage.tets", Type::integer, from_to(24, 200'000), 0, may_lack,
      "budget of a cage made round the model", "", ""},
     {"bodies[].cage.cells", Type::integers, from_to(1, 200), 3, may_lack,
      "boxes, and plates without a hole: cells along x, y, z, five tets each", "", ""},
+    {"bodies[].cage.cell_m", Type::number, positive, 0, may_lack,
+     "m; blocks: cells between their faces, five tets each, no longer than this, two at least through a "
+     "solid",
+     "", ""},
     {"bodies[].cage.mode",
      Type::choice,
      {},
@@ -446,6 +463,13 @@ void check_box(const Key& key, const std::string& shown, const Node& node) {
                       shown, "xyz"[i], upper[i], "xyz"[i], lower[i]));
 }
 
+void check_boxes(const Key& key, const std::string& shown, const Node& node) {
+  const Array* elements = node.array();
+  if (!elements) complain_of_type(key, shown, node);
+  for (std::size_t i = 0; i < elements->size(); ++i)
+    check_box(key, fmt::format("{}[{}]", shown, i), (*elements)[i]);
+}
+
 void check_fixed(const Key& key, const std::string& shown, Node& node) {
   const auto is_walls = [](const Node& n) {
     const auto* text = std::get_if<std::string>(&n.value);
@@ -500,6 +524,8 @@ void check_value(const Key& key, const std::string& shown, Node& node) {
     case Type::box:
     case Type::region:
       return check_box(key, shown, node);
+    case Type::boxes:
+      return check_boxes(key, shown, node);
     case Type::color:
       return check_color(key, shown, node);
     case Type::fixed:
@@ -624,6 +650,8 @@ std::string Key::expected() const {
     case Type::box:
     case Type::region:
       return "two corners [[x, y, z], [x, y, z]], the lower one first";
+    case Type::boxes:
+      return "a list of boxes [[x, y, z], [x, y, z]], the lower corner first";
     case Type::color:
       return "a colour \"#rrggbb\"";
     case Type::fixed:
@@ -666,6 +694,8 @@ std::string Key::example() const {
       case Type::box:
       case Type::region:
         return "[[0, 0, 0], [10, 3, 3]]";
+      case Type::boxes:
+        return "[[[0, 0, 0], [1, 1, 1]]]";
       case Type::color:
         return "\"#c0392b\"";
       case Type::fixed:

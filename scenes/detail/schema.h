@@ -24,6 +24,7 @@ enum class Type {
   range,
   box,
   region,  // a box that may be flat
+  boxes,
   color,
   fixed,
   table,

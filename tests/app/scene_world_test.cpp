@@ -17,7 +17,8 @@ namespace {
 
 // All tets of the scene: exactly where all cages are cells, within a tenth where limber makes one round a
 // model.
-const std::map<std::string, int> tets_of_scene{{"barriers1", 675}, {"barriers2", 2335}, {"bunny_gate", 620}};
+const std::map<std::string, int> tets_of_scene{
+    {"barriers1", 675}, {"barriers2", 2335}, {"bunny_gate", 620}, {"squeeze", 957}, {"windows", 1710}};
 
 TEST(SceneWorld, EveryScenePreparesBuildsAndSteps) {
   TemporaryFolder folder;

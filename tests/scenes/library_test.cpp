@@ -1,6 +1,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cstdlib>
 
 #include "core/error.h"
@@ -94,6 +95,34 @@ TEST(Library, Barriers2IsBarriers1WithFinerPlates) {
   EXPECT_EQ(fine.goal.radius_m, coarse.goal.radius_m);
 }
 
+// Every window is narrower than the ball, the one straight to the goal most of all; the ball is a quarter as
+// stiff.
+TEST(Library, WindowsAreNarrowerThanTheBall) {
+  const Scene scene = read_scene_file(find_scene("windows"));
+  const BodySpec &ball = scene.bodies[0], &walls = scene.bodies[1];
+  std::vector<double> widths;
+  for (const Box& hole : std::get<BlocksModel>(walls.model).holes) {
+    Vec3 size = hole.size();
+    std::sort(size.begin(), size.end());
+    EXPECT_NEAR(size[0], 0.4, 1e-12);
+    EXPECT_NEAR(size[1], size[2], 1e-12) << "square";
+    widths.push_back(size[2]);
+  }
+  ASSERT_EQ(widths.size(), 4U);
+  const double expected[] = {0.9, 1.5, 1.4, 1.3};
+  for (std::size_t w = 0; w < 4; ++w) EXPECT_NEAR(widths[w], expected[w], 1e-12);
+  EXPECT_NEAR(start_box(ball)->size().x(), 1.6, 1e-12);
+  EXPECT_NEAR(walls.material.youngs_modulus_pa, 4 * ball.material.youngs_modulus_pa, 1e-9);
+  EXPECT_NEAR(scene.goal.center_of_mass_m.y(), ball.pose.position_m.y(), 1e-12)
+      << "straight through the first window";
+}
+
+TEST(Library, SqueezeLeavesSixTenthsOfTheBall) {
+  const Scene scene = read_scene_file(find_scene("squeeze"));
+  const Vec3 slit = std::get<BlocksModel>(scene.bodies[1].model).holes[0].size();
+  EXPECT_NEAR(slit.y(), 0.6 * start_box(scene.bodies[0])->size().y(), 1e-12);
+}
+
 TEST(Library, BunnyGateIsNarrowerThanEitherBunny) {
   const Scene scene = read_scene_file(find_scene("bunny_gate"));
   const double gap_m = start_box(scene.bodies[2])->lower.y() - start_box(scene.bodies[1])->upper.y();
@@ -123,8 +152,10 @@ TEST(Library, UnknownSceneNamesTheNearest) {
     find_scene("bariers1");
     FAIL();
   } catch (const InputError& error) {
-    EXPECT_THAT(error.what(),
-                HasSubstr("did you mean \"barriers1\"? known scenes: barriers1, barriers2, bunny_gate"));
+    EXPECT_THAT(
+        error.what(),
+        HasSubstr(
+            "did you mean \"barriers1\"? known scenes: barriers1, barriers2, bunny_gate, squeeze, windows"));
   }
 }
 

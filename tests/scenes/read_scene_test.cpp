@@ -122,6 +122,7 @@ struct Slip {
 };
 
 TEST(ReadScene, ComplainsWithLineAndColumn) {
+  constexpr const char* blocks_robot = "model = { box = { size_m = [1, 1, 1], bevel_m = 0.1 } }";
   const Slip slips[] = {
       {"radius_m = 0.25", "radius = 0.25", "radius = 0.25", "did you mean \"radius_m\"?"},
       {"max_force_n", "max_force",
@@ -142,8 +143,9 @@ TEST(ReadScene, ComplainsWithLineAndColumn) {
       {"density_kg_m3 = 100", "density_kg_m3 = inf", "inf", "write a finite number"},
       {"density_kg_m3 = 100", "density_kg_m3 = 100, poisson_ratio = 0.5", "0.5 }", "must be ≥ 0 and ≤ 0.495"},
       {"cells = [3, 3, 3]", "cells = [3, 3.5, 3]", "3.5", "must be a whole number"},
-      {"cells = [3, 3, 3]", "cells = [3, 3, 3], tets = 90", "{ cells", "both tets and cells"},
-      {"cage = { cells = [3, 3, 3] }", "cage = {}", "{}", "neither tets nor cells"},
+      {"cells = [3, 3, 3]", "cells = [3, 3, 3], tets = 90", "{ cells",
+       "more than one of tets, cells and cell_m"},
+      {"cage = { cells = [3, 3, 3] }", "cage = {}", "{}", "none of tets, cells and cell_m"},
       {"cells = [3, 3, 3]", "cells = [200, 200, 200]", "[200", "make 40000000 tets"},
       {"size_m = [1, 1, 1], bevel_m = 0.1", "size_m = [1, 1e-9, 1e-9], triangle_m = 1e-8", "1e-8",
        "triangles"},
@@ -153,13 +155,35 @@ TEST(ReadScene, ComplainsWithLineAndColumn) {
       {"bevel_m = 0.1", "triangle_m = 1e-5", "1e-5", "triangles"},
       {"size_m = 1.0", "size_m = 3.5", "3.5", "does not fit"},
       {"{ box = { size_m = [1, 1, 1], bevel_m = 0.1 } }", "{}", "{}",
-       "none of file, made, box, plate, sphere"},
+       "none of file, made, box, plate, blocks, sphere"},
       {", bevel_m = 0.1 } }", " }, sphere = { diameter_m = 1 } }", "{ box", "more than one of"},
       {", bevel_m = 0.1 } }", " }, scale = 2 }", "2 }\ncage", "goes with file only"},
       {"{ box = { size_m = [1, 1, 1], bevel_m = 0.1 } }", "{ file = \"a\", up = \"+x\" }", "\"+x\"",
        "same axis"},
       {"{ box = { size_m = [1, 1, 1], bevel_m = 0.1 } }", "{ file = \"a\", scale = 1, height_m = 1 }",
        "1, height", "both scale and height_m"},
+      {blocks_robot, "model = { blocks = { solids = [[[0, 0, 0], [1, 1, 1]], [[2, 0, 0], [3, 1, 1]]] } }",
+       "{ solids", "the solids do not hang together by faces"},
+      {blocks_robot, "model = { blocks = { solids = [[[0, 0, 0], [1, 1, 1]], [[1, 1, 0], [2, 2, 1]]] } }",
+       "{ solids", "the solids do not hang together by faces"},
+      {blocks_robot,
+       "model = { blocks = { solids = [[[0, 0, 0], [2, 2, 1]]], holes = [[[0, 0, 0], [1, 1, 1]], [[1, 1, 0], "
+       "[2, "
+       "2, 1]]] } }",
+       "{ solids", "the solids do not hang together by faces"},
+      {blocks_robot,
+       "model = { blocks = { solids = [[[0, 0, 0], [3, 3, 1]]], holes = [[[1, 1, 0], [2, 2, 1]], [[2, 2, 0], "
+       "[3, "
+       "3, 1]]] } }",
+       "{ solids", "at (2, 2, 0) solids or holes meet only in an edge or a corner"},
+      {blocks_robot,
+       "model = { blocks = { solids = [[[0, 0, 0], [1, 1, 1]]], holes = [[[-1, -1, -1], [2, 2, 2]]] } }",
+       "{ solids", "the holes leave nothing"},
+      {blocks_robot, "model = { blocks = { solids = [[[0, 0, 0], [1, 1, 1]]], bevel_m = 0.6 } }", "{ solids",
+       "bevel_m is 0.6, more than half of the 1 m between two faces"},
+      {blocks_robot, "model = { blocks = { solids = [] } }", "[] }", "write one solid at least"},
+      {blocks_robot, "model = { blocks = { solids = [[[0, 0, 0], [1, 0, 1]]] } }", "[1, 0", "upper y = 0"},
+      {"cells = [3, 3, 3]", "cell_m = 0.5", "0.5 }\nmaterial", "goes with model.blocks only"},
       {"role = \"obstacle\"", "role = \"robot\"", "\"robot\"\nmodel = { plate", "two robots, robot and gate"},
       {"role = \"robot\"", "role = \"free\"", "[[bodies]]", "there is no robot"},
       {"role = \"robot\"", "role = \"robt\"", "\"robt\"", "did you mean \"robot\"?"},
@@ -318,6 +342,10 @@ std::string another_value(const Key& key) {
       {"bodies[].model.plate.triangle_m", "0.2"},
       {"bodies[].model.plate.hole.size_m", "0.7"},
       {"bodies[].model.plate.hole.center_m", "[0.1, 0.2]"},
+      {"bodies[].model.blocks.solids", "[[[0, 0, 0], [0.5, 1, 1]], [[0.5, 0, 0], [1, 1, 0.5]]]"},
+      {"bodies[].model.blocks.holes", "[[[0.25, 0, 0.25], [0.75, 1, 0.75]]]"},
+      {"bodies[].model.blocks.bevel_m", "0.2"},
+      {"bodies[].model.blocks.triangle_m", "0.2"},
       {"bodies[].model.sphere.diameter_m", "0.8"},
       {"bodies[].model.sphere.triangle_m", "0.2"},
       {"bodies[].fixed", "[]"},
@@ -376,6 +404,9 @@ TEST(Keys, EveryKeyChangesTheScene) {
     if (key.parent() == "bodies[].model" && key.path != "bodies[].model.made")
       sets = {file_robot, tets_robot};
     if (key.path == "bodies[].model.made") sets = {file_robot, tets_robot};
+    if (key.path.find(".blocks") != key.path.npos || key.path == "bodies[].cage.cell_m")
+      sets = {"bodies.robot.model={ blocks = { solids = [[[0, 0, 0], [1, 1, 1]]] } }",
+              "bodies.robot.cage={ cell_m = 0.5 }"};
     if (key.path.find(".sphere") != key.path.npos) sets = {sphere_robot, tets_robot};
     if (key.path == "bodies[].cage.tets" || key.path == "bodies[].cage.mode" ||
         key.path == "bodies[].cage.shells")
@@ -442,6 +473,13 @@ std::string all_of(const Model& model) {
   if (const auto* m = std::get_if<BoxModel>(&model)) return "box " + box_text(*m);
   if (const auto* m = std::get_if<SphereModel>(&model))
     return fmt::format("sphere {} {}", m->diameter_m, m->triangle_m);
+  if (const auto* m = std::get_if<BlocksModel>(&model)) {
+    std::string text = fmt::format("blocks {} {} {} ", m->solids.size(), m->bevel_m, m->triangle_m);
+    for (const auto* boxes : {&m->solids, &m->holes})
+      for (const Box& b : *boxes)
+        text += v(b.lower) + v(b.upper) + fmt::format("{} {} ", b.lower[2], b.upper[2]);
+    return text;
+  }
   const auto& plate = std::get<PlateModel>(model);
   return fmt::format("plate {}", box_text(plate.box)) +
          (plate.hole ? fmt::format("{} {} {}", plate.hole->round, plate.hole->size_m, v(plate.hole->center_m))
@@ -455,11 +493,11 @@ std::string all_of(const Scene& s) {
                               v(s.gravity_m_s2), s.max_dt_s.value_or(-1));
   for (const BodySpec& body : s.bodies) {
     const MaterialSpec& m = body.material;
-    t += fmt::format("{} {} {} {} | {} {} {} {} | {} {} {} {} {} {} | {} {} {} {} | {}", body.name,
+    t += fmt::format("{} {} {} {} | {} {} {} {} {} | {} {} {} {} {} {} | {} {} {} {} | {}", body.name,
                      int(body.role), int(body.kind), all_of(body.model), body.cage.tets, v(body.cage.cells),
-                     body.cage.mode, body.cage.shells, m.model, m.youngs_modulus_pa, m.poisson_ratio,
-                     m.density_kg_m3, m.damping_ratio, m.friction, v(body.pose.position_m), v(body.pose.axis),
-                     body.pose.angle_deg, body.pose.anchor, v(body.color_srgb));
+                     body.cage.cell_m, body.cage.mode, body.cage.shells, m.model, m.youngs_modulus_pa,
+                     m.poisson_ratio, m.density_kg_m3, m.damping_ratio, m.friction, v(body.pose.position_m),
+                     v(body.pose.axis), body.pose.angle_deg, body.pose.anchor, v(body.color_srgb));
     t += fmt::format(" {}", body.fixed.walls);
     for (const Box& box : body.fixed.boxes_m) t += b(box);
     for (const PartSpec& part : body.parts)

@@ -29,6 +29,18 @@ double rounded_box_volume(const Vec3& size, double r) {
          4 * pi / 3 * r * r * r;
 }
 
+// Two walls that cross, 0.2 thick, with a window in each arm; the third reaches to the floor.
+BlocksModel crossing(double bevel) {
+  return {{{{0, 1, 0}, {2.2, 1.2, 1}}, {{1, 0, 0}, {1.2, 2.2, 1}}},
+          {{{0.3, 1, 0.2}, {0.7, 1.2, 0.8}},
+           {{1.5, 1, 0.2}, {1.9, 1.2, 0.5}},
+           {{1, 0.3, 0}, {1.2, 0.7, 0.5}},
+           {{1, 1.5, 0.5}, {1.2, 1.9, 0.8}}},
+          bevel,
+          0.1};
+}
+constexpr double crossing_volume = 2 * 2.2 * 0.2 - 0.04 - 0.2 * (0.24 + 0.12 + 0.2 + 0.12);
+
 std::vector<Shape> shapes() {
   const Vec3 size(1, 2, 0.5);
   std::vector<Shape> made{
@@ -41,6 +53,11 @@ std::vector<Shape> shapes() {
       {"one-piece sphere", make_sphere({1, 9}), 2, 0.31702,
        1e-4},  // 5(3+√5)/12 a³ of the icosahedron, a = 1/(2 sin 72°)
       {"bunny", make_bunny(), 2, 0, 0},
+      {"one block", make_blocks({{{Vec3(1, 1, 1), Vec3(1, 1, 1) + size}}, {}, 0, 0.1}), 2, 1, 1e-4},
+      {"rounded block", make_blocks({{{Vec3::Zero(), size}}, {}, 0.1, 0.1}), 2, rounded_box_volume(size, 0.1),
+       2e-3},
+      {"crossing walls", make_blocks(crossing(0)), 2 - 2 * 3, crossing_volume, 1e-4},
+      {"rounded crossing walls", make_blocks(crossing(0.04)), 2 - 2 * 3, crossing_volume, 3e-2},
   };
   for (const Vec3& s : {Vec3(0.3, 3, 2), Vec3(3, 0.3, 2), Vec3(3, 2, 0.3)}) {
     made.push_back({"plate, square hole", make_plate({{s, 0, 0.1}, Hole{false, 0.8, {0.2, -0.1}}}), 0,
@@ -169,6 +186,46 @@ TEST(BoxCage, NeighboursShareTheirFaces) {
     EXPECT_NEAR(area(SurfaceMesh{cage.positions, boundary}),
                 2 * (size.x() * size.y() + size.y() * size.z() + size.z() * size.x()), 1e-9);
   }
+}
+
+// Cells left out leave holes, and the rest fits together: the boundary is that of the blocks.
+TEST(BlocksCage, FillsTheBlocksInTwoLayersAndNoMore) {
+  const BlocksModel blocks = crossing(0);
+  const TetMesh cage = make_blocks_cage(blocks, 0.4);
+  ASSERT_NO_THROW(validate(cage, "cage"));
+  EXPECT_NEAR(volume(cage), crossing_volume, 1e-12);
+  const SurfaceMesh boundary{cage.positions, boundary_triangles(cage.tets)};
+  EXPECT_NEAR(volume(boundary), crossing_volume, 1e-12);
+  EXPECT_NEAR(area(boundary), area(make_blocks(blocks)), 1e-3);
+  EXPECT_EQ(vertices_of(boundary.triangles).size() < std::size_t(cage.positions.rows()), true);
+  std::set<double> through, along;
+  double longest = 0;  // along the axes
+  for (Eigen::Index n = 0; n < cage.positions.rows(); ++n) {
+    if (cage.positions(n, 0) < 1) through.insert(cage.positions(n, 1));
+    if (cage.positions(n, 0) >= 1 && cage.positions(n, 0) <= 1.2) along.insert(cage.positions(n, 1));
+  }
+  EXPECT_EQ(through.size(), 3U);
+  for (auto at = std::next(along.begin()); at != along.end(); ++at)
+    longest = std::max(longest, *at - *std::prev(at));
+  EXPECT_LE(longest, 0.4 + 1e-12);
+}
+
+// Faces stay where they are but for a millionth; in a corner that points inwards both do.
+TEST(Blocks, AreRoundedWhereTheyStandOutOnly) {
+  const double bevel = 0.04;
+  const BlocksModel blocks = crossing(bevel);
+  const SurfaceMesh sharp = make_blocks(crossing(0)), round = make_blocks(blocks);
+  EXPECT_LT(volume(round), volume(sharp));
+  int in_the_notch = 0;
+  for (Eigen::Index v = 0; v < round.positions.rows(); ++v) {
+    const Vec3 p = round.positions.row(v);
+    const bool flat_height = p.z() > bevel && p.z() < 1 - bevel;
+    if (std::hypot(p.x() - 1, p.y() - 1) > 1e-4 || !flat_height) continue;
+    ++in_the_notch;  // the edge between two arms
+    EXPECT_GT(p.x(), 1);
+    EXPECT_GT(p.y(), 1);
+  }
+  EXPECT_GT(in_the_notch, 5);
 }
 
 BodySpec box_body() {
