@@ -25,7 +25,7 @@ Json json_of(const fem::Cost& cost) {
           {"controls_cpu_s", cost.controls_s},
           {"elastic_cpu_s", cost.elastic_s},
           {"integration_cpu_s", cost.integration_s},
-          {"contact_of_force_step", cost.steps ? cost.contact_s / cost.force_step_s() : 0},
+          {"contact_of_force_step", cost.force_step_s() > 0 ? cost.contact_s / cost.force_step_s() : 0},
           {"load_us", per(cost.load_s, cost.loads)},
           {"store_us", per(cost.store_s, cost.stores)}};
 }

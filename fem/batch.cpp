@@ -61,7 +61,7 @@ struct Batch::Impl {
   }
 
   void finish(int index) {
-    const double before = thread_cpu_s();
+    Stopwatch watch;
     Lane& lane = lanes[index];
     State end{lane.state.step + lane.control.steps, std::vector<float>(rest.positions.size()),
               std::vector<float>(rest.velocities.size())};
@@ -69,7 +69,7 @@ struct Batch::Impl {
     lane.outcome = judge(world, end);
     if (lane.outcome.status == RunStatus::ok) lane.state = std::move(end);
     lane.stale = true;
-    cost.store_s += thread_cpu_s() - before, ++cost.stores;
+    cost.store_s += watch.lap_s(), ++cost.stores;
   }
   // A lane that is not loaded anew goes along at rest: numbers that grow or shrink without end are slow.
   void rest_stale_lanes() {
@@ -93,10 +93,10 @@ void Batch::load(int lane, const State& state, const Control& control) {
   LIMBER_CHECK(state.velocities.size() == impl_->rest.velocities.size(), state.velocities.size(),
                impl_->rest.velocities.size());
   LIMBER_CHECK(control.steps >= 0, control.steps);
-  const double before = thread_cpu_s();
+  Stopwatch watch;
   impl_->lanes.at(std::size_t(lane)) = {control, control.steps, state, {}};
   impl_->stepper.load(lane, state.positions.data(), state.velocities.data(), control, control.steps > 0);
-  impl_->cost.load_s += thread_cpu_s() - before, ++impl_->cost.loads;
+  impl_->cost.load_s += watch.lap_s(), ++impl_->cost.loads;
   if (control.steps == 0) impl_->finish(lane);
 }
 

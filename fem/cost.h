@@ -28,4 +28,14 @@ struct Cost {
 
 double thread_cpu_s();
 
+// Seconds of CPU time since it was made or last asked, without what the asking takes.
+class Stopwatch {
+ public:
+  Stopwatch() : before_(thread_cpu_s()) {}
+  double lap_s();
+
+ private:
+  double before_;
+};
+
 }  // namespace limber::fem

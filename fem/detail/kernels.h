@@ -57,7 +57,7 @@ inline constexpr int block_size = 16;
 template <class E>
 struct Block;
 template <class Real, int Nodes, template <class> class Law>
-struct Block<Element<Real, Nodes, Law>> {
+struct alignas(64) Block<Element<Real, Nodes, Law>> {
   static constexpr int numbers = sizeof(Law<Real>) / sizeof(Real);
   int node[Nodes][block_size];
   Real law[numbers][block_size];

@@ -2,6 +2,7 @@
 // double for the reference; the code is the same.
 #pragma once
 
+#include <new>
 #include <vector>
 
 #include "core/state.h"
@@ -10,6 +11,19 @@
 #include "fem/detail/kernels.h"
 
 namespace limber::fem::detail {
+
+// Memory that begins with a cache line: a vector of sixteen lanes is one line, and never parts of two.
+template <class T>
+struct LineAllocator {
+  using value_type = T;
+  static constexpr std::align_val_t line{64};
+  LineAllocator() = default;
+  template <class U>
+  LineAllocator(const LineAllocator<U>&) {}
+  T* allocate(std::size_t count) { return static_cast<T*>(::operator new(count * sizeof(T), line)); }
+  void deallocate(T* p, std::size_t) { ::operator delete(p, line); }
+  bool operator==(const LineAllocator&) const { return true; }
+};
 
 template <class Real>
 class Stepper {
@@ -38,12 +52,13 @@ class Stepper {
   Contacts<Real> contacts_;
   Layout state_layout_, force_layout_;
   int first_velocity_;
-  std::vector<Real> state_, f_;
-  std::vector<Real> push_;             // [robot node][xyz][lane] accelerations
-  std::vector<Real> lower_, upper_;    // [body][xyz][lane]
-  std::vector<Real> speed2_, travel_;  // [body][lane]
-  std::vector<Control> controls_;      // [lane]
-  std::vector<bool> contact_;          // [lane]
+  using Numbers = std::vector<Real, LineAllocator<Real>>;
+  Numbers state_, f_;
+  Numbers push_;                   // [robot node][xyz][lane] accelerations
+  Numbers lower_, upper_;          // [body][xyz][lane]
+  Numbers speed2_, travel_;        // [body][lane]
+  std::vector<Control> controls_;  // [lane]
+  std::vector<bool> contact_;      // [lane]
   Cost cost_;
 };
 

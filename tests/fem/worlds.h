@@ -1,6 +1,7 @@
 // Meshes and worlds that tests and benchmarks share.
 #pragma once
 
+#include <array>
 #include <cmath>
 #include <functional>
 #include <vector>
@@ -9,11 +10,14 @@
 
 namespace limber::fem::testing {
 
-// A box cut into nx × ny × nz cells of five tets each; neighbouring cells are mirrored so that faces match.
-inline TetMesh grid(const Vec3& lower, const Vec3& size, int nx, int ny, int nz) {
+// The nodes of a box cut into nx × ny × nz cells, and its cells' tets by their corners: corner bits are x, y,
+// z.
+template <class Cut>
+TetMesh grid_of(const Vec3& lower, const Vec3& size, int nx, int ny, int nz, int tets_a_cell,
+                const Cut& cut) {
   TetMesh mesh;
   mesh.positions.resize((nx + 1) * (ny + 1) * (nz + 1), 3);
-  mesh.tets.resize(5 * nx * ny * nz, 4);
+  mesh.tets.resize(tets_a_cell * nx * ny * nz, 4);
   const auto node = [&](int i, int j, int k) { return (k * (ny + 1) + j) * (nx + 1) + i; };
   for (int k = 0; k <= nz; ++k)
     for (int j = 0; j <= ny; ++j)
@@ -23,21 +27,37 @@ inline TetMesh grid(const Vec3& lower, const Vec3& size, int nx, int ny, int nz)
   int t = 0;
   for (int k = 0; k < nz; ++k)
     for (int j = 0; j < ny; ++j)
-      for (int i = 0; i < nx; ++i) {
-        const bool mirrored = (i + j + k) % 2;
-        const auto corner = [&](int c) {
-          const int x = c & 1, y = (c >> 1) & 1, z = c >> 2;
-          return node(i + (mirrored ? 1 - x : x), j + y, k + z);
-        };
-        constexpr int five[5][4] = {{0, 1, 2, 4}, {3, 2, 1, 7}, {5, 4, 7, 1}, {6, 7, 4, 2}, {1, 2, 4, 7}};
-        for (const auto& f : five) {
-          Eigen::RowVector4i tet(corner(f[0]), corner(f[1]), corner(f[2]), corner(f[3]));
+      for (int i = 0; i < nx; ++i)
+        cut((i + j + k) % 2 == 1, [&](const auto& corners) {
+          Eigen::RowVector4i tet;
+          for (int c = 0; c < 4; ++c)
+            tet[c] = node(i + (corners[c] & 1), j + ((corners[c] >> 1) & 1), k + (corners[c] >> 2));
           const auto p = [&](int a) { return Vec3(mesh.positions.row(tet[a])); };
           if (signed_volume(p(0), p(1), p(2), p(3)) < 0) std::swap(tet[2], tet[3]);
           mesh.tets.row(t++) = tet;
-        }
-      }
+        });
   return mesh;
+}
+
+// Five tets a cell; neighbouring cells are mirrored so that faces match.
+inline TetMesh grid(const Vec3& lower, const Vec3& size, int nx, int ny, int nz) {
+  return grid_of(lower, size, nx, ny, nz, 5, [](bool mirrored, const auto& add) {
+    constexpr int five[5][4] = {{0, 1, 2, 4}, {3, 2, 1, 7}, {5, 4, 7, 1}, {6, 7, 4, 2}, {1, 2, 4, 7}};
+    for (const auto& f : five) {
+      const int flip = mirrored ? 1 : 0;
+      add(std::array{f[0] ^ flip, f[1] ^ flip, f[2] ^ flip, f[3] ^ flip});
+    }
+  });
+}
+
+// Six tets a cell, all round the same diagonal: a mesh that leans, whose neighbourhoods have no symmetry but
+// one.
+inline TetMesh leaning_grid(const Vec3& lower, const Vec3& size, int nx, int ny, int nz) {
+  return grid_of(lower, size, nx, ny, nz, 6, [](bool, const auto& add) {
+    for (int first = 0; first < 3; ++first)
+      for (int second = 0; second < 3; ++second)
+        if (first != second) add(std::array{0, 1 << first, (1 << first) | (1 << second), 7});
+  });
 }
 
 inline TetMesh cube(const Vec3& center, double edge, int cells) {
