@@ -74,8 +74,7 @@ Outcome render(const RenderOptions&);
 // prepare, plan and render; stages that are up to date are skipped.
 Outcome run(const PlanOptions&, const RenderOptions&);
 
-// With `observables`, of a work folder: also a CSV with the figures of every frame.
-Outcome verify(const fs::path& folder, const std::optional<fs::path>& observables = {});
+Outcome verify(const fs::path& folder);
 Outcome info(const fs::path& path);
 Outcome list_scenes();
 

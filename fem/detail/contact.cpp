@@ -9,7 +9,8 @@
 namespace limber::fem::detail {
 namespace {
 
-constexpr float kept = 0.9f;  // share of a distance that movement may use up; the rest is for rounding
+// Share of a distance that movement may use up, and of the reach, by which less; the rest is for rounding.
+constexpr float kept = 0.9f, rounding = 0.02f;
 
 template <class Real>
 Real dot(const Real a[3], const Real b[3]) {
@@ -64,6 +65,28 @@ bool penalty_force(Real beta, Real depth, const Real normal[3], const Real relat
   return true;
 }
 
+// Whether the box of p and q meets a box. What is not finite, of a rollout that blows up, meets none.
+template <class Real>
+bool meets(const Real* p, const Real* q, const Real lower[3], const Real upper[3]) {
+  bool meet = true;
+  for (int c = 0; c < 3; ++c)
+    meet &=
+        std::max(p[c], q[c]) >= lower[c] && std::min(p[c], q[c]) <= upper[c] && std::isfinite(p[c] + q[c]);
+  return meet;
+}
+
+// The box of a body.
+template <class Real>
+struct Span {
+  Real lower[3], upper[3];
+  Span(const LaneView<Real>& view, int body) {
+    for (int c = 0; c < 3; ++c) {
+      lower[c] = view.lower[(3 * body + c) * view.stride];
+      upper[c] = view.upper[(3 * body + c) * view.stride];
+    }
+  }
+};
+
 }  // namespace
 
 // A tet where it is now.
@@ -105,10 +128,9 @@ Contacts<Real>::Contacts(const World& world, const Kernels<Real>& kernels, int l
 }
 
 template <class Real>
-void Contacts<Real>::place_of(int point, Real out[3]) const {
-  const Topology::Point& p = topology_.points[point];
-  for (int c = 0; c < 3; ++c)
-    out[c] = Real(p.share[0]) * packed_[p.node[0]].at[c] + Real(p.share[1]) * packed_[p.node[1]].at[c];
+void Contacts<Real>::place_of(int point, const Real share[2], Real out[3]) const {
+  const int* node = topology_.points[point].node;
+  for (int c = 0; c < 3; ++c) out[c] = share[0] * packed_[node[0]].at[c] + share[1] * packed_[node[1]].at[c];
 }
 
 template <class Real>
@@ -135,116 +157,184 @@ const std::vector<Touch<Real>>& Contacts<Real>::find(int lane, const LaneView<Re
   }
   const auto pair = std::find(pairs_.begin(), pairs_.end(), std::pair(a, b));
   List& list = lists_[lane * pairs_.size() + std::size_t(pair - pairs_.begin())];
-  refresh(view, a, b, list);
+  const Real moved = refresh(view, a, b, list);
   for (int node : list.nodes) fetch(view, node, packed_[node].at);
-  const Real travel = view.travel[a * view.stride] + view.travel[b * view.stride];
-  find_touches(view, b, travel, list, 0);
+  find_touches(view, b, moved, list.points[0]);
+  find_passing_edges(view, b, moved, list.edges[0]);
   const std::size_t second = touches_.size();
-  find_touches(view, a, travel, list, 1);
+  find_touches(view, a, moved, list.points[1]);
+  find_passing_edges(view, a, moved, list.edges[1]);
   measure_depths(view, a, b, 0, second);
   measure_depths(view, b, a, second, touches_.size());
   return touches_;
 }
 
 // A list holds while the two bodies' nodes together have moved less than the reach it was built with; the
-// tenth kept back is for rounding.
+// tenth kept back is for rounding. How far that is follows from the speeds; what swings to and fro goes less
+// far, so it is measured anew now and then. Returns it.
 template <class Real>
-void Contacts<Real>::refresh(const LaneView<Real>& view, int a, int b, List& list) {
+Real Contacts<Real>::refresh(const LaneView<Real>& view, int a, int b, List& list) {
+  constexpr Real measure_after = Real(0.1), worn = Real(0.7);  // of the reach
   const Real reach = (tables_.skin[a] + tables_.skin[b]) / 2;
   const Real travel = view.travel[a * view.stride] + view.travel[b * view.stride];
-  if (list.built && travel - list.travel_at_build <= kept * reach) return;
+  if (list.built && travel - list.travel_when_measured > measure_after * reach) {
+    list.moved = way_since_build(view, a, list.places[0]) + way_since_build(view, b, list.places[1]);
+    list.travel_when_measured = travel;
+    list.built = list.moved <= worn * reach;
+  }
+  if (list.built) return list.moved + (travel - list.travel_when_measured);
   list.built = true;
-  list.travel_at_build = travel;
+  list.travel_when_measured = travel;
+  list.moved = 0;
+  keep_places(view, a, list.places[0]), keep_places(view, b, list.places[1]);
   list.nodes.clear();
   build_direction(view, a, b, reach, list, 0);
   build_direction(view, b, a, reach, list, 1);
   for (int node : list.nodes) listed_[node] = false;
+  return 0;
 }
 
-// Tet by tet, the points that slabs find in its box; then by point, which keeps the tets of each ascending.
+template <class Real>
+void Contacts<Real>::keep_places(const LaneView<Real>& view, int index, std::vector<Real>& places) const {
+  const Topology::Body& body = topology_.bodies[index];
+  places.clear();
+  for (int n = body.first_node; n < body.last_node && body.moving; ++n)
+    for (int c = 0; c < 3; ++c) places.push_back(view.x[view.state.at(n, c)]);
+}
+
+// Of the node that went farthest.
+template <class Real>
+Real Contacts<Real>::way_since_build(const LaneView<Real>& view, int index,
+                                     const std::vector<Real>& places) const {
+  const Topology::Body& body = topology_.bodies[index];
+  Real farthest2 = 0;
+  const Real* place = places.data();
+  for (int n = body.first_node; n < body.last_node && body.moving; ++n, place += 3) {
+    Real way[3];
+    for (int c = 0; c < 3; ++c) way[c] = view.x[view.state.at(n, c)] - place[c];
+    farthest2 = std::max(farthest2, dot(way, way));
+  }
+  return std::sqrt(farthest2);
+}
+
+// Tet by tet, the points and edges that slabs find in its box; then by point, which keeps the tets of each
+// ascending.
 template <class Real>
 void Contacts<Real>::build_direction(const LaneView<Real>& view, int from, int into, Real reach, List& list,
                                      int direction) {
-  auto& records = list.records[direction];
-  auto& candidates = list.candidates[direction];
-  records.clear(), candidates.clear();
-  if (!sort_points(view, from, into, reach)) return;
-
-  const Topology::Body& body = topology_.bodies[into];
+  const Topology::Body &body = topology_.bodies[from], &other = topology_.bodies[into];
+  const int points = body.last_point - body.first_point;
   for (int n = body.first_node; n < body.last_node; ++n) fetch(view, n, packed_[n].at);
-  found_.clear();
-  for (int t = body.first_tet; t < body.last_tet; ++t) collect_near(t, reach);
+  first_point_ = body.first_point;
+  slabs_[0].edges = false, slabs_[1].edges = true;
+  near_tet_.resize(std::size_t(points));
+  const bool any_points = sort_near(view, from, into, reach, slabs_[0]),
+             any_edges = sort_near(view, from, into, reach, slabs_[1]);
+  if (any_points || any_edges) {
+    for (int n = other.first_node; n < other.last_node; ++n) fetch(view, n, packed_[n].at);
+    for (int t = other.first_tet; t < other.last_tet; ++t) collect_near(t, reach);
+  }
+  list_found(slabs_[0], points, reach, list, list.points[direction]);
+  list_found(slabs_[1], points, reach, list, list.edges[direction]);
+}
 
-  // Counting sort by point.
-  counts_.assign(points_.size() + 1, 0);
-  for (const Found& f : found_) ++counts_[f.point + 1];
-  for (std::size_t k = 1; k < counts_.size(); ++k) counts_[k] += counts_[k - 1];
-  for (int k = 0; k < int(points_.size()); ++k)
-    if (counts_[k] < counts_[k + 1]) records.push_back({first_point_ + k, counts_[k], counts_[k + 1]});
-  candidates.resize(found_.size());
-  for (const Found& f : found_)
-    candidates[counts_[f.point]++] = {f.tet, f.face, list.travel_at_build + kept * f.distance};
+// Counting sort by point.
+template <class Real>
+void Contacts<Real>::list_found(Slabs& slabs, int points, Real reach, List& list, Near& near) {
+  near.records.clear();
+  near.candidates.resize(slabs.found.size());
+  counts_.assign(std::size_t(points + 1), 0);
+  for (const Found& f : slabs.found) ++counts_[f.point + 1];
+  for (int k = 0; k < points; ++k) {
+    counts_[k + 1] += counts_[k];
+    if (counts_[k] < counts_[k + 1])
+      near.records.push_back({first_point_ + k, counts_[k], counts_[k + 1], 0});
+  }
+  for (const Found& f : slabs.found)
+    near.candidates[counts_[f.point]++] = {f.tet, f.face, kept * f.distance - rounding * reach};
+  for (Record& r : near.records) {
+    r.asleep_until = near.candidates[r.begin].asleep_until;
+    for (int k = r.begin; k < r.end; ++k)
+      r.asleep_until = std::min(r.asleep_until, near.candidates[k].asleep_until);
+  }
 
   const auto name = [&](const int* node, int count) {
     for (int i = 0; i < count; ++i)
       if (!listed_[node[i]]) listed_[node[i]] = true, list.nodes.push_back(node[i]);
   };
-  for (const Record& r : records) name(topology_.points[r.point].node, 2);
-  for (const Candidate& k : candidates) name(topology_.tets[k.tet].node, 4);
+  for (const Record& r : near.records) name(topology_.points[r.point].node, 2);
+  for (const Candidate& k : near.candidates) name(topology_.tets[k.tet].node, 4);
 }
 
-// Puts the points of a body that are near the other's box into slabs; false when there are none.
+// Puts the points, or edges, of a body that are near the other's box into slabs; false when there are none.
 template <class Real>
-bool Contacts<Real>::sort_points(const LaneView<Real>& view, int from, int into, Real reach) {
+bool Contacts<Real>::sort_near(const LaneView<Real>& view, int from, int into, Real reach, Slabs& slabs) {
   const Topology::Body& body = topology_.bodies[from];
-  for (int n = body.first_node; n < body.last_node; ++n) fetch(view, n, packed_[n].at);
+  const int points = body.last_point - body.first_point;
   Real lower[3], upper[3];
   for (int c = 0; c < 3; ++c) {
     lower[c] = view.lower[(3 * into + c) * view.stride] - reach;
     upper[c] = view.upper[(3 * into + c) * view.stride] + reach;
-    slabs_.lower[c] = std::numeric_limits<Real>::max(), slabs_.upper[c] = -slabs_.lower[c];
+    slabs.lower[c] = std::numeric_limits<Real>::max(), slabs.upper[c] = -slabs.lower[c];
   }
-  first_point_ = body.first_point;
-  points_.resize(std::size_t(body.last_point - body.first_point));
+  slabs.found.clear();
   near_.clear();
-  for (int k = 0; k < int(points_.size()); ++k) {
-    Real* p = points_[k].at;
-    place_of(first_point_ + k, p);
-    // Said so that a point that is not finite, of a rollout that blows up, is left out: no slab can hold it.
-    bool held = true;
-    for (int c = 0; c < 3; ++c) held &= p[c] >= lower[c] && p[c] <= upper[c] && std::isfinite(p[c]);
-    if (!held) continue;
+  for (auto* at : {slabs.from, slabs.to})
+    for (int c = 0; c < 3; ++c) at[c].clear();
+  for (int k = slabs.edges ? int(body.surface_nodes.size()) : 0; k < points; ++k) {
+    const Topology::Point& point = topology_.points[first_point_ + k];
+    Real p[3], q[3];
+    const Real share[2] = {Real(point.share[0]), Real(point.share[1])};
+    place_of(first_point_ + k, share, p);
+    std::copy_n(p, 3, q);
+    if (slabs.edges)
+      std::copy_n(packed_[point.node[0]].at, 3, p), std::copy_n(packed_[point.node[1]].at, 3, q);
+    if (!meets(p, q, lower, upper)) continue;
     near_.push_back(k);
     for (int c = 0; c < 3; ++c) {
-      slabs_.lower[c] = std::min(slabs_.lower[c], p[c]);
-      slabs_.upper[c] = std::max(slabs_.upper[c], p[c]);
+      slabs.from[c].push_back(p[c]), slabs.to[c].push_back(q[c]);
+      slabs.lower[c] = std::min(slabs.lower[c], std::min(p[c], q[c]));
+      slabs.upper[c] = std::max(slabs.upper[c], std::max(p[c], q[c]));
     }
   }
   if (near_.empty()) return false;
-  slabs_.axis = 0;
-  const auto size = [&](int c) { return slabs_.upper[c] - slabs_.lower[c]; };
+  slabs.axis = 0;
+  const auto size = [&](int c) { return slabs.upper[c] - slabs.lower[c]; };
   for (int c = 1; c < 3; ++c)
-    if (size(c) > size(slabs_.axis)) slabs_.axis = c;
-  slabs_.count = 1 + int(std::min(size(slabs_.axis) / reach, Real(Slabs::most - 1)));
-  slabs_.inverse_width = Real(slabs_.count) / (size(slabs_.axis) + reach);
-  const auto slab_of = [&](int k) { return slabs_.of(points_[k].at[slabs_.axis]); };
-  counts_.assign(std::size_t(slabs_.count + 1), 0);
-  for (int k : near_) ++counts_[slab_of(k) + 1];
-  for (std::size_t k = 1; k < counts_.size(); ++k) counts_[k] += counts_[k - 1];
-  slabs_.begin = counts_;
-  slabs_.point.resize(near_.size());
-  for (int k : near_) slabs_.point[counts_[slab_of(k)]++] = k;
-  const std::size_t room = near_.size() + block_size;
-  distance_.resize(room), face_.resize(room);
-  for (int c = 0; c < 3; ++c) {
-    slabs_.at[c].resize(room);
-    for (std::size_t i = 0; i < near_.size(); ++i) slabs_.at[c][i] = points_[slabs_.point[i]].at[c];
+    if (size(c) > size(slabs.axis)) slabs.axis = c;
+  const int next = (slabs.axis + 1) % 3, other = (slabs.axis + 2) % 3,
+            second = size(next) > size(other) ? next : other;
+  slabs.count = 1 + int(std::min(size(slabs.axis) / reach, Real(Slabs::most - 1)));
+  slabs.inverse_width = Real(slabs.count) / (size(slabs.axis) + reach);
+  const Real inverse_row = Real(Slabs::rows) / (size(second) + reach);
+  const std::size_t count = near_.size();
+  order_.resize(count);
+  counts_.assign(std::size_t(slabs.count * Slabs::rows + 1), 0);
+  slabs.half = 0;
+  for (std::size_t i = 0; i < count; ++i) {
+    const Real p = slabs.from[slabs.axis][i], q = slabs.to[slabs.axis][i];
+    slabs.half = std::max(slabs.half, std::abs(q - p) / 2);
+    const int row =
+        int(((slabs.from[second][i] + slabs.to[second][i]) / 2 - slabs.lower[second]) * inverse_row);
+    order_[i] = slabs.of((p + q) / 2) * Slabs::rows + std::clamp(row, 0, Slabs::rows - 1);
+    ++counts_[order_[i] + 1];
   }
+  for (std::size_t k = 1; k < counts_.size(); ++k) counts_[k] += counts_[k - 1];
+  slabs.begin.clear();
+  for (int s = 0; s <= slabs.count; ++s) slabs.begin.push_back(counts_[s * Slabs::rows]);
+  slabs.point.resize(count);
+  for (std::size_t i = 0; i < count; ++i) slabs.point[order_[i] = counts_[order_[i]]++] = near_[i];
+  for (auto* at : {slabs.from, slabs.to})
+    for (int c = 0; c < 3; ++c) {
+      unsorted_.swap(at[c]);
+      at[c].resize(count + block_size);
+      for (std::size_t i = 0; i < count; ++i) at[c][order_[i]] = unsorted_[i];
+    }
   return true;
 }
 
-// A point that is in the tet now was within `reach` of it at build, so it was in its box and on the inner
-// side of each of its planes, all moved out by `reach`.
+// What is in the tet now was within `reach` of it at build, so it was in its box and not wholly on the outer
+// side of one of its planes, all moved out by `reach`.
 template <class Real>
 void Contacts<Real>::collect_near(int t, Real reach) {
   const int* node = topology_.tets[t].node;
@@ -256,11 +346,18 @@ void Contacts<Real>::collect_near(int t, Real reach) {
         std::min(std::min(place[0][c], place[1][c]), std::min(place[2][c], place[3][c])) - reach;
     planes.upper[c] =
         std::max(std::max(place[0][c], place[1][c]), std::max(place[2][c], place[3][c])) + reach;
-    if (planes.lower[c] > slabs_.upper[c] || planes.upper[c] < slabs_.lower[c]) return;
   }
-  const int first = slabs_.begin[slabs_.of(planes.lower[slabs_.axis])],
-            last = slabs_.begin[slabs_.of(planes.upper[slabs_.axis]) + 1];
-  if (first == last) return;
+  int first[2] = {0, 0}, last[2] = {0, 0};
+  for (int s = 0; s < 2; ++s) {
+    const Slabs& slabs = slabs_[s];
+    bool meet = true;
+    for (int c = 0; c < 3; ++c)
+      meet &= planes.lower[c] <= slabs.upper[c] && planes.upper[c] >= slabs.lower[c];
+    if (!meet) continue;
+    first[s] = slabs.begin[slabs.of(planes.lower[slabs.axis] - slabs.half)];
+    last[s] = slabs.begin[slabs.of(planes.upper[slabs.axis] + slabs.half) + 1];
+  }
+  if (first[0] == last[0] && first[1] == last[1]) return;
   face_normals(place, planes.normal);
   Real volume6 = 0;
   for (int c = 0; c < 3; ++c) volume6 += planes.normal[1][c] * (place[1][c] - place[0][c]);
@@ -273,54 +370,170 @@ void Contacts<Real>::collect_near(int t, Real reach) {
     for (Real& n : planes.normal[i]) n *= scale;
     planes.offset[i] = dot(planes.normal[i], place[(i + 1) % 4]);
   }
-  const int count = last - first;
-  kernels_.distances(planes, &slabs_.at[0][first], &slabs_.at[1][first], &slabs_.at[2][first], count,
-                     distance_.data(), face_.data());
-  const Real* const distance = distance_.data();
-  for (int i = 0; i < count; ++i)
-    if (distance[i] <= reach) found_.push_back({slabs_.point[first + i], t, face_[i], distance[i]});
+  for (int s = 0; s < 2; ++s) {
+    Slabs& slabs = slabs_[s];
+    const int begin = first[s], count = last[s] - begin;
+    if (count == 0) continue;
+    const Real* const from[3] = {&slabs.from[0][begin], &slabs.from[1][begin], &slabs.from[2][begin]};
+    const Real* const to[3] = {&slabs.to[0][begin], &slabs.to[1][begin], &slabs.to[2][begin]};
+    const int near = (slabs.edges ? kernels_.near_segments : kernels_.near_points)(planes, from, to, count,
+                                                                                   reach, near_tet_.data());
+    for (int i = 0; i < near; ++i)
+      slabs.found.push_back(
+          {slabs.point[begin + near_tet_[i].item], t, near_tet_[i].face, near_tet_[i].distance});
+  }
 }
 
 // The first tet that contains the point, in ascending order, has it: a point on a shared face has one owner.
+// Middles count where an end is inside; an edge with neither passes through, if at all.
 template <class Real>
-void Contacts<Real>::find_touches(const LaneView<Real>& view, int into, Real travel, List& list,
-                                  int direction) {
-  Real lower[3], upper[3];
-  for (int c = 0; c < 3; ++c) {
-    lower[c] = view.lower[(3 * into + c) * view.stride];
-    upper[c] = view.upper[(3 * into + c) * view.stride];
-  }
-  Candidate* const candidates = list.candidates[direction].data();
-  for (const Record& record : list.records[direction]) {
+void Contacts<Real>::find_touches(const LaneView<Real>& view, int into, Real moved, Near& near) {
+  const Span<Real> box(view, into);
+  for (const Record& record : near.records) {
+    if (record.asleep_until > moved) continue;
+    const Topology::Point& point = topology_.points[record.point];
+    const bool vertex = point.node[0] == point.node[1];
+    if (!vertex && touch_of_node_[point.node[0]] < 0 && touch_of_node_[point.node[1]] < 0) continue;
+    Touch<Real> touch{record.point, -1,   {Real(point.share[0]), Real(point.share[1])}, {}, 0, {0, 0, 0},
+                      false,        false};
     Real p[3];
-    place_of(record.point, p);
-    // Said so that a point that is not finite, of a rollout that blows up, is left out: no slab can hold it.
-    bool held = true;
-    for (int c = 0; c < 3; ++c) held &= p[c] >= lower[c] && p[c] <= upper[c] && std::isfinite(p[c]);
-    if (!held) continue;
-    for (Candidate* k = candidates + record.begin; k != candidates + record.end; ++k) {
-      if (k->asleep_until > travel) continue;
-      const Topology::Tet& tet = topology_.tets[k->tet];
+    place_of(record.point, touch.share, p);
+    if (!meets(p, p, box.lower, box.upper)) continue;
+    for (int k = record.begin; k < record.end; ++k) {
+      Candidate& candidate = near.candidates[k];
+      if (candidate.asleep_until > moved) continue;
+      const Topology::Tet& tet = topology_.tets[candidate.tet];
       const auto side = [&](int i) {
         const int* face = tet.face[i];
         return Real(tet.sign[i]) * det_from(p, packed_[face[0]].at, packed_[face[1]].at, packed_[face[2]].at);
       };
-      if (side(k->face) < 0) continue;
-      Touch<Real> touch{record.point, k->tet, {}, 0, {0, 0, 0}, false};
+      if (side(candidate.face) < 0) continue;
       Real sum = 0;
       bool inside = true;
       for (int i = 0; i < 4 && inside; ++i) {
         touch.weight[i] = side(i);
         sum += touch.weight[i];
         inside = touch.weight[i] >= 0;
-        if (!inside) k->face = i;
+        if (!inside) candidate.face = i;
       }
       if (!inside || !(sum > 0)) continue;
       for (Real& w : touch.weight) w /= sum;
+      touch.tet = candidate.tet;
+      if (vertex) touch_of_node_[point.node[0]] = int(touches_.size());
       touches_.push_back(touch);
       break;
     }
   }
+}
+
+// Edges with no end inside: cut by the planes of each tet, what is left of them is inside.
+template <class Real>
+void Contacts<Real>::find_passing_edges(const LaneView<Real>& view, int into, Real moved, Near& near) {
+  const Span<Real> box(view, into);
+  for (const Record& record : near.records) {
+    if (record.asleep_until > moved) continue;
+    const int* node = topology_.points[record.point].node;
+    if (touch_of_node_[node[0]] >= 0 || touch_of_node_[node[1]] >= 0) continue;
+    const Real *const p = packed_[node[0]].at, *const q = packed_[node[1]].at;
+    if (!meets(p, q, box.lower, box.upper)) continue;
+    stretches_.clear();
+    for (int k = record.begin; k < record.end; ++k) {
+      Candidate& candidate = near.candidates[k];
+      if (candidate.asleep_until > moved) continue;
+      const Topology::Tet& tet = topology_.tets[candidate.tet];
+      const auto side = [&](const Real* at, int i) {
+        const int* face = tet.face[i];
+        return Real(tet.sign[i]) *
+               det_from(at, packed_[face[0]].at, packed_[face[1]].at, packed_[face[2]].at);
+      };
+      if (side(p, candidate.face) < 0 && side(q, candidate.face) < 0) continue;
+      Stretch s{candidate.tet, -1, -1, 0, 1, {}, {}};
+      Real sum = 0;
+      for (int i = 0; i < 4 && s.begin < s.end; ++i) {
+        const Real at_p = side(p, i), at_q = side(q, i);
+        s.at_begin[i] = at_p, s.at_end[i] = at_q;
+        sum += at_p;
+        if ((at_p < 0) == (at_q < 0)) {
+          if (at_p < 0) candidate.face = i, s.end = 0;
+          continue;
+        }
+        const Real cut = at_p / (at_p - at_q);
+        if (at_p < 0 && cut > s.begin) s.begin = cut, s.entry = i;
+        if (at_q < 0 && cut < s.end) s.end = cut, s.exit = i;
+      }
+      if (s.begin < s.end && sum > 0) stretches_.push_back(s);
+    }
+    if (!stretches_.empty()) touch_of_stretches(record.point);
+  }
+}
+
+// The longest stretch, and what joins it on both sides (a face cuts the edge at the same number whichever tet
+// asks), is one way through; the touch is in its middle.
+template <class Real>
+void Contacts<Real>::touch_of_stretches(int point) {
+  const Stretch* first = &stretches_[0];
+  for (const Stretch& s : stretches_)
+    if (s.end - s.begin > first->end - first->begin) first = &s;
+  const Stretch *last = first, *longest = first;
+  for (std::size_t i = 0; i < stretches_.size(); ++i)
+    for (const Stretch& s : stretches_) {
+      if (s.end == first->begin) first = &s;
+      if (s.begin == last->end) last = &s;
+    }
+  const Real middle = (first->begin + last->end) / 2;
+  const Stretch* owner = longest;
+  for (const Stretch& s : stretches_)
+    if (s.begin <= middle && middle <= s.end) owner = &s;
+  Touch<Real> touch{point, owner->tet, {1 - middle, middle}, {}, 0, {0, 0, 0}, false, true};
+  Real sum = 0;
+  for (int i = 0; i < 4; ++i) {
+    touch.weight[i] = touch.share[0] * owner->at_begin[i] + touch.share[1] * owner->at_end[i];
+    sum += touch.weight[i];
+  }
+  for (Real& w : touch.weight) w /= sum;
+  const int* node = topology_.points[point].node;
+  Real way[3];
+  for (int c = 0; c < 3; ++c) way[c] = packed_[node[1]].at[c] - packed_[node[0]].at[c];
+  touch.known = leave_over_ridge(*first, *last, way, touch);
+  touches_.push_back(touch);
+}
+
+// An edge e that comes in through a face of normal n₁ and leaves through the next, of n₂, cuts off a piece of
+// the edge between them: the shortest way out is square to both, along a₂n₁ + a₁n₂ with aᵢ = |e·nᵢ|, and as
+// long as the lines' distance, (end − begin) a₁a₂/|a₂n₁ + a₁n₂|. False for other faces, and for two that look
+// away from one another.
+template <class Real>
+bool Contacts<Real>::leave_over_ridge(const Stretch& first, const Stretch& last, const Real way[3],
+                                      Touch<Real>& touch) const {
+  constexpr Real least = Real(0.2);
+  if (first.entry < 0 || last.exit < 0) return false;
+  const Topology::Tet &in = topology_.tets[first.tet], &out = topology_.tets[last.tet];
+  if (in.across[first.entry] >= 0 || out.across[last.exit] >= 0) return false;
+  int shared = 0;
+  for (int i : in.face[first.entry])
+    for (int j : out.face[last.exit]) shared += i == j;
+  if (shared != 2) return false;
+  Real normal[2][3], across[2];
+  for (int k = 0; k < 2; ++k) {
+    const int* face = k == 0 ? in.face[first.entry] : out.face[last.exit];
+    const Real sign = Real(k == 0 ? in.sign[first.entry] : out.sign[last.exit]);
+    const Real *a = packed_[face[0]].at, *b = packed_[face[1]].at, *c = packed_[face[2]].at;
+    const Real s[3] = {b[0] - a[0], b[1] - a[1], b[2] - a[2]}, t[3] = {c[0] - a[0], c[1] - a[1], c[2] - a[2]};
+    normal[k][0] = s[1] * t[2] - s[2] * t[1];
+    normal[k][1] = s[2] * t[0] - s[0] * t[2];
+    normal[k][2] = s[0] * t[1] - s[1] * t[0];
+    const Real length = std::sqrt(dot(normal[k], normal[k]));
+    if (!(length > 0)) return false;
+    for (Real& n : normal[k]) n *= sign / length;
+    across[k] = std::abs(dot(way, normal[k]));
+  }
+  Real ridge[3];
+  for (int c = 0; c < 3; ++c) ridge[c] = across[1] * normal[0][c] + across[0] * normal[1][c];
+  const Real length = std::sqrt(dot(ridge, ridge));
+  if (!(length > least * (across[0] + across[1]))) return false;
+  touch.depth = (last.end - first.begin) * across[0] * across[1] / length;
+  for (int c = 0; c < 3; ++c) touch.direction[c] = ridge[c] / length;
+  return true;
 }
 
 // Consistent penetration depth (Heidelberger, Teschner, Keiser, Müller, Gross 2004): vertices next to the
@@ -334,10 +547,11 @@ void Contacts<Real>::measure_depths(const LaneView<Real>& view, int from, int in
   std::size_t unknown = 0;
   for (std::size_t i = first; i < last; ++i) {
     Touch<Real>& touch = touches_[i];
-    const Topology::Point& point = topology_.points[touch.point];
-    if (point.node[0] == point.node[1]) touch_of_node_[point.node[0]] = int(i);
-    const Real sum = sum_of_exits(view, touch);
-    touch.known = finish(touch, sum);
+    const Touch<Real> along_edges = leave_along_edges(view, touch);
+    // An edge that lies under a flat face can come in and leave over the ridge of two faces beside it: then
+    // that ridge is not the way out. (Over the ridge of a wedge of 60° the other depth is half as large.)
+    const bool elsewhere = along_edges.known && along_edges.depth < Real(0.4) * touch.depth;
+    if (!touch.known || elsewhere) touch = along_edges;
     unknown += !touch.known;
   }
   std::vector<std::size_t> layer;
@@ -348,7 +562,7 @@ void Contacts<Real>::measure_depths(const LaneView<Real>& view, int from, int in
       if (touch.known) continue;
       const Topology::Point& point = topology_.points[touch.point];
       Real p[3], sum = 0;
-      place_of(touch.point, p);
+      place_of(touch.point, touch.share, p);
       for (int k = point.neighbor_begin; k < point.neighbor_end; ++k) {
         const int other = touch_of_node_[topology_.neighbors[k]];
         if (other < 0 || !touches_[other].known) continue;
@@ -370,16 +584,17 @@ void Contacts<Real>::measure_depths(const LaneView<Real>& view, int from, int in
   for (std::size_t i = first; i < last; ++i) touch_of_node_[topology_.points[touches_[i].point].node[0]] = -1;
 }
 
-// Adds the depth and direction of all ways out along mesh edges, weighted by 1/distance², and returns the sum
-// of the weights.
+// The touch with the mean depth and direction of all ways out along mesh edges, weighted by 1/distance².
 template <class Real>
-Real Contacts<Real>::sum_of_exits(const LaneView<Real>& view, Touch<Real>& touch) {
+Touch<Real> Contacts<Real>::leave_along_edges(const LaneView<Real>& view, Touch<Real> touch) {
   constexpr Real tiny = Real(1e-12);  // m², keeps 1/distance² finite
+  touch.depth = 0;
+  for (Real& d : touch.direction) d = 0;
   const Topology::Point& point = topology_.points[touch.point];
   const Topology::Tet& tet = topology_.tets[touch.tet];
   const Cell cell(view, tet);
   WayOut<Real> from;
-  place_of(touch.point, from.place);
+  place_of(touch.point, touch.share, from.place);
   Real outward[4][3];
   for (int i = 0; i < 4; ++i) {
     const Real* on_face = cell.place[(i + 1) % 4];
@@ -418,7 +633,8 @@ Real Contacts<Real>::sum_of_exits(const LaneView<Real>& view, Touch<Real>& touch
     touch.depth += weight * dot(way, normal);
     for (int c = 0; c < 3; ++c) touch.direction[c] += weight * normal[c];
   }
-  return sum;
+  touch.known = finish(touch, sum);
+  return touch;
 }
 
 // Divides the weighted sums; false when there was nothing to sum, or the directions cancelled.
@@ -452,7 +668,7 @@ void Contacts<Real>::leave_along_centers(const LaneView<Real>& view, int from, i
     Touch<Real>& touch = touches_[i];
     if (touch.known) continue;
     Real p[3], far[3], way[3], normal[3];
-    place_of(touch.point, p);
+    place_of(touch.point, touch.share, p);
     for (int c = 0; c < 3; ++c) far[c] = p[c] + scale * line[c];
     touch.known = walk_out(view, touch.tet, -1, p, far, way, normal);
     if (!touch.known) continue;
@@ -501,8 +717,8 @@ void Contacts<Real>::respond(const LaneView<Real>& view, Real friction, const To
   const Topology::Point& point = topology_.points[touch.point];
   const int* corner = topology_.tets[touch.tet].node;
   const int node[6] = {point.node[0], point.node[1], corner[0], corner[1], corner[2], corner[3]};
-  const Real share[6] = {Real(point.share[0]), Real(point.share[1]), -touch.weight[0],
-                         -touch.weight[1],     -touch.weight[2],     -touch.weight[3]};
+  const Real share[6] = {touch.share[0],   touch.share[1],   -touch.weight[0],
+                         -touch.weight[1], -touch.weight[2], -touch.weight[3]};
   Real inverse_mass = 0, relative[3] = {0, 0, 0};
   for (int i = 0; i < 6; ++i) {
     inverse_mass += share[i] * share[i] * tables_.inverse_mass[node[i]];

@@ -16,7 +16,7 @@ namespace limber::fem::detail {
 // Penalty stiffness β m_eff/h², damping 2 ζ √(k m_eff), and the share of a slip that friction may stop in one
 // step.
 inline constexpr double contact_beta = 0.4;       // vertices
-inline constexpr double contact_edge_beta = 0.2;  // middles of edges: a vertex has six of them
+inline constexpr double contact_edge_beta = 0.2;  // points of edges: a vertex has six of them
 inline constexpr double contact_damping_ratio = 0.3;
 inline constexpr double contact_slip_stop = 0.5;
 
@@ -32,14 +32,17 @@ struct LaneView {
   const Real *lower, *upper, *travel;
 };
 
-// A contact point inside a tet of another body. Everything follows from the present positions.
+// A contact point inside a tet of another body: a vertex; the middle of an edge that has an end inside; or,
+// of an edge that passes through, the middle of the stretch inside. All follows from the present positions.
 template <class Real>
 struct Touch {
   int point, tet;     // of the world's points and tets
+  Real share[2];      // of the point's two nodes
   Real weight[4];     // barycentric coordinates of the point in the tet
   Real depth;         // metres along `direction` to the surface; ≤ 0: no force
   Real direction[3];  // unit, out of the tet's body
   bool known;         // depth and direction are set
+  bool passes;        // the point is of an edge with no end inside
 };
 
 // A force that a contact or a wall gave, for those who ask.
@@ -60,25 +63,32 @@ class Contacts {
   void add_forces(int lane, const LaneView<Real>& view);
   // From now on add_forces also appends to this list, unless null.
   void tell(std::vector<Exerted<Real>>* list) { told_ = list; }
-  // The touches of bodies a and b, a < b: points of a in b, then those of b in a, each ascending. For tests
-  // and observables; valid until the next call.
+  // The touches of bodies a and b, a < b: of a in b vertices and edges with an end inside, then edges that
+  // pass through, each ascending; then those of b in a. For tests and observables; valid until the next call.
   const std::vector<Touch<Real>>& find(int lane, const LaneView<Real>& view, int a, int b);
 
  private:
   struct Record {
     int point, begin, end;  // candidates [begin, end)
+    Real asleep_until;      // the soonest of them
   };
   struct Candidate {
     int tet;
     int face;           // the face that refused last time, tried first: changes cost, never results
-    Real asleep_until;  // travel of the two bodies before which the point cannot have come into the tet
+    Real asleep_until;  // way of the two bodies' nodes since build before which nothing can be in the tet
+  };
+  // Points, or edges (named by their points), and the tets of the other body near them.
+  struct Near {
+    std::vector<Record> records;
+    std::vector<Candidate> candidates;
   };
   // Candidates of one pair in one lane, [0] a in b, [1] b in a: derived data, a superset of what can touch.
   struct List {
     bool built = false;
-    Real travel_at_build = 0;
-    std::vector<Record> records[2];
-    std::vector<Candidate> candidates[2];
+    Real moved = 0;  // how far the two bodies' nodes had come since build when that was measured last
+    Real travel_when_measured = 0;
+    std::vector<Real> places[2];  // of the two bodies' nodes at build; empty when static
+    Near points[2], edges[2];
     std::vector<int> nodes;  // every node they name
   };
   struct Place {
@@ -89,30 +99,45 @@ class Contacts {
     int tet, face;
     Real distance;  // to the tet at least
   };
-  // Points of a body near another, in slabs along their longest axis; within a slab by number.
+  // Points or edges of a body near another, in slabs along their longest axis, each in rows along the second.
   struct Slabs {
-    static constexpr int most = 32;
+    static constexpr int most = 32, rows = 8;
+    bool edges;
     int axis, count;
     Real lower[3], upper[3], inverse_width;
+    Real half;  // of the edges, the largest half length along the axis
     std::vector<int> begin, point;
-    std::vector<Real> at[3];  // x, y, z of each point, filled up for the kernel
-    int of(Real x) const {    // never falls as x grows, so a box finds all that is in it
+    std::vector<Real> from[3], to[3];  // x, y, z of a point, or of an edge's ends; filled up for the kernel
+    std::vector<Found> found;
+    int of(Real x) const {  // never falls as x grows, so a box finds all that is in it
       const Real slab = (x - lower[axis]) * inverse_width;
       return slab > 0 ? (slab < Real(count) ? int(slab) : count - 1) : 0;
     }
   };
+  // The part of an edge that is in a tet, as shares of the way from its first node to its second.
+  struct Stretch {
+    int tet, entry, exit;  // entry, exit: faces; −1: the edge's end is inside
+    Real begin, end;
+    Real at_begin[4], at_end[4];  // barycentric, times 6V, of the edge's ends
+  };
   struct Cell;
 
-  void place_of(int point, Real out[3]) const;  // from packed_
-  void refresh(const LaneView<Real>&, int a, int b, List&);
+  void place_of(int point, const Real share[2], Real out[3]) const;  // from packed_
+  Real refresh(const LaneView<Real>&, int a, int b, List&);
+  void keep_places(const LaneView<Real>&, int body, std::vector<Real>& places) const;
+  Real way_since_build(const LaneView<Real>&, int body, const std::vector<Real>& places) const;
   void build_direction(const LaneView<Real>&, int from, int into, Real reach, List&, int direction);
-  bool sort_points(const LaneView<Real>&, int from, int into, Real reach);
+  bool sort_near(const LaneView<Real>&, int from, int into, Real reach, Slabs&);
   void collect_near(int tet, Real reach);
-  void find_touches(const LaneView<Real>&, int into, Real travel, List&, int direction);
+  void list_found(Slabs&, int points, Real reach, List&, Near&);
+  void find_touches(const LaneView<Real>&, int into, Real moved, Near&);
+  void find_passing_edges(const LaneView<Real>&, int into, Real moved, Near&);
+  void touch_of_stretches(int point);
+  bool leave_over_ridge(const Stretch& first, const Stretch& last, const Real way[3], Touch<Real>&) const;
   void measure_depths(const LaneView<Real>&, int from, int into, std::size_t first, std::size_t last);
   void leave_along_centers(const LaneView<Real>&, int from, int into, std::size_t first, std::size_t last);
   static bool finish(Touch<Real>&, Real sum);
-  Real sum_of_exits(const LaneView<Real>&, Touch<Real>&);
+  Touch<Real> leave_along_edges(const LaneView<Real>&, Touch<Real>);
   bool walk_out(const LaneView<Real>&, int tet, int before, const Real p[3], const Real q[3], Real way[3],
                 Real normal[3]) const;
   void respond(const LaneView<Real>&, Real friction, const Touch<Real>&) const;
@@ -129,18 +154,17 @@ class Contacts {
   std::vector<List> lists_;  // [lane × pairs + pair]
   std::vector<Touch<Real>> touches_;
   std::vector<Place> packed_;       // by world node; valid for the nodes of the list at hand
-  std::vector<int> touch_of_node_;  // index into touches_ while depths are measured, else −1
+  std::vector<int> touch_of_node_;  // index into touches_ of a vertex, until depths are measured, else −1
+  std::vector<Stretch> stretches_;  // of the edge at hand
   // Scratch of a touch: the mesh edges' other ends, and where ways to them leave the tet.
   std::vector<Real> ends_[3], share_;
   std::vector<int> exit_;
   // Scratch of a list's building.
   int first_point_ = 0;
-  std::vector<Place> points_;  // of the body at hand, from first_point_
-  std::vector<int> near_, counts_;
-  Slabs slabs_;
-  std::vector<Real> distance_;  // of points of slabs_ to the tet at hand, and their faces
-  std::vector<int> face_;
-  std::vector<Found> found_;
+  std::vector<int> near_, order_, counts_;
+  std::vector<Real> unsorted_;
+  Slabs slabs_[2];  // points, edges
+  std::vector<NearTet<Real>> near_tet_;
   std::vector<bool> listed_;  // by world node
 };
 

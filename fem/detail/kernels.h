@@ -120,6 +120,14 @@ struct TetPlanes {
   Real normal[4][3], offset[4];  // outward unit normals and places of the faces' planes; all 0 of a flat tet
 };
 
+// What was found near it.
+template <class Real>
+struct NearTet {
+  int item;       // of the points or segments
+  int face;       // the one it is farthest outside of
+  Real distance;  // to the tet at least
+};
+
 // A point in a tet, for finding how ways lead out of the tet.
 template <class Real>
 struct WayOut {
@@ -137,10 +145,12 @@ struct Kernels {
   void (*integrate)(const Motion<Real>&, Real* x, Real* v, Real* f);
   // The same for a body whose nodes keep their distances. They are drawn onto the nearest rigid place first.
   void (*move_rigid)(const RigidMotion<Real>&, Real* x, Real* v, Real* f);
-  // How far points are outside of the planes, at most, and of which; huge outside of the box. Works on
-  // multiples of block_size: all five arrays must be that long.
-  void (*distances)(const TetPlanes<Real>&, const Real* x, const Real* y, const Real* z, int count,
-                    Real* distance, int* face);
+  // The points p, or segments from p to q, whose boxes meet the tet's and that are outside of its planes by
+  // `reach` at most. Reads multiples of block_size: all arrays must be that long. Returns how many are near.
+  int (*near_points)(const TetPlanes<Real>&, const Real* const p[3], const Real* const q[3], int count,
+                     Real reach, NearTet<Real>* found);
+  int (*near_segments)(const TetPlanes<Real>&, const Real* const p[3], const Real* const q[3], int count,
+                       Real reach, NearTet<Real>* found);
   // Through which face (−1: none) straight ways from the point to (x y z) leave the tet, and after which
   // share of the way. Multiples of block_size as above.
   void (*exits)(const WayOut<Real>&, const Real* x, const Real* y, const Real* z, int count, Real* share,
