@@ -2,51 +2,111 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "core/threads.h"
-#include "fem/observe.h"
 #include "render/plot.h"
 
 namespace limber::app {
 
+namespace {
+
+std::string between(const fem::World& world, int body, int other) {
+  if (body < 0) return "nothing touches";
+  return fmt::format("{} and {}", world.bodies[std::size_t(body)].name,
+                     other < 0 ? std::string("a wall") : world.bodies[std::size_t(other)].name);
+}
+
+FrameFigures measure_frame(const fem::World& world, const State& state) {
+  FrameFigures frame;
+  frame.time_s = fem::time_s(world, state);
+  std::vector<Vec3> contact(world.bodies.size(), Vec3::Zero());
+  frame.contact_between = between(world, -1, -1);
+  for (const fem::PairForce& pair : fem::pair_forces(fem::contact_forces(world, state))) {
+    contact[std::size_t(pair.body)] += pair.force_n;
+    if (pair.other >= 0) contact[std::size_t(pair.other)] -= pair.force_n;
+    if (pair.force_n.norm() <= frame.contact_force_n) continue;
+    frame.contact_force_n = pair.force_n.norm();
+    frame.contact_between = between(world, pair.body, pair.other);
+  }
+  for (int b = 0; b < int(world.bodies.size()); ++b) {
+    BodyFigures& body = frame.bodies.emplace_back();
+    body.contact_force_n = contact[std::size_t(b)].norm();
+    if (!world.bodies[std::size_t(b)].moving) continue;
+    const std::vector<double> strain = fem::strains(world, state, b).largest;
+    body.volume_change = fem::volume_m3(world, state, b) / world.bodies[std::size_t(b)].rest_volume_m3 - 1;
+    body.largest_strain = *std::max_element(strain.begin(), strain.end());
+    body.elastic_energy_j = fem::elastic_energy_j(world, state, b);
+    body.kinetic_energy_j = fem::kinetic_energy_j(world, state, b);
+  }
+  frame.penetration = fem::deepest_penetration(world, state);
+  frame.penetration_between = between(world, frame.penetration.body, frame.penetration.other);
+  frame.inverted_tets = fem::inverted_tets(world, state);
+  return frame;
+}
+
+}  // namespace
+
 MotionFigures measure_motion(const fem::World& world, const plan::Trajectory& path) {
-  const std::size_t bodies = world.bodies.size(), frames = path.frames.size();
   MotionFigures figures;
-  figures.volume_change.assign(bodies, std::vector<double>(frames, 0));
-  std::vector<fem::Penetration> penetration(frames);
-  std::vector<int> inverted(frames);
-  parallel_for(int(frames), [&](int f) {
-    const State& state = path.frames[std::size_t(f)];
-    for (std::size_t b = 0; b < bodies; ++b)
-      if (world.bodies[b].moving)
-        figures.volume_change[b][std::size_t(f)] =
-            fem::volume_m3(world, state, int(b)) / world.bodies[b].rest_volume_m3 - 1;
-    penetration[std::size_t(f)] = fem::deepest_penetration(world, state);
-    inverted[std::size_t(f)] = fem::inverted_tets(world, state);
+  figures.frames.resize(path.frames.size());
+  parallel_for(int(path.frames.size()), [&](int f) {
+    figures.frames[std::size_t(f)] = measure_frame(world, path.frames[std::size_t(f)]);
   });
 
-  for (const std::vector<double>& change : figures.volume_change) {
-    double largest = 0;
-    for (const double v : change) largest = std::max(largest, std::abs(v));
-    figures.largest_volume_change.push_back(largest);
+  figures.largest_volume_change.assign(world.bodies.size(), 0);
+  for (const FrameFigures& frame : figures.frames) {
+    for (std::size_t b = 0; b < world.bodies.size(); ++b) {
+      const BodyFigures& body = frame.bodies[b];
+      figures.largest_volume_change[b] =
+          std::max(figures.largest_volume_change[b], std::abs(body.volume_change));
+      if (body.largest_strain > figures.largest_strain)
+        figures.largest_strain = body.largest_strain, figures.largest_strain_of = world.bodies[b].name;
+    }
+    if (frame.contact_force_n > figures.largest_contact_force_n)
+      figures.largest_contact_force_n = frame.contact_force_n,
+      figures.contact_between = frame.contact_between;
+    if (frame.penetration.depth_m > figures.deepest_penetration_m)
+      figures.deepest_penetration_m = frame.penetration.depth_m,
+      figures.penetration_between = frame.penetration_between;
+    figures.inverted_tets += frame.inverted_tets;
   }
-  fem::Penetration deepest;
-  for (const fem::Penetration& p : penetration)
-    if (p.depth_m > deepest.depth_m) deepest = p;
-  const auto name = [&](int body) {
-    return body < 0 ? std::string("a wall") : world.bodies[std::size_t(body)].name;
-  };
-  figures.deepest_penetration_m = deepest.depth_m;
-  figures.penetration_between = deepest.body < 0
-                                    ? "nothing touches"
-                                    : fmt::format("{} and {}", name(deepest.body), name(deepest.other));
   figures.robot_size_m =
       bounding_box(world.bodies[std::size_t(world.robot)].cage.positions).size().maxCoeff();
-  for (const int n : inverted) figures.inverted_tets += n;
   for (const Control& control : path.controls)
     figures.largest_force_n = std::max(figures.largest_force_n, double(largest_force(control)));
   return figures;
+}
+
+Json json_of(const MotionFigures& figures) {
+  return {{"largest_strain", figures.largest_strain},
+          {"largest_strain_of", figures.largest_strain_of},
+          {"largest_contact_force_n", figures.largest_contact_force_n},
+          {"contact_between", figures.contact_between},
+          {"deepest_penetration_m", figures.deepest_penetration_m},
+          {"deepest_penetration_of_robot_size", figures.deepest_penetration_m / figures.robot_size_m},
+          {"penetration_between", figures.penetration_between},
+          {"inverted_tets", figures.inverted_tets},
+          {"largest_force_n", figures.largest_force_n}};
+}
+
+void write_observables(const fs::path& csv, const fem::World& world, const MotionFigures& figures) {
+  std::string text = "time_s";
+  for (const fem::Body& body : world.bodies)
+    for (const char* what :
+         {"volume_change", "largest_strain", "elastic_energy_j", "kinetic_energy_j", "contact_force_n"})
+      text += fmt::format(",{}.{}", body.name, what);
+  text += ",contact_force_n,contact_between,penetration_m,penetration_between,inverted_tets\n";
+  for (const FrameFigures& frame : figures.frames) {
+    text += fmt::format("{}", frame.time_s);
+    for (const BodyFigures& b : frame.bodies)
+      text += fmt::format(",{},{},{},{},{}", b.volume_change, b.largest_strain, b.elastic_energy_j,
+                          b.kinetic_energy_j, b.contact_force_n);
+    text += fmt::format(",{},{},{},{},{}\n", frame.contact_force_n, frame.contact_between,
+                        frame.penetration.depth_m, frame.penetration_between, frame.inverted_tets);
+  }
+  write_file(csv, text);
 }
 
 void write_volume_plot(const fs::path& file, const scenes::Scene& scene, const fem::World& world,
@@ -55,9 +115,9 @@ void write_volume_plot(const fs::path& file, const scenes::Scene& scene, const f
   for (std::size_t b = 0; b < world.bodies.size(); ++b) {
     if (!world.bodies[b].moving) continue;
     render::Curve curve{world.bodies[b].name, scene.bodies[b].color_srgb, {}, {}};
-    for (std::size_t f = 0; f < figures.volume_change[b].size(); ++f) {
+    for (std::size_t f = 0; f < figures.frames.size(); ++f) {
       curve.x.push_back(double(f) / frames_per_second);
-      curve.y.push_back(100 * figures.volume_change[b][f]);
+      curve.y.push_back(100 * figures.frames[f].bodies[b].volume_change);
     }
     curves.push_back(std::move(curve));
   }

@@ -5,23 +5,48 @@
 #include <vector>
 
 #include "core/file.h"
+#include "core/json.h"
+#include "fem/observe.h"
 #include "fem/world.h"
 #include "plan/trajectory.h"
 #include "scenes/scene.h"
 
 namespace limber::app {
 
+struct BodyFigures {          // of one frame; all 0 for a body that does not move, but for contact_force_n
+  double volume_change = 0;   // V/V₀ − 1
+  double largest_strain = 0;  // of its tets, Green's, absolute and principal
+  double elastic_energy_j = 0, kinetic_energy_j = 0;
+  double contact_force_n = 0;  // of the sum of all contacts and walls on it
+};
+struct FrameFigures {
+  double time_s = 0;
+  std::vector<BodyFigures> bodies;
+  double contact_force_n = 0;   // the largest sum over one pair of bodies, or a body and the walls
+  std::string contact_between;  // "robot and floor", "robot and a wall"; "nothing touches"
+  fem::Penetration penetration;
+  std::string penetration_between;
+  int inverted_tets = 0;
+};
 struct MotionFigures {
-  std::vector<std::vector<double>> volume_change;  // [body][frame], V/V₀ − 1; 0 for a body that does not move
-  std::vector<double> largest_volume_change;       // [body], largest absolute value
+  std::vector<FrameFigures> frames;
+  std::vector<double> largest_volume_change;  // [body], largest absolute value
+  double largest_strain = 0;
+  std::string largest_strain_of = "no body";
+  double largest_contact_force_n = 0;
+  std::string contact_between = "nothing touches";
   double deepest_penetration_m = 0;
-  std::string penetration_between;  // "robot and floor"; "nothing" when nothing touches
-  double robot_size_m = 0;          // largest edge of the robot's bounding box at rest
-  int inverted_tets = 0;            // over all frames
-  double largest_force_n = 0;       // of any control
+  std::string penetration_between = "nothing touches";
+  double robot_size_m = 0;     // largest edge of the robot's bounding box at rest
+  int inverted_tets = 0;       // over all frames
+  double largest_force_n = 0;  // of any control
   double mean_speed_at_end_m_s = 0;
 };
 MotionFigures measure_motion(const fem::World&, const plan::Trajectory&);
+Json json_of(const MotionFigures&);  // strain, contact and penetration, as plan and verify print them
+
+// A row a frame, for each body its figures and then what is of all: docs/files.md.
+void write_observables(const fs::path& csv, const fem::World&, const MotionFigures&);
 
 void write_volume_plot(const fs::path&, const scenes::Scene&, const fem::World&, const MotionFigures&,
                        double frames_per_second);

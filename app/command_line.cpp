@@ -122,6 +122,7 @@ int run_command_line(int argc, const char* const* argv) {
   PlanOptions plan_options;
   RenderOptions render_options;
   fs::path folder;
+  std::optional<fs::path> observables;
   std::function<Outcome()> chosen;
 
   CLI::App& prepare_command =
@@ -210,7 +211,13 @@ int run_command_line(int argc, const char* const* argv) {
       *program.add_subcommand("verify", "replays the plan bit for bit, checks every promise, prints a table");
   verify_command.add_option("DIR", folder, "work folder, or the output folder of prepare")->required();
   add_global(verify_command, global), add_threads(verify_command, global);
-  verify_command.callback([&] { chosen = [&] { return verify(folder); }; });
+  verify_command
+      .add_option(
+          "--observables", observables,
+          "also write, for each frame of the path: of each body volume, strain, energies and contact force, "
+          "the strongest contact and the deepest penetration")
+      ->type_name("FILE.csv");
+  verify_command.callback([&] { chosen = [&] { return verify(folder, observables); }; });
 
   CLI::App& info_command = *program.add_subcommand("info", "what is in a file or folder");
   info_command

@@ -74,7 +74,8 @@ Outcome render(const RenderOptions&);
 // prepare, plan and render; stages that are up to date are skipped.
 Outcome run(const PlanOptions&, const RenderOptions&);
 
-Outcome verify(const fs::path& folder);
+// With `observables`, of a work folder: also a CSV with the figures of every frame.
+Outcome verify(const fs::path& folder, const std::optional<fs::path>& observables = {});
 Outcome info(const fs::path& path);
 Outcome list_scenes();
 

@@ -35,24 +35,21 @@ Json summary_of(const plan::Plan& plan, const fem::World& world, const fem::Cost
   Json volumes;
   for (std::size_t b = 0; b < world.bodies.size(); ++b)
     volumes[world.bodies[b].name] = std::round(1e4 * 100 * figures.largest_volume_change[b]) / 1e4;
-  return {{"solved", plan.solved()},
-          {"explanation", plan::explain(plan)},
-          {"seed", plan.settings.seed},
-          {"nodes", plan.tree.size()},
-          {"distance_m", plan.best_distance_m},
-          {"statistics", plan::json_of(plan.statistics)},
-          {"dynamics", json_of(cost)},
-          {"dt_s", world.dt_s},
-          {"motion_s", double(plan.trajectory.end.step) * world.dt_s},
-          {"frames", plan.trajectory.frames.size()},
-          {"largest_volume_change_percent", volumes},
-          {"deepest_penetration_m", figures.deepest_penetration_m},
-          {"deepest_penetration_of_robot_size", figures.deepest_penetration_m / figures.robot_size_m},
-          {"penetration_between", figures.penetration_between},
-          {"inverted_tets", figures.inverted_tets},
-          {"largest_force_n", figures.largest_force_n},
-          {"tree_hash", hex(plan::hash_of(plan.tree))},
-          {"trajectory_hash", hex(plan::hash_of(plan.trajectory))}};
+  Json json{{"solved", plan.solved()},
+            {"explanation", plan::explain(plan)},
+            {"seed", plan.settings.seed},
+            {"nodes", plan.tree.size()},
+            {"distance_m", plan.best_distance_m},
+            {"statistics", plan::json_of(plan.statistics)},
+            {"dynamics", json_of(cost)},
+            {"dt_s", world.dt_s},
+            {"motion_s", double(plan.trajectory.end.step) * world.dt_s},
+            {"frames", plan.trajectory.frames.size()},
+            {"largest_volume_change_percent", volumes},
+            {"tree_hash", hex(plan::hash_of(plan.tree))},
+            {"trajectory_hash", hex(plan::hash_of(plan.trajectory))}};
+  json.update(json_of(figures));
+  return json;
 }
 
 std::string text_of(const Json& s, const fs::path& file) {
@@ -67,6 +64,8 @@ std::string text_of(const Json& s, const fs::path& file) {
       "  motion       {:.2f} s in {} frames, time step {:.3g} ms\n"
       "  volume       changes at most: {}\n"
       "  penetration  at most {:.4f} m, {:.2f} % of the robot's size ({})\n"
+      "  strain       at most {:.3f} ({})\n"
+      "  contact      at most {:.1f} N ({})\n"
       "  hashes       tree {}, trajectory {}\n"
       "  file         {}\n",
       s.at("explanation").get<std::string>(), t.at("iterations").get<std::int64_t>(),
@@ -76,7 +75,9 @@ std::string text_of(const Json& s, const fs::path& file) {
       s.at("frames").get<int>(), 1e3 * s.at("dt_s").get<double>(), volumes,
       s.at("deepest_penetration_m").get<double>(),
       100 * s.at("deepest_penetration_of_robot_size").get<double>(),
-      s.at("penetration_between").get<std::string>(), s.at("tree_hash").get<std::string>(),
+      s.at("penetration_between").get<std::string>(), s.at("largest_strain").get<double>(),
+      s.at("largest_strain_of").get<std::string>(), s.at("largest_contact_force_n").get<double>(),
+      s.at("contact_between").get<std::string>(), s.at("tree_hash").get<std::string>(),
       s.at("trajectory_hash").get<std::string>(), file.string());
 }
 

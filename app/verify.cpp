@@ -25,13 +25,22 @@ class Table {
     rows_.push_back({{"promise", promise}, {"kept", kept}, {"value", value}});
     all_kept_ = all_kept_ && kept;
   }
-  Outcome outcome() const {
+  // `motion` is of the path, null where there is none.
+  Outcome outcome(const Json& motion) const {
     std::string text;
     for (const Json& r : rows_)
       text += fmt::format("  {:6}  {:48}  {}\n", r.at("kept").get<bool>() ? "kept" : "BROKEN",
                           r.at("promise").get<std::string>(), r.at("value").get<std::string>());
+    if (!motion.is_null())
+      text += fmt::format("largest strain {:.3f} ({}), strongest contact {:.1f} N ({})\n",
+                          motion.at("largest_strain").get<double>(),
+                          motion.at("largest_strain_of").get<std::string>(),
+                          motion.at("largest_contact_force_n").get<double>(),
+                          motion.at("contact_between").get<std::string>());
     text += all_kept_ ? "every promise is kept\n" : "not every promise is kept\n";
-    return {all_kept_ ? exit_done : exit_defect, {{"all_kept", all_kept_}, {"promises", rows_}}, text};
+    return {all_kept_ ? exit_done : exit_defect,
+            {{"all_kept", all_kept_}, {"promises", rows_}, {"motion", motion}},
+            text};
   }
 
  private:
@@ -54,7 +63,7 @@ void check_body(const std::string& name, const PreparedBody& body, Table& table)
             fmt::format("dihedrals {:.1f} … {:.1f} degrees", c.min_dihedral_deg, c.max_dihedral_deg));
 }
 
-void check_plan(const PlanFolder& planned, const fem::World& world, Table& table) {
+MotionFigures check_plan(const PlanFolder& planned, const fem::World& world, Table& table) {
   const plan::Plan& plan = planned.plan;
   const plan::Trajectory& path = plan.trajectory;
   const FemSystem system(world);
@@ -92,28 +101,36 @@ void check_plan(const PlanFolder& planned, const fem::World& world, Table& table
       figures.deepest_penetration_m <= largest_penetration * figures.robot_size_m,
       fmt::format("{:.4f} m, {:.2f} % ({})", figures.deepest_penetration_m,
                   100 * figures.deepest_penetration_m / figures.robot_size_m, figures.penetration_between));
+  return figures;
 }
 
 }  // namespace
 
-Outcome verify(const fs::path& folder) {
+Outcome verify(const fs::path& folder, const std::optional<fs::path>& observables) {
   if (!fs::is_directory(folder))
     throw InputError(fmt::format("{}: is not a folder; name a work folder of limber", folder.string()));
   Table table;
+  Json motion;
   if (fs::exists(folder / "plan.npz")) {
     const PlanFolder planned = read_plan_folder(folder);
     const std::vector<PreparedBody> bodies = read_bodies_of(planned, folder);
     for (std::size_t b = 0; b < bodies.size(); ++b)
       check_body(planned.scene.bodies[b].name, bodies[b], table);
-    check_plan(planned, build_world(planned.scene, bodies), table);
+    const fem::World world = build_world(planned.scene, bodies);
+    const MotionFigures figures = check_plan(planned, world, table);
+    motion = json_of(figures);
+    if (observables) write_observables(*observables, world, figures);
   } else if (fs::exists(folder / "report.json")) {
+    if (observables)
+      throw InputError(fmt::format(
+          "{}: holds no plan, so there is nothing to observe; leave --observables out", folder.string()));
     check_body("body", read_body(folder), table);
   } else {
     throw InputError(
         fmt::format("{}: holds neither plan.npz nor report.json; make them with limber run or limber prepare",
                     folder.string()));
   }
-  return table.outcome();
+  return table.outcome(motion);
 }
 
 }  // namespace limber::app

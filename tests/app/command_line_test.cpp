@@ -4,8 +4,10 @@
 #include <sys/resource.h>
 #include <sys/wait.h>
 
+#include <algorithm>
 #include <cstdlib>
 #include <fstream>
+#include <sstream>
 
 #include "app/commands.h"
 #include "core/error.h"
@@ -116,6 +118,51 @@ TEST_F(Program, RunFilmsASceneVerifyAgreesAndASecondRunChangesNothing) {
     if (file.first == "manifest.json") continue;
     EXPECT_NE(std::find(before.begin(), before.end(), file), before.end()) << file.first << " has changed";
   }
+}
+
+// One row a frame, as many numbers as the head has names, and their extremes are those that verify and plan
+// tell.
+TEST_F(Program, ObservablesOfAPathAgreeWithItsSummary) {
+  const Result planned = limber_program({"plan", scene(), "-o", out(), "--json"});
+  ASSERT_EQ(planned.code, exit_done) << planned.err;
+  const std::string csv = out("observables.csv");
+  const Result verified = limber_program({"verify", out(), "--observables", csv, "--json"});
+  ASSERT_EQ(verified.code, exit_done) << verified.err;
+  const Json motion = verified.json().at("motion");
+
+  std::vector<std::vector<std::string>> rows;
+  std::istringstream lines(read_file(csv));
+  for (std::string line; std::getline(lines, line);) {
+    rows.emplace_back();
+    std::istringstream cells(line);
+    for (std::string cell; std::getline(cells, cell, ',');) rows.back().push_back(cell);
+  }
+  ASSERT_EQ(int(rows.size()), planned.json().at("frames").get<int>() + 1);
+  const auto column = [&](const std::string& name) {
+    const auto at = std::find(rows[0].begin(), rows[0].end(), name);
+    EXPECT_NE(at, rows[0].end()) << name;
+    std::vector<double> numbers;
+    for (std::size_t r = 1; r < rows.size(); ++r)
+      numbers.push_back(std::stod(rows[r].at(std::size_t(at - rows[0].begin()))));
+    return numbers;
+  };
+  const auto largest = [&](const std::string& name) {
+    const std::vector<double> numbers = column(name);
+    return *std::max_element(numbers.begin(), numbers.end());
+  };
+  for (const auto& row : rows) EXPECT_EQ(row.size(), rows[0].size());
+  const std::vector<double> times = column("time_s");
+  EXPECT_EQ(times[0], 0);
+  for (std::size_t i = 1; i < times.size(); ++i) EXPECT_NEAR(times[i] - times[i - 1], 0.2, 0.01);
+  EXPECT_EQ(std::max(largest("robot.largest_strain"), largest("block.largest_strain")),
+            motion.at("largest_strain"));
+  EXPECT_EQ(largest("contact_force_n"), motion.at("largest_contact_force_n"));
+  EXPECT_EQ(largest("penetration_m"), motion.at("deepest_penetration_m"));
+  EXPECT_GT(largest("robot.contact_force_n"), 0);
+  EXPECT_GT(largest("robot.kinetic_energy_j"), largest("robot.elastic_energy_j"));
+  for (const auto& [key, value] : motion.items()) EXPECT_EQ(planned.json().at(key), value) << key;
+  EXPECT_EQ(limber_program({"verify", out() + "/bodies/robot", "--observables", csv}).code, exit_bad_input);
+  EXPECT_EQ(limber_program({"verify", out(), "--observables", "/dev/null/x.csv"}).code, exit_disk);
 }
 
 // The same cube as one piece: every manipulation still makes sense, so a plan is found and keeps its
