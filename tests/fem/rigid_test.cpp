@@ -264,6 +264,29 @@ TEST(Rigid, ABoxComesToRestOnTheFloor) {
   EXPECT_LT(distortion(world, end), 1e-6);
 }
 
+// Four cubes of different cages, each a little to the side of the one below, stand still on one another:
+// stiffness by the nodes' masses is stable in any contact, of rigid bodies with each other too.
+TEST(Rigid, AStackStands) {
+  Material material;
+  material.friction = 0.5;
+  WorldSpec spec;
+  for (int i = 0; i < 4; ++i)
+    spec.bodies.push_back({fmt::format("cube{}", i),
+                           cube({0.03 * i, 0.02 * i, 0.5 + 1.001 * i}, 1, 2 + i % 2),
+                           material,
+                           {},
+                           BodyKind::rigid});
+  spec.bounds_m = {Vec3(-5, -5, 0), Vec3(5, 5, 10)};
+  spec.gravity_m_s2 = {0, 0, -10};
+  const World world = build_world(spec);
+  const State start = rest_state(world);
+  const State end = coast(world, start, 3000);
+  for (int b = 0; b < 4; ++b) {
+    EXPECT_LT(mean_speed_m_s(world, end, b), 1e-3);
+    EXPECT_LT((center_of_mass_m(world, end, b) - center_of_mass_m(world, start, b)).norm(), 0.006);
+  }
+}
+
 // Thrown at a static plate 0.35 m thick: back, never through.
 TEST(Rigid, AThrownCubeComesBack) {
   for (const double pace : {1.0, 4.0, 8.0}) {
