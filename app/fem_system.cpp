@@ -17,8 +17,8 @@ std::uint64_t hash_of(const fem::World& world) {
   for (const fem::Body& body : world.bodies) {
     const fem::Material& m = body.material;
     hasher.value(limber::hash_of(body.cage)).value(int(body.moving)).value(int(body.kind));
-    for (const double v :
-         {m.youngs_modulus_pa, m.poisson_ratio, m.density_kg_m3, m.damping_ratio, m.friction})
+    for (const double v : {m.youngs_modulus_pa, m.poisson_ratio, m.density_kg_m3, m.damping_ratio, m.friction,
+                           body.stiffness_share})
       hasher.value(v);
     for (const auto* of_tets : {&body.youngs_modulus_from_tet_pa, &body.density_from_tet_kg_m3})
       for (const double v : *of_tets) hasher.value(v);

@@ -151,7 +151,8 @@ fem::World build_world(const scenes::Scene& scene, const std::vector<PreparedBod
                          .poisson_ratio = body.material.poisson_ratio,
                          .density_kg_m3 = body.material.density_kg_m3,
                          .damping_ratio = body.material.damping_ratio,
-                         .friction = body.material.friction};
+                         .friction = body.material.friction,
+                         .mesh_independent = body.material.mesh_independent};
     fem_body.fixed_nodes = scenes::fixed_nodes(body, scene.bounds_m, prepared[b].cage.positions);
     fem_body.kind = kind_of(body);
     set_parts(body, prepared[b], fem_body);

@@ -8,6 +8,8 @@
 #include <set>
 
 #include "core/error.h"
+#include "core/threads.h"
+#include "fem/detail/locking.h"
 #include "fem/detail/overlap.h"
 #include "fem/detail/spring_weights.h"
 #include "fem/detail/timestep.h"
@@ -114,6 +116,7 @@ Body make_body(const BodySpec& spec) {
   body.density_from_tet_kg_m3 = spec.density_from_tet_kg_m3;
   body.density_from_tet_kg_m3.resize(tets, body.material.density_kg_m3);
   body.mass_kg = body.material.density_kg_m3 * body.rest_volume_m3;
+  body.stiffness_share = 1;
   body.elastic_dt_limit_s = std::numeric_limits<double>::infinity();
   const auto& x = body.cage.positions;
   for (int t = 0; t < body.cage.tets.rows(); ++t) {
@@ -144,11 +147,10 @@ double damping_time(const Body& body, int tet) {
   return 2 * body.material.damping_ratio / frequency;
 }
 
-struct Lame {
-  double mu, lambda;
-};
+using detail::Lame;
 Lame lame_of(const Body& body, int tet) {
-  const double young = body.youngs_modulus_from_tet_pa[tet], poisson = body.material.poisson_ratio;
+  const double young = body.stiffness_share * body.youngs_modulus_from_tet_pa[tet],
+               poisson = body.material.poisson_ratio;
   return {young / (2 * (1 + poisson)), young * poisson / ((1 + poisson) * (1 - 2 * poisson))};
 }
 
@@ -230,6 +232,24 @@ void make_neo_hookean(const Body& body, ElementTables<double>& tables) {
     const double rest = (x.row(edge.first) - x.row(edge.second)).norm(), tau = taus.at(edge);
     tables.dashpots.elements.push_back({{edge.first, edge.second}, {tau * k / (rest * rest)}});
   }
+}
+
+ElementTables<double> make_elements(const Body& body) {
+  ElementTables<double> elements;
+  body.material.model == MaterialModel::springs ? make_springs(body, elements)
+                                                : make_neo_hookean(body, elements);
+  return elements;
+}
+
+void find_stiffness_shares(std::vector<Body>& bodies) {
+  parallel_for(int(bodies.size()), [&](int b) {
+    Body& body = bodies[std::size_t(b)];
+    if (!body.moving || body.kind != BodyKind::deformable || !body.material.mesh_independent) return;
+    std::vector<Lame> of_tet;
+    for (int t = 0; t < body.cage.tets.rows(); ++t) of_tet.push_back(lame_of(body, t));
+    body.stiffness_share =
+        detail::locking_share(body.cage, body.fixed, of_tet, body.node_mass_kg, make_elements(body));
+  });
 }
 
 double largest_stable_step(const Body& body, const ElementTables<double>& elements) {
@@ -483,6 +503,7 @@ World build_world(const WorldSpec& spec) {
     throw InputError(
         fmt::format("body {}: the robot has no node that can move", world.bodies[spec.robot].name));
 
+  find_stiffness_shares(world.bodies);
   auto& tables = world.tables64;
   world.topology.bodies.resize(world.bodies.size());
   world.rigid_tables.resize(world.bodies.size());
@@ -498,9 +519,7 @@ World build_world(const WorldSpec& spec) {
       append_topology(body, int(b), world.topology);
       if (body.kind == BodyKind::rigid) world.rigid_tables[b] = make_rigid(body);
       if (!moving || body.kind == BodyKind::rigid) continue;
-      ElementTables<double> elements;
-      body.material.model == MaterialModel::springs ? make_springs(body, elements)
-                                                    : make_neo_hookean(body, elements);
+      const ElementTables<double> elements = make_elements(body);
       body.elastic_dt_limit_s = largest_stable_step(body, elements);
       append(elements, body.first_node, tables.elements);
     }

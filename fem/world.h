@@ -22,9 +22,10 @@ struct Material {
   double youngs_modulus_pa = 5e3;  // > 0
   double poisson_ratio =
       0.45;  // springs: 0.25 ≤ ν ≤ 0.495, since springs alone have 0.25; else 0 ≤ ν ≤ 0.495
-  double density_kg_m3 = 100;   // > 0
-  double damping_ratio = 0.05;  // 0 … 1, share of critical damping of the body's lowest longitudinal mode
-  double friction = 0.2;        // 0 … 2, Coulomb; a pair has the geometric mean, a wall the body's own
+  double density_kg_m3 = 100;     // > 0
+  double damping_ratio = 0.05;    // 0 … 1, share of critical damping of the body's lowest longitudinal mode
+  double friction = 0.2;          // 0 … 2, Coulomb; a pair has the geometric mean, a wall the body's own
+  bool mesh_independent = false;  // softens the elements by what coarse tets are too stiff (docs/dynamics.md)
 };
 
 enum class BodyKind {
@@ -68,6 +69,7 @@ struct Body {
   std::vector<double> youngs_modulus_from_tet_pa,
       density_from_tet_kg_m3;  // (T) the material's, or a part's own
   double mass_kg, rest_volume_m3;
+  double stiffness_share;     // by which the elements' stiffness is multiplied; 1 unless mesh_independent
   double elastic_dt_limit_s;  // largest stable step of the damped elastic body; infinite unless deformable
   int node_count() const { return int(cage.positions.rows()); }
 };

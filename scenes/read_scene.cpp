@@ -329,7 +329,8 @@ MaterialSpec read_material(const Node& body_table, Kind kind, Role role, const s
   }
   return {text(*table, "model"),           maybe_number(*table, "youngs_modulus_pa").value_or(any_modulus_pa),
           number(*table, "poisson_ratio"), number(*table, "density_kg_m3"),
-          number(*table, "damping_ratio"), number(*table, "friction")};
+          number(*table, "damping_ratio"), number(*table, "friction"),
+          flag(*table, "mesh_independent")};
 }
 
 std::vector<PartSpec> read_parts(const Array& tables, const BodySpec& body, const std::string& body_name) {

@@ -70,6 +70,7 @@ struct CageSpec {
 struct MaterialSpec {
   std::string model;  // "springs" or "neo_hookean"
   double youngs_modulus_pa = 0, poisson_ratio = 0, density_kg_m3 = 0, damping_ratio = 0, friction = 0;
+  bool mesh_independent = true;  // what the cage's tets are too stiff is taken off
 };
 
 // What differs from the material in part of a body.

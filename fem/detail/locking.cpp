@@ -1,0 +1,402 @@
+#include "fem/detail/locking.h"
+
+#include <Eigen/Dense>
+#include <Eigen/Sparse>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <map>
+#include <utility>
+
+#include "core/random.h"
+
+namespace limber::fem::detail {
+namespace {
+
+using Sparse = Eigen::SparseMatrix<double>;
+using Triplets = std::vector<Eigen::Triplet<double>>;
+using Vector = Eigen::VectorXd;
+using Solver = Eigen::SimplicialLDLT<Sparse>;
+
+constexpr int most_refined_tets = 1500, most_tets = 20000;
+constexpr int modes = 4, rigid_modes = 6;
+// Where edges are held, what is missing falls as h^1.4 (stress is singular there), and so by 2.6 when tets
+// are cut.
+constexpr double still_missing = 0.6;
+constexpr double hold_free = 1e-9;  // share of the diagonal that is added, so that free bodies do not drift
+constexpr int tet_edges[6][2] = {{0, 1}, {0, 2}, {0, 3}, {1, 2}, {1, 3}, {2, 3}};
+
+// The middles of a mesh's edges, as nodes behind its own.
+struct Middles {
+  std::map<std::pair<int, int>, int> node;
+  int of(int i, int j) const { return node.at(std::minmax(i, j)); }
+};
+Middles middles_of(const TetMesh& mesh) {
+  Middles middles;
+  int next = int(mesh.positions.rows());
+  for (int t = 0; t < mesh.tets.rows(); ++t)
+    for (const auto& [i, j] : tet_edges)
+      next += middles.node.try_emplace(std::minmax(mesh.tets(t, i), mesh.tets(t, j)), next).second;
+  return middles;
+}
+
+// Values at nodes → values at nodes and middles.
+Sparse interpolation(const Middles& middles, int nodes) {
+  Triplets entries;
+  for (int n = 0; n < nodes; ++n) entries.emplace_back(n, n, 1.0);
+  for (const auto& [edge, middle] : middles.node)
+    entries.emplace_back(middle, edge.first, 0.5), entries.emplace_back(middle, edge.second, 0.5);
+  Sparse matrix(nodes + int(middles.node.size()), nodes);
+  matrix.setFromTriplets(entries.begin(), entries.end());
+  return matrix;
+}
+
+// Each tet cut in eight: four at its corners, four round one diagonal of the octahedron between them.
+TetMesh refined(const TetMesh& mesh, const Middles& middles) {
+  TetMesh fine{interpolation(middles, int(mesh.positions.rows())) * mesh.positions,
+               Tets(8 * mesh.tets.rows(), 4)};
+  for (int t = 0; t < mesh.tets.rows(); ++t) {
+    const auto q = mesh.tets.row(t);
+    const auto m = [&](int i, int j) { return middles.of(q[i], q[j]); };
+    const int parts[8][4] = {{q[0], m(0, 1), m(0, 2), m(0, 3)},    {m(0, 1), q[1], m(1, 2), m(1, 3)},
+                             {m(0, 2), m(1, 2), q[2], m(2, 3)},    {m(0, 3), m(1, 3), m(2, 3), q[3]},
+                             {m(0, 1), m(0, 2), m(0, 3), m(1, 3)}, {m(0, 1), m(0, 2), m(1, 3), m(1, 2)},
+                             {m(0, 2), m(0, 3), m(1, 3), m(2, 3)}, {m(0, 2), m(1, 2), m(2, 3), m(1, 3)}};
+    for (int k = 0; k < 8; ++k)
+      fine.tets.row(8 * t + k) << parts[k][0], parts[k][1], parts[k][2], parts[k][3];
+  }
+  return fine;
+}
+
+std::vector<bool> fixed_with_middles(const std::vector<bool>& fixed, const Middles& middles) {
+  std::vector<bool> all = fixed;
+  all.resize(fixed.size() + middles.node.size());
+  for (const auto& [edge, middle] : middles.node) all[middle] = fixed[edge.first] && fixed[edge.second];
+  return all;
+}
+
+// Numbers of what may move: three a node that is not fixed.
+struct Freedoms {
+  std::vector<int> first;  // of a node; −1 where fixed
+  int count = 0;
+  explicit Freedoms(const std::vector<bool>& fixed) {
+    for (const bool f : fixed) first.push_back(f ? -1 : count), count += f ? 0 : 3;
+  }
+  // Adds a 3 × 3 block, or what of it may move.
+  void add(Triplets& entries, int a, int b, const Eigen::Matrix3d& block) const {
+    if (first[a] < 0 || first[b] < 0) return;
+    for (int i = 0; i < 3; ++i)
+      for (int j = 0; j < 3; ++j) entries.emplace_back(first[a] + i, first[b] + j, block(i, j));
+  }
+  Vector from_nodes(const Points& field) const {
+    Vector v(count);
+    for (std::size_t n = 0; n < first.size(); ++n)
+      if (first[n] >= 0) v.segment<3>(first[n]) = field.row(Eigen::Index(n)).transpose();
+    return v;
+  }
+  Points to_nodes(const Vector& v) const {
+    Points field = Points::Zero(Eigen::Index(first.size()), 3);
+    for (std::size_t n = 0; n < first.size(); ++n)
+      if (first[n] >= 0) field.row(Eigen::Index(n)) = v.segment<3>(first[n]).transpose();
+    return field;
+  }
+};
+
+Sparse matrix_of(const Triplets& entries, int rows, int columns) {
+  Sparse matrix(rows, columns);
+  matrix.setFromTriplets(entries.begin(), entries.end());
+  return matrix;
+}
+
+// A matrix over nodes as one over what may move, the same for each axis.
+Sparse over_axes(const Sparse& by_node, const Freedoms& rows, const Freedoms& columns) {
+  Triplets entries;
+  for (int n = 0; n < by_node.outerSize(); ++n)
+    for (Sparse::InnerIterator it(by_node, n); it; ++it)
+      for (int c = 0; c < 3 && rows.first[it.row()] >= 0 && columns.first[n] >= 0; ++c)
+        entries.emplace_back(rows.first[it.row()] + c, columns.first[n] + c, it.value());
+  return matrix_of(entries, rows.count, columns.count);
+}
+
+// ∇λ of a tet's four barycentric coordinates, as rows; and its volume.
+struct Shape {
+  Eigen::Matrix<double, 4, 3> gradient;
+  double volume;
+  Shape(const Points& x, const Tets& tets, int t) {
+    Vec3 p[4];
+    for (int i = 0; i < 4; ++i) p[i] = x.row(tets(t, i));
+    const Vec3 b = p[1] - p[0], c = p[2] - p[0], d = p[3] - p[0];
+    const double volume6 = b.dot(c.cross(d));
+    gradient.row(1) = c.cross(d) / volume6, gradient.row(2) = d.cross(b) / volume6;
+    gradient.row(3) = b.cross(c) / volume6;
+    gradient.row(0) = -gradient.bottomRows<3>().colwise().sum();
+    volume = volume6 / 6;
+  }
+};
+
+// Quadratic tets of an isotropic linear material: ten nodes each, four points of integration (exact for
+// straight edges); every textbook has them, Zienkiewicz and Taylor's "The Finite Element Method" for one.
+class Quadratic {
+ public:
+  Quadratic(const TetMesh& mesh, const std::vector<bool>& fixed, const std::vector<Lame>& of_tet)
+      : middles_(middles_of(mesh)),
+        freedoms_(fixed_with_middles(fixed, middles_)),
+        mesh_nodes_(int(mesh.positions.rows())) {
+    for (int t = 0; t < mesh.tets.rows(); ++t) {
+      const auto q = mesh.tets.row(t);
+      Element e{{q[0], q[1], q[2], q[3]}, Shape(mesh.positions, mesh.tets, t), of_tet[std::size_t(t)]};
+      for (int k = 0; k < 6; ++k) e.node[4 + k] = middles_.of(q[tet_edges[k][0]], q[tet_edges[k][1]]);
+      elements_.push_back(e);
+    }
+  }
+
+  // Values at the mesh's nodes → at this one's.
+  Sparse from_mesh() const { return interpolation(middles_, mesh_nodes_); }
+  const Freedoms& freedoms() const { return freedoms_; }
+
+  // Of a force a volume that is given at the mesh's nodes (N × 3).
+  Vector load(const Points& force) const {
+    Points sum = Points::Zero(Eigen::Index(freedoms_.first.size()), 3);
+    for (const Element& e : elements_)
+      for (int point = 0; point < 4; ++point) {
+        Eigen::RowVector3d here = Eigen::RowVector3d::Zero();
+        for (int i = 0; i < 4; ++i) here += e.shape.volume / 4 * weight(point, i) * force.row(e.node[i]);
+        for (int i = 0; i < 4; ++i)
+          sum.row(e.node[i]) += weight(point, i) * (2 * weight(point, i) - 1) * here;
+        for (int k = 0; k < 6; ++k)
+          sum.row(e.node[4 + k]) +=
+              4 * weight(point, tet_edges[k][0]) * weight(point, tet_edges[k][1]) * here;
+      }
+    return freedoms_.from_nodes(sum);
+  }
+
+  // K u.
+  Vector forces(const Vector& displacements) const {
+    const Points u = freedoms_.to_nodes(displacements);
+    Points sum = Points::Zero(u.rows(), 3);
+    for (const Element& e : elements_) {
+      Nodal of_element, force = Nodal::Zero();
+      for (int a = 0; a < 10; ++a) of_element.row(a) = u.row(e.node[a]);
+      for (int point = 0; point < 4; ++point) {
+        const Nodal g = gradients(e.shape, point);
+        const Eigen::Matrix3d change = of_element.transpose() * g;  // ∂u_i/∂x_j
+        const Eigen::Matrix3d stress = e.lame.mu * (change + change.transpose()) +
+                                       e.lame.lambda * change.trace() * Eigen::Matrix3d::Identity();
+        force += e.shape.volume / 4 * g * stress;
+      }
+      for (int a = 0; a < 10; ++a) sum.row(e.node[a]) += force.row(a);
+    }
+    return freedoms_.from_nodes(sum);
+  }
+  Vector diagonal() const {
+    Points sum = Points::Zero(Eigen::Index(freedoms_.first.size()), 3);
+    for (const Element& e : elements_)
+      for (int point = 0; point < 4; ++point) {
+        const Nodal g = gradients(e.shape, point);
+        for (int a = 0; a < 10; ++a)
+          sum.row(e.node[a]) += e.shape.volume / 4 *
+                                ((e.lame.mu + e.lame.lambda) * g.row(a).cwiseAbs2() +
+                                 e.lame.mu * g.row(a).squaredNorm() * Eigen::RowVector3d::Ones());
+      }
+    return freedoms_.from_nodes(sum);
+  }
+
+ private:
+  using Nodal = Eigen::Matrix<double, 10, 3>;
+  struct Element {
+    int node[10];  // corners, then middles
+    Shape shape;
+    Lame lame;
+  };
+  static double weight(int point, int corner) {
+    return point == corner ? 0.58541019662496845 : 0.13819660112501051;  // (5 + 3√5)/20 and (5 − √5)/20
+  }
+  static Nodal gradients(const Shape& shape, int point) {
+    Nodal g;
+    for (int i = 0; i < 4; ++i) g.row(i) = (4 * weight(point, i) - 1) * shape.gradient.row(i);
+    for (int k = 0; k < 6; ++k) {
+      const auto [i, j] = tet_edges[k];
+      g.row(4 + k) =
+          4 * (weight(point, i) * shape.gradient.row(j) + weight(point, j) * shape.gradient.row(i));
+    }
+    return g;
+  }
+
+  Middles middles_;
+  Freedoms freedoms_;
+  int mesh_nodes_;
+  std::vector<Element> elements_;
+};
+
+// K of the elements at rest: k n nᵀ of springs, k g gᵀ of volumes with g = ∂(6V); of Neo-Hookean tets the
+// linear ones.
+Sparse stiffness_at_rest(const ElementTables<double>& elements, const TetMesh& mesh,
+                         const std::vector<Lame>& of_tet, const Freedoms& freedoms) {
+  const Points& x = mesh.positions;
+  Triplets entries;
+  for (const auto& [node, law] : elements.springs.elements) {
+    const Vec3 n = (x.row(node[1]) - x.row(node[0])).normalized();
+    for (int a = 0; a < 2; ++a)
+      for (int b = 0; b < 2; ++b)
+        freedoms.add(entries, node[a], node[b], (a == b ? 1 : -1) * law.stiffness * n * n.transpose());
+  }
+  const bool springs = elements.neo_hookeans.elements.empty();
+  for (int t = 0; t < mesh.tets.rows(); ++t) {
+    const Shape shape(x, mesh.tets, t);
+    for (int a = 0; a < 4; ++a)
+      for (int b = 0; b < 4; ++b) {
+        const Vec3 ga = shape.gradient.row(a), gb = shape.gradient.row(b);
+        const auto& [mu, lambda] = of_tet[std::size_t(t)];
+        // Springs give λ = μ, and their volumes the rest.
+        Eigen::Matrix3d block = shape.volume * (springs ? lambda - mu : lambda) * ga * gb.transpose();
+        if (!springs)
+          block += shape.volume * mu * (gb * ga.transpose() + ga.dot(gb) * Eigen::Matrix3d::Identity());
+        freedoms.add(entries, mesh.tets(t, a), mesh.tets(t, b), block);
+      }
+  }
+  return matrix_of(entries, freedoms.count, freedoms.count);
+}
+
+// The softest modes of K and the diagonal mass m, by subspace iteration from a written seed; columns, softest
+// first.
+Eigen::MatrixXd softest_modes(const Sparse& k, const Solver& solver, const Vector& m, int count) {
+  Rng rng(19, 0);
+  const int columns = std::min(int(k.rows()), count + 4);
+  Eigen::MatrixXd x = Eigen::MatrixXd::NullaryExpr(k.rows(), columns, [&] { return rng.uniform(-1, 1); });
+  for (int pass = 0; pass < 20; ++pass) {
+    const Eigen::MatrixXd y = solver.solve(m.asDiagonal() * x);
+    const Eigen::GeneralizedSelfAdjointEigenSolver<Eigen::MatrixXd> eigen(y.transpose() * (k * y),
+                                                                          y.transpose() * m.asDiagonal() * y);
+    x = y * eigen.eigenvectors();
+  }
+  return x.leftCols(std::min(columns, count));
+}
+
+// How far a load moves the quadratic tets (the work it does), by conjugate gradients; preconditioner: the
+// diagonal, and the coarse mesh's answer. What is missing falls with the square of the residual.
+double compliance(const Quadratic& reference, const Sparse& from_coarse, const Solver& coarse,
+                  const Vector& load, double hold) {
+  constexpr int most = 500;
+  const Vector diagonal = reference.diagonal();
+  const double enough = 1e-3 * load.norm();
+  Vector u = Vector::Zero(load.size()), r = load, p;
+  double rz = 0;
+  for (int i = 0; i < most && r.norm() > enough; ++i) {
+    const Vector z =
+        0.5 * r.cwiseQuotient(diagonal) + from_coarse * coarse.solve(from_coarse.transpose() * r);
+    const double before = std::exchange(rz, r.dot(z));
+    p = i == 0 ? z : Vector(z + rz / before * p);
+    const Vector q = reference.forces(p) + hold * diagonal.cwiseProduct(p);
+    const double step = rz / p.dot(q);
+    u += step * p, r -= step * q;
+  }
+  return load.dot(u);
+}
+
+// The six rigid motions as fields (N × 3).
+std::vector<Points> rigid_motions(const Points& x) {
+  std::vector<Points> motions;
+  const Eigen::RowVector3d center = x.colwise().mean();
+  for (int axis = 0; axis < 3; ++axis) {
+    const Vec3 along = Vec3::Unit(axis);
+    motions.push_back(along.transpose().replicate(x.rows(), 1));
+    Points turn(x.rows(), 3);
+    for (int n = 0; n < x.rows(); ++n) turn.row(n) = along.cross((x.row(n) - center).transpose()).transpose();
+    motions.push_back(turn);
+  }
+  return motions;
+}
+
+// The material's answer at one fineness.
+struct Level {
+  Sparse to_mesh;  // values at the cage's nodes → at those of the mesh whose tets are quadratic
+  Quadratic tets;
+  Sparse from_coarse;  // what may move of the cage → of this
+
+  Level(const TetMesh& mesh, const Sparse& interpolate, const std::vector<bool>& fixed,
+        const std::vector<Lame>& of_tet, const Freedoms& coarse)
+      : to_mesh(interpolate),
+        tets(mesh, fixed, of_tet),
+        from_coarse(over_axes(tets.from_mesh() * to_mesh, tets.freedoms(), coarse)) {}
+};
+
+// Takes rigid motions out of a force field (N × 3 at the cage's nodes) until its load moves nothing as a
+// whole.
+Points balanced(const Level& level, const Freedoms& coarse, const std::vector<Points>& rigid,
+                const Points& field) {
+  const int count = int(rigid.size());
+  const auto load = [&](const Points& f) -> Vector {
+    return level.from_coarse.transpose() * level.tets.load(level.to_mesh * f);
+  };
+  Eigen::MatrixXd of_rigid(count, count);
+  Vector of_field(count);
+  for (int i = 0; i < count; ++i) {
+    const Vector motion = coarse.from_nodes(rigid[i]);
+    for (int j = 0; j < count; ++j) of_rigid(i, j) = motion.dot(load(rigid[j]));
+    of_field[i] = motion.dot(load(field));
+  }
+  const Vector drift = of_rigid.ldlt().solve(of_field);
+  Points rest = field;
+  for (int i = 0; i < count; ++i) rest -= drift[i] * rigid[i];
+  return rest;
+}
+
+}  // namespace
+
+double locking_share(const TetMesh& rest, const std::vector<bool>& fixed, const std::vector<Lame>& of_tet,
+                     const std::vector<double>& node_mass, const ElementTables<double>& elements) {
+  const int tets = int(rest.tets.rows()), nodes = int(rest.positions.rows());
+  if (tets > most_tets) return 1;
+  const Freedoms coarse(fixed);
+  const double hold = coarse.count < 3 * nodes ? 0 : hold_free;
+  Sparse stiffness = stiffness_at_rest(elements, rest, of_tet, coarse);
+  stiffness += hold * Sparse(stiffness.diagonal().asDiagonal());
+  const Solver solver(stiffness);
+  if (solver.info() != Eigen::Success) return 1;
+
+  std::vector<Points> fields, rigid;  // forces a volume
+  if (hold == 0) {
+    for (int axis = 0; axis < 3; ++axis) fields.push_back(Vec3::Unit(axis).transpose().replicate(nodes, 1));
+  } else {
+    rigid = rigid_motions(rest.positions);
+    Vector mass(3 * nodes);
+    for (int k = 0; k < 3 * nodes; ++k) mass[k] = node_mass[std::size_t(k / 3)];
+    const Eigen::MatrixXd soft = softest_modes(stiffness, solver, mass, rigid_modes + modes);
+    for (int k = rigid_modes; k < soft.cols(); ++k) fields.push_back(coarse.to_nodes(soft.col(k)));
+  }
+
+  std::vector<Level> levels;
+  Sparse same(nodes, nodes);
+  same.setIdentity();
+  levels.emplace_back(rest, same, fixed, of_tet, coarse);
+  if (tets <= most_refined_tets) {
+    const Middles middles = middles_of(rest);
+    std::vector<Lame> of_part;
+    for (const Lame& lame : of_tet) of_part.insert(of_part.end(), 8, lame);
+    levels.emplace_back(refined(rest, middles), interpolation(middles, nodes),
+                        fixed_with_middles(fixed, middles), of_part, coarse);
+  }
+
+  double coarse_sum = 0, reference_sum = 0;
+  for (const Points& field : fields) {
+    double coarse_gives = 0, reference_gives = 0, before = 0;
+    for (const Level& level : levels) {
+      const Points force = balanced(level, coarse, rigid, field);
+      const Vector load = level.tets.load(level.to_mesh * force);
+      const Vector on_coarse = level.from_coarse.transpose() * load;
+      const double size = on_coarse.dot(coarse.from_nodes(force));
+      before = std::exchange(reference_gives,
+                             compliance(level.tets, level.from_coarse, solver, load, hold) / size);
+      coarse_gives = on_coarse.dot(solver.solve(on_coarse)) / size;
+    }
+    if (levels.size() > 1) reference_gives += still_missing * (reference_gives - before);
+    // The softest decide.
+    const double weight = std::pow(reference_gives, 3);
+    coarse_sum += weight * coarse_gives, reference_sum += weight * reference_gives;
+  }
+  const double share = coarse_sum / reference_sum;
+  // Rounded, so that no other rounding on the way shows.
+  return std::isfinite(share) ? std::clamp(std::round(512 * share) / 512, 0.05, 4.0) : 1;
+}
+
+}  // namespace limber::fem::detail

@@ -1,0 +1,123 @@
+// The same material in coarse and fine meshes (docs/dynamics.md, "One material, any mesh").
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "core/error.h"
+
+#include "fem/reference.h"
+#include "tests/fem/worlds.h"
+
+namespace limber::fem {
+namespace {
+
+using testing::alone;
+using testing::cube;
+using testing::grid;
+using testing::nodes_where;
+
+constexpr MaterialModel both_models[] = {MaterialModel::springs, MaterialModel::neo_hookean};
+
+// How far the middle of mass goes under so small a gravity that forces are linear: K u = f by conjugate
+// gradients, K as differences of the double reference's forces.
+Vec3 sag(BodySpec body, const Vec3& gravity_m_s2) {
+  const World world = build_world(alone(std::move(body)));
+  const auto& mass = world.tables64.node_mass;
+  const auto& inverse_mass = world.tables64.inverse_mass;
+  const ReferenceState rest = reference_state(rest_state(world));
+  const auto size = Eigen::Index(rest.positions.size());
+  const auto stiffness_times = [&](const Eigen::VectorXd& u) {
+    const double nudge = 1e-6 / u.cwiseAbs().maxCoeff();
+    Eigen::VectorXd force[2];
+    for (const int side : {0, 1}) {
+      ReferenceState state = rest;
+      for (Eigen::Index k = 0; k < size; ++k) state.positions[k] += (side ? nudge : -nudge) * u[k];
+      const std::vector<double> f = elastic_forces(world, state);
+      force[side] = Eigen::Map<const Eigen::VectorXd>(f.data(), size);
+    }
+    Eigen::VectorXd product = (force[0] - force[1]) / (2 * nudge);
+    for (Eigen::Index k = 0; k < size; ++k) product[k] *= inverse_mass[k / 3] > 0;
+    return product;
+  };
+  Eigen::VectorXd r(size), u = Eigen::VectorXd::Zero(size);
+  for (Eigen::Index k = 0; k < size; ++k)
+    r[k] = inverse_mass[k / 3] > 0 ? mass[k / 3] * gravity_m_s2[k % 3] : 0;
+  Eigen::VectorXd p = r;
+  const double enough = 1e-8 * r.squaredNorm();
+  int left = 5000;
+  for (; left > 0 && r.squaredNorm() > enough; --left) {
+    const Eigen::VectorXd q = stiffness_times(p);
+    const double before = r.squaredNorm(), step = before / p.dot(q);
+    u += step * p, r -= step * q;
+    p = r + r.squaredNorm() / before * p;
+  }
+  EXPECT_GT(left, 0);
+  Vec3 moved = Vec3::Zero();
+  for (Eigen::Index k = 0; k < size; ++k) moved[k % 3] += mass[k / 3] * u[k] / world.bodies[0].mass_kg;
+  return moved;
+}
+
+// The plate of the paper's Barriers: 0.35 × 3 × 2.2 m, held at the floor and at both side walls.
+BodySpec plate(int nx, int ny, int nz, const Material& material) {
+  BodySpec body{"plate", grid({0, 0, 0}, {0.35, 3, 2.2}, nx, ny, nz), material, {}};
+  body.fixed_nodes =
+      nodes_where(body.cage, [](const Vec3& p) { return p.y() < 1e-9 || p.y() > 3 - 1e-9 || p.z() < 1e-9; });
+  return body;
+}
+
+// Barriers1 and Barriers2 are one material: 270 tets and 1,100 sag alike under the same load. Without the law
+// they do not, by far.
+TEST(Locking, ThePlatesOfBothBarriersSagAlike) {
+  for (const MaterialModel model : both_models) {
+    SCOPED_TRACE(int(model));
+    Material material;
+    material.model = model;
+    const auto ratio = [&](bool mesh_independent) {
+      material.mesh_independent = mesh_independent;
+      const Vec3 load(0.05, 0, 0);
+      return sag(plate(2, 9, 3, material), load).x() / sag(plate(2, 11, 10, material), load).x();
+    };
+    EXPECT_NEAR(ratio(true), 1, 0.03);
+    EXPECT_LT(ratio(false), 0.6);
+  }
+}
+
+// A cantilever of slender shape against Euler and Bernoulli's beam, with the little that shear adds
+// (Timoshenko, κ = 5/6): w(x) under its own weight, averaged over the length.
+TEST(Locking, ACantileverSagsAsABeam) {
+  constexpr double length = 4, edge = 1, gravity = 0.02;
+  for (const MaterialModel model : both_models)
+    for (const int cells : {2, 3}) {
+      SCOPED_TRACE(fmt::format("model {}, {} cells", int(model), cells));
+      Material material;
+      material.model = model;
+      material.poisson_ratio = model == MaterialModel::springs ? 0.25 : 0;
+      material.mesh_independent = true;
+      BodySpec bar{"bar", grid({0, 0, 0}, {length, edge, edge}, 4 * cells, cells, cells), material, {}};
+      bar.fixed_nodes = nodes_where(bar.cage, [](const Vec3& p) { return p.x() < 1e-9; });
+      const double young = material.youngs_modulus_pa, shear = young / (2 * (1 + material.poisson_ratio));
+      const double load = material.density_kg_m3 * edge * edge * gravity, inertia = std::pow(edge, 4) / 12;
+      const double bending = load * std::pow(length, 4) / (20 * young * inertia);
+      const double shearing = load * length * length / (3 * (5.0 / 6) * shear * edge * edge);
+      EXPECT_NEAR(sag(bar, {0, 0, -gravity}).z() / -(bending + shearing), 1, 0.03);
+    }
+}
+
+// The finer the mesh, the less there is to mend.
+TEST(Locking, FineMeshesNeedLess) {
+  for (const MaterialModel model : both_models) {
+    double before = 0.6;
+    for (const int cells : {3, 5, 8}) {
+      Material material;
+      material.model = model;
+      material.mesh_independent = true;
+      const World world = build_world(alone({"cube", cube({0, 0, 0}, 1, cells), material, {}}));
+      const double missing = std::abs(world.bodies[0].stiffness_share - 1);
+      EXPECT_LT(missing, 0.75 * before);
+      before = missing;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace limber::fem
