@@ -1,0 +1,136 @@
+// Every scene that comes with limber, in the middle of contact: the same bits whatever the number of lanes,
+// the instruction set and the threads.
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <thread>
+
+#include "app/scene_world.h"
+#include "core/random.h"
+#include "fem/batch.h"
+#include "fem/observe.h"
+#include "scenes/library.h"
+#include "tests/core/temporary_folder.h"
+
+namespace limber::app {
+namespace {
+
+constexpr int rollouts = 16;
+constexpr int least_contact_steps = 3000;
+
+struct Cases {
+  State start;  // robot against an obstacle
+  std::vector<Control> controls;
+};
+
+Control push(const Vec3& force_n, int steps) {
+  Control control;
+  control.manipulation = Manipulation::body;
+  control.force_n = force_n.cast<float>();
+  control.steps = steps;
+  return control;
+}
+
+bool touches(const fem::World& world, const State& state) {
+  const fem::Penetration deepest = deepest_penetration(world, state);
+  return deepest.depth_m > 0 && deepest.other >= 0;
+}
+
+// Pushed towards the goal until something is in the way, and a little further; then on in many ways.
+Cases pressed_cases(const fem::World& world, const scenes::Scene& scene) {
+  Cases cases;
+  cases.start = rest_state(world);
+  const Vec3 towards =
+      (scene.goal.center_of_mass_m - center_of_mass_m(world, cases.start, world.robot)).normalized();
+  const double force_n = scene.planner.max_force_n;
+  const int fifty_ms = std::max(1, int(0.05 / world.dt_s));
+  const auto go_on = [&] {
+    cases.start = propagate(world, cases.start, push(0.7 * force_n * towards, fifty_ms)).end;
+  };
+  for (int i = 0; i < 200 && !touches(world, cases.start); ++i) go_on();
+  EXPECT_TRUE(touches(world, cases.start));
+  for (int i = 0; i < 4; ++i) go_on();
+  Rng rng(61, 0);
+  for (int i = 0; i < rollouts; ++i) {
+    Control control = push(force_n * (0.7 * towards + 0.3 * rng.direction()), 300 + rng.below(200));
+    control.manipulation = Manipulation(i % 4);
+    control.node = rng.below(world.bodies[std::size_t(world.robot)].node_count());
+    control.radius_m = 0.4f;
+    control.target_m = scene.goal.center_of_mass_m.cast<float>();
+    control.max_force_n = float(force_n);
+    cases.controls.push_back(control);
+  }
+  return cases;
+}
+
+// The ends of the rollouts [first, last).
+std::vector<State> ends(const fem::World& world, const Cases& cases, int first, int last, int lanes,
+                        fem::InstructionSet set) {
+  std::vector<fem::Rollout> work;
+  for (int i = first; i < last; ++i) work.push_back({&cases.start, cases.controls[std::size_t(i)], {}, {}});
+  fem::Batch batch(world, lanes, set);
+  propagate(batch, work);
+  std::vector<State> all;
+  for (const fem::Rollout& r : work) {
+    EXPECT_EQ(r.outcome.status, fem::RunStatus::ok) << r.outcome.reason;
+    all.push_back(r.end);
+  }
+  return all;
+}
+
+std::vector<State> ends_of_two_threads(const fem::World& world, const Cases& cases, int lanes) {
+  std::vector<State> all, others;
+  std::thread other(
+      [&] { others = ends(world, cases, rollouts / 2, rollouts, lanes, fem::InstructionSet::automatic); });
+  all = ends(world, cases, 0, rollouts / 2, lanes, fem::InstructionSet::automatic);
+  other.join();
+  all.insert(all.end(), others.begin(), others.end());
+  return all;
+}
+
+// Steps in pieces of ten at whose end the robot touches something: a second way to the same ends.
+int count_contact_steps(const fem::World& world, const Cases& cases, const std::vector<State>& expected) {
+  constexpr int piece = 10;
+  int steps = 0;
+  for (int i = 0; i < rollouts; ++i) {
+    State state = cases.start;
+    fem::Batch batch(world, 1);
+    for (Control rest = cases.controls[std::size_t(i)]; rest.steps > 0; rest.steps -= piece) {
+      Control part = rest;
+      part.steps = std::min(rest.steps, piece);
+      fem::Rollout rollout{&state, part, {}, {}};
+      propagate(batch, {&rollout, 1});
+      state = rollout.end;
+      if (touches(world, state)) steps += part.steps;
+    }
+    EXPECT_TRUE(state == expected[std::size_t(i)]) << i;
+  }
+  return steps;
+}
+
+TEST(Identity, EverySceneHasTheSameBitsEverywhere) {
+  TemporaryFolder folder;
+  ::setenv("LIMBER_MODELS", folder.path().c_str(), 1);  // the made models, on every machine
+  std::vector<std::pair<fem::InstructionSet, const char*>> sets{{fem::InstructionSet::sse2, "SSE2"}};
+  if (__builtin_cpu_supports("avx2")) sets.push_back({fem::InstructionSet::avx2, "AVX2"});
+  if (__builtin_cpu_supports("avx512bw")) sets.push_back({fem::InstructionSet::avx512, "AVX-512"});
+  for (const scenes::KnownScene& known : scenes::known_scenes()) {
+    SCOPED_TRACE(known.name);
+    const scenes::Scene scene = scenes::read_scene_file(known.file);
+    const fem::World world = build_world(scene, prepare_bodies(scene, {}, folder / known.name));
+    const Cases cases = pressed_cases(world, scene);
+    const std::vector<State> alone = ends(world, cases, 0, rollouts, 1, fem::InstructionSet::automatic);
+    EXPECT_NE(alone[0], alone[4]);
+    const int contact_steps = count_contact_steps(world, cases, alone);
+    EXPECT_GE(contact_steps, least_contact_steps);
+    fmt::print("{}: {} steps in contact\n", known.name, contact_steps);
+    for (const int lanes : {1, 4, 8, 16}) {
+      for (const auto& [set, name] : sets)
+        EXPECT_TRUE(ends(world, cases, 0, rollouts, lanes, set) == alone) << lanes << " lanes, " << name;
+      EXPECT_TRUE(ends_of_two_threads(world, cases, lanes) == alone) << lanes << " lanes, two threads";
+    }
+  }
+}
+
+}  // namespace
+}  // namespace limber::app
