@@ -48,10 +48,12 @@ void face_normals(const Real* const place[4], Real normal[4][3]) {
 }
 
 // Normal force k d − c ṙ·n, never pulling; friction against the slip, at most μ times that, and at most what
-// takes a share of the slip away in one step. False: no force.
-template <class Real>
-bool penalty_force(Real beta, Real depth, const Real normal[3], const Real relative_velocity[3], Real mass,
-                   Real step, Real friction, Real force[3]) {
+// takes a share of the slip away in one step. `mass_along` a unit vector is what is set against a push.
+// False: no force.
+template <class Real, class Mass>
+bool penalty_force(Real beta, Real depth, const Real normal[3], const Real relative_velocity[3],
+                   const Mass& mass_along, Real step, Real friction, Real force[3]) {
+  const Real mass = mass_along(normal);
   const Real damping = Real(2 * contact_damping_ratio) * std::sqrt(beta);
   const Real speed = dot(relative_velocity, normal);
   const Real push = mass / step * (beta * depth / step - damping * speed);
@@ -59,8 +61,11 @@ bool penalty_force(Real beta, Real depth, const Real normal[3], const Real relat
   Real slip[3];
   for (int c = 0; c < 3; ++c) slip[c] = relative_velocity[c] - speed * normal[c];
   const Real slip_speed = std::sqrt(dot(slip, slip));
-  const Real most = friction * push, stop = Real(contact_slip_stop) * mass / step * slip_speed;
-  const Real drag = stop > most ? most / slip_speed : Real(contact_slip_stop) * mass / step;
+  Real slip_way[3];
+  for (int c = 0; c < 3; ++c) slip_way[c] = slip_speed > 0 ? slip[c] / slip_speed : Real(0);
+  const Real slip_mass = mass_along(slip_way);
+  const Real most = friction * push, stop = Real(contact_slip_stop) * slip_mass / step * slip_speed;
+  const Real drag = stop > most ? most / slip_speed : Real(contact_slip_stop) * slip_mass / step;
   for (int c = 0; c < 3; ++c) force[c] = push * normal[c] - drag * slip[c];
   return true;
 }
@@ -121,6 +126,8 @@ Contacts<Real>::Contacts(const World& world, const Kernels<Real>& kernels, int l
   for (int a = 0; a < bodies_; ++a)
     for (int b = a + 1; b < bodies_; ++b)
       if (world.bodies[a].moving || world.bodies[b].moving) pairs_.emplace_back(a, b);
+  for (const Body& body : world.bodies)
+    if (body.kind == BodyKind::rigid) bearings_.resize(world.bodies.size());
   lists_.resize(std::size_t(lanes) * pairs_.size());
   packed_.resize(std::size_t(world.nodes));
   listed_.assign(std::size_t(world.nodes), false);
@@ -140,12 +147,31 @@ void Contacts<Real>::forget(int lane) {
 
 template <class Real>
 void Contacts<Real>::add_forces(int lane, const LaneView<Real>& view) {
+  if (!bearings_.empty()) return add_forces_with_rigid(lane, view);
   for (const auto& [a, b] : pairs_)
-    for (const Touch<Real>& touch : find(lane, view, a, b))
-      respond(view, tables_.pair_friction[a * bodies_ + b], touch);
-  if (!world_.walls) return;
-  for (int body = 0; body < bodies_; ++body)
-    if (topology_.bodies[body].moving) add_wall_forces(view, body);
+    for (const Touch<Real>& touch : find(lane, view, a, b)) respond(view, a, b, touch);
+  for (int body = 0; body < bodies_; ++body) add_wall_forces(view, body);
+}
+
+// The mass that a rigid body sets against a contact depends on all it has, so these are found first.
+template <class Real>
+void Contacts<Real>::add_forces_with_rigid(int lane, const LaneView<Real>& view) {
+  held_.clear();
+  for (Bearing& bearing : bearings_) bearing.depths = 0;
+  for (const auto& [a, b] : pairs_)
+    for (const Touch<Real>& touch : find(lane, view, a, b)) {
+      if (!(touch.depth > 0)) continue;
+      held_.push_back({a, b, touch});
+      bearings_[a].depths += double(touch.depth), bearings_[b].depths += double(touch.depth);
+    }
+  for (int body = 0; body < bodies_; ++body) {
+    Bearing& bearing = bearings_[body];
+    if (world_.bodies[body].kind != BodyKind::rigid) continue;
+    for_each_beyond_wall(view, body, [&](int, int, Real, Real depth) { bearing.depths += double(depth); });
+    if (bearing.depths > 0) bearing.measure(view, topology_.bodies[body], tables_.node_mass);
+  }
+  for (const Held& held : held_) respond(view, held.a, held.b, held.touch);
+  for (int body = 0; body < bodies_; ++body) add_wall_forces(view, body);
 }
 
 template <class Real>
@@ -712,22 +738,38 @@ bool Contacts<Real>::walk_out(const LaneView<Real>& view, int tet, int before, c
 }
 
 template <class Real>
-void Contacts<Real>::respond(const LaneView<Real>& view, Real friction, const Touch<Real>& touch) const {
+void Contacts<Real>::respond(const LaneView<Real>& view, int a, int b, const Touch<Real>& touch) const {
   if (!(touch.depth > 0)) return;
   const Topology::Point& point = topology_.points[touch.point];
   const int* corner = topology_.tets[touch.tet].node;
   const int node[6] = {point.node[0], point.node[1], corner[0], corner[1], corner[2], corner[3]};
   const Real share[6] = {touch.share[0],   touch.share[1],   -touch.weight[0],
                          -touch.weight[1], -touch.weight[2], -touch.weight[3]};
-  Real inverse_mass = 0, relative[3] = {0, 0, 0};
-  for (int i = 0; i < 6; ++i) {
-    inverse_mass += share[i] * share[i] * tables_.inverse_mass[node[i]];
-    for (int c = 0; c < 3; ++c) relative[c] += share[i] * view.v[view.state.at(node[i], c)];
-  }
-  if (!(inverse_mass > 0)) return;
+  Real relative[3] = {0, 0, 0}, place[3] = {0, 0, 0};
+  for (int i = 0; i < 6; ++i)
+    for (int c = 0; c < 3; ++c) {
+      relative[c] += share[i] * view.v[view.state.at(node[i], c)];
+      if (i < 2) place[c] += share[i] * view.x[view.state.at(node[i], c)];
+    }
+  const bool of_a = node[0] >= topology_.bodies[a].first_node && node[0] < topology_.bodies[a].last_node;
+  const int side[2] = {of_a ? a : b, of_a ? b : a};  // whose point, whose tet
+  Real inverse_mass = 0;                             // of what is not rigid
+  for (int i = 0; i < 6; ++i)
+    if (world_.bodies[side[i >= 2]].kind != BodyKind::rigid)
+      inverse_mass += share[i] * share[i] * tables_.inverse_mass[node[i]];
+  const bool any_rigid = world_.bodies[a].kind == BodyKind::rigid || world_.bodies[b].kind == BodyKind::rigid;
+  if (!any_rigid && !(inverse_mass > 0)) return;
+  const auto mass_along = [&](const Real along[3]) {
+    Real inverse = inverse_mass;
+    for (const int body : side)
+      if (world_.bodies[body].kind == BodyKind::rigid)
+        inverse += Real(bearings_[body].inverse_mass(place, along, touch.depth));
+    return 1 / inverse;
+  };
   const Real beta = Real(point.share[1] > 0 ? contact_edge_beta : contact_beta);
   Real force[3];
-  if (!penalty_force(beta, touch.depth, touch.direction, relative, 1 / inverse_mass, step_, friction, force))
+  if (!penalty_force(beta, touch.depth, touch.direction, relative, mass_along, step_,
+                     tables_.pair_friction[a * bodies_ + b], force))
     return;
   for (int i = 0; i < 6; ++i)
     if (tables_.inverse_mass[node[i]] > 0)
@@ -737,29 +779,41 @@ void Contacts<Real>::respond(const LaneView<Real>& view, Real friction, const To
         {{node[0], node[1]}, {share[0], share[1]}, corner[0], touch.depth, {force[0], force[1], force[2]}});
 }
 
+// Calls each(node, axis, the wall's normal along it, depth).
 template <class Real>
-void Contacts<Real>::add_wall_forces(const LaneView<Real>& view, int body) const {
+template <class Each>
+void Contacts<Real>::for_each_beyond_wall(const LaneView<Real>& view, int body, const Each& each) const {
+  if (!world_.walls || !topology_.bodies[body].moving) return;
   for (int axis = 0; axis < 3; ++axis)
     for (int side = 0; side < 2; ++side) {
-      const Real out = side == 0 ? Real(1) : Real(-1);  // the wall's normal along the axis
+      const Real out = side == 0 ? Real(1) : Real(-1);
       const Real wall = Real(side == 0 ? world_.bounds_m.lower[axis] : world_.bounds_m.upper[axis]);
       const Real* reach = side == 0 ? view.lower : view.upper;
       if (!(out * (wall - reach[(3 * body + axis) * view.stride]) > 0)) continue;
-      Real normal[3] = {0, 0, 0};
-      normal[axis] = out;
       for (int n : topology_.bodies[body].surface_nodes) {
         const Real depth = out * (wall - view.x[view.state.at(n, axis)]);
-        if (!(depth > 0) || !(tables_.inverse_mass[n] > 0)) continue;
-        const Real velocity[3] = {view.v[view.state.at(n, 0)], view.v[view.state.at(n, 1)],
-                                  view.v[view.state.at(n, 2)]};
-        Real force[3];
-        if (!penalty_force(Real(contact_beta), depth, normal, velocity, tables_.node_mass[n], step_,
-                           tables_.pair_friction[body * bodies_ + body], force))
-          continue;
-        for (int c = 0; c < 3; ++c) view.f[view.force.at(n, c)] += force[c];
-        if (told_) told_->push_back({{n, n}, {1, 0}, -1, depth, {force[0], force[1], force[2]}});
+        if (depth > 0 && tables_.inverse_mass[n] > 0) each(n, axis, out, depth);
       }
     }
+}
+
+template <class Real>
+void Contacts<Real>::add_wall_forces(const LaneView<Real>& view, int body) const {
+  const bool rigid = world_.bodies[body].kind == BodyKind::rigid;
+  for_each_beyond_wall(view, body, [&](int n, int axis, Real out, Real depth) {
+    Real normal[3] = {0, 0, 0}, place[3], velocity[3], force[3];
+    normal[axis] = out;
+    for (int c = 0; c < 3; ++c)
+      place[c] = view.x[view.state.at(n, c)], velocity[c] = view.v[view.state.at(n, c)];
+    const auto mass_along = [&](const Real along[3]) {
+      return rigid ? Real(1 / bearings_[body].inverse_mass(place, along, depth)) : tables_.node_mass[n];
+    };
+    if (!penalty_force(Real(contact_beta), depth, normal, velocity, mass_along, step_,
+                       tables_.pair_friction[body * bodies_ + body], force))
+      return;
+    for (int c = 0; c < 3; ++c) view.f[view.force.at(n, c)] += force[c];
+    if (told_) told_->push_back({{n, n}, {1, 0}, -1, depth, {force[0], force[1], force[2]}});
+  });
 }
 
 template class Contacts<float>;

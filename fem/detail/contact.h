@@ -5,6 +5,8 @@
 #include <vector>
 
 #include "core/types.h"
+#include "fem/detail/bearing.h"
+#include "fem/detail/lane_view.h"
 #include "fem/detail/tables.h"
 
 namespace limber::fem {
@@ -19,18 +21,6 @@ inline constexpr double contact_beta = 0.4;       // vertices
 inline constexpr double contact_edge_beta = 0.2;  // points of edges: a vertex has six of them
 inline constexpr double contact_damping_ratio = 0.3;
 inline constexpr double contact_slip_stop = 0.5;
-
-// One lane's arrays.
-template <class Real>
-struct LaneView {
-  const Real *x, *v;
-  Real* f;
-  Layout state, force;  // of x and v, of f
-  int stride;           // lanes
-  // Boxes of the bodies, [(3 body + c) stride], and how far each body's fastest node can have come since
-  // load, [body stride].
-  const Real *lower, *upper, *travel;
-};
 
 // A contact point inside a tet of another body: a vertex; the middle of an edge that has an end inside; or,
 // of an edge that passes through, the middle of the stretch inside. All follows from the present positions.
@@ -140,7 +130,10 @@ class Contacts {
   Touch<Real> leave_along_edges(const LaneView<Real>&, Touch<Real>);
   bool walk_out(const LaneView<Real>&, int tet, int before, const Real p[3], const Real q[3], Real way[3],
                 Real normal[3]) const;
-  void respond(const LaneView<Real>&, Real friction, const Touch<Real>&) const;
+  void add_forces_with_rigid(int lane, const LaneView<Real>&);
+  void respond(const LaneView<Real>&, int a, int b, const Touch<Real>&) const;
+  template <class Each>
+  void for_each_beyond_wall(const LaneView<Real>&, int body, const Each&) const;
   void add_wall_forces(const LaneView<Real>&, int body) const;
 
   const World& world_;
@@ -151,6 +144,14 @@ class Contacts {
   std::vector<Exerted<Real>>* told_ = nullptr;
   Real step_;  // the step from which stiffness follows
   std::vector<std::pair<int, int>> pairs_;
+  // Where there are rigid bodies that move: a body, in the lane at hand; and all touches of that, with their
+  // bodies.
+  std::vector<Bearing> bearings_;
+  struct Held {
+    int a, b;
+    Touch<Real> touch;
+  };
+  std::vector<Held> held_;
   std::vector<List> lists_;  // [lane × pairs + pair]
   std::vector<Touch<Real>> touches_;
   std::vector<Place> packed_;       // by world node; valid for the nodes of the list at hand

@@ -227,17 +227,18 @@ TEST(Rigid, FrictionHoldsAndSlidesOnASlope) {
       const double before = momenta(world, landed).linear.x() / mass,
                    after = momenta(world, end).linear.x() / mass;
       const double gained = 10 * std::cos(angle) * std::max(0.0, tangent - friction) * 1000 * world.dt_s;
-      EXPECT_NEAR(after - before, gained, 0.01 + 0.01 * gained);
+      // Without friction it is at 4 to 7 m/s, and vertices of a body that pass under its leading edge
+      // take 1.9 % of that.
+      EXPECT_NEAR(after - before, gained, on_floor ? 1e-3 : 0.001 + 0.02 * gained);
       if (friction > tangent) {
-        // Friction takes half of a slip away in a step and half of the nodes bear on the slope, so it creeps
-        // at 4 g h sin θ, and a little faster while it trembles.
-        EXPECT_LT(after, 6 * 10 * std::sin(angle) * world.dt_s);
+        // Friction stops a slip over a few steps, so it creeps (docs/contact.md).
+        EXPECT_LT(after, 4 * 10 * std::sin(angle) * world.dt_s);
       }
     }
 }
 
-// Dropped on a corner, a box comes to rest on a face; its depth is that of the stiffness rule, as if it were
-// soft: g h²/β times all mass over the mass of the nodes that carry.
+// Dropped on a corner, a box comes to rest on a face, whose nodes are equally deep there and so have equal
+// shares of what it sets against the floor: g h²/2β · M/(mean of 1/(1/M + (r × n)·J⁻¹(r × n))).
 TEST(Rigid, ABoxComesToRestOnTheFloor) {
   Material material;
   material.friction = 0.5;
@@ -252,15 +253,24 @@ TEST(Rigid, ABoxComesToRestOnTheFloor) {
   const World world = build_world(spec);
   const State end = coast(world, rest_state(world), 8000);
   EXPECT_LT(mean_speed_m_s(world, end, 0), 1e-4);
-  double bottom = 0, sum = 0;
+  const double mass = world.bodies[0].mass_kg;
+  Eigen::Matrix3d inertia = Eigen::Matrix3d::Zero();
+  for (int n = 0; n < world.nodes; ++n) {
+    const Vec3 r = flat.row(n);
+    inertia +=
+        world.tables64.node_mass[n] * (r.squaredNorm() * Eigen::Matrix3d::Identity() - r * r.transpose());
+  }
+  double set_against = 0, depth = 0, count = 0;
   for (int n = 0; n < world.nodes; ++n)
     if (flat(n, 2) < -0.29) {
-      bottom += world.tables64.node_mass[n];
-      sum -= world.tables64.node_mass[n] * place(end, n).z();
+      const Vec3 lever = Vec3(flat.row(n)).cross(Vec3::UnitZ());
+      set_against += 1 / (1 / mass + lever.dot(inertia.inverse() * lever));
+      depth -= place(end, n).z();
+      ++count;
     }
-  const double expected =
-      10 * world.contact_dt_s * world.contact_dt_s / detail::contact_beta * world.bodies[0].mass_kg / bottom;
-  EXPECT_NEAR(sum / bottom / expected, 1, 0.05);
+  const double expected = 10 * world.contact_dt_s * world.contact_dt_s / (2 * detail::contact_beta) * mass /
+                          (set_against / count);
+  EXPECT_NEAR(depth / count / expected, 1, 0.05);
   EXPECT_LT(distortion(world, end), 1e-6);
 }
 
@@ -307,6 +317,30 @@ TEST(Rigid, AThrownCubeComesBack) {
     RecordProperty("deepest_mm", int(1e3 * deepest));
     EXPECT_LT(deepest, 2 * pace * world.dt_s / std::sqrt(detail::contact_beta));
   }
+}
+
+// A fine cube on its corner: one node of 1/12,288 of its mass meets the wall first, and all of the body
+// stands behind it.
+TEST(Rigid, ALightNodeBearsTheWholeBody) {
+  TetMesh mesh = cube(Vec3::Zero(), 1, 8);
+  const Eigen::Matrix3d turn =
+      Eigen::Quaterniond::FromTwoVectors(Vec3(1, 1, 1), Vec3::UnitX()).toRotationMatrix();
+  mesh.positions = mesh.positions * turn.transpose();
+  WorldSpec spec = alone(rigid(mesh));
+  spec.bounds_m = {Vec3::Constant(-1), Vec3::Constant(1)};
+  spec.walls = true;
+  const World world = build_world(spec);
+  State state = rest_state(world);
+  const double pace = 2;
+  set_motion(world, {pace, 0, 0}, {0, 0, 0}, state);
+  double deepest = 0;
+  for (int i = 0; i < 150; ++i) {
+    state = coast(world, state, 1);
+    deepest = std::max(deepest, deepest_penetration(world, state).depth_m);
+  }
+  EXPECT_LT(momenta(world, state).linear.x(), 0);
+  EXPECT_GT(deepest, 0);
+  EXPECT_LT(deepest, 1.2 * pace * world.dt_s / std::sqrt(2 * detail::contact_beta));
 }
 
 // A rigid robot pushed at a soft plate, by every manipulation: the same bits for any number of lanes and any
