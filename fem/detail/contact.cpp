@@ -183,64 +183,31 @@ const std::vector<Touch<Real>>& Contacts<Real>::find(int lane, const LaneView<Re
   }
   const auto pair = std::find(pairs_.begin(), pairs_.end(), std::pair(a, b));
   List& list = lists_[lane * pairs_.size() + std::size_t(pair - pairs_.begin())];
-  const Real moved = refresh(view, a, b, list);
+  const Real reach = (tables_.skin[a] + tables_.skin[b]) / 2;
+  const Real travel = view.travel[a * view.stride] + view.travel[b * view.stride];
+  refresh(view, a, b, reach, travel, list);
   for (int node : list.nodes) fetch(view, node, packed_[node].at);
-  find_touches(view, b, moved, list.points[0]);
-  find_passing_edges(view, b, moved, list.edges[0]);
+  find_touches(view, b, travel, list.points[0]);
+  find_passing_edges(view, b, reach, travel, list.edges[0]);
   const std::size_t second = touches_.size();
-  find_touches(view, a, moved, list.points[1]);
-  find_passing_edges(view, a, moved, list.edges[1]);
+  find_touches(view, a, travel, list.points[1]);
+  find_passing_edges(view, a, reach, travel, list.edges[1]);
   measure_depths(view, a, b, 0, second);
   measure_depths(view, b, a, second, touches_.size());
   return touches_;
 }
 
 // A list holds while the two bodies' nodes together have moved less than the reach it was built with; the
-// tenth kept back is for rounding. How far that is follows from the speeds; what swings to and fro goes less
-// far, so it is measured anew now and then. Returns it.
+// tenth kept back is for rounding.
 template <class Real>
-Real Contacts<Real>::refresh(const LaneView<Real>& view, int a, int b, List& list) {
-  constexpr Real measure_after = Real(0.1), worn = Real(0.7);  // of the reach
-  const Real reach = (tables_.skin[a] + tables_.skin[b]) / 2;
-  const Real travel = view.travel[a * view.stride] + view.travel[b * view.stride];
-  if (list.built && travel - list.travel_when_measured > measure_after * reach) {
-    list.moved = way_since_build(view, a, list.places[0]) + way_since_build(view, b, list.places[1]);
-    list.travel_when_measured = travel;
-    list.built = list.moved <= worn * reach;
-  }
-  if (list.built) return list.moved + (travel - list.travel_when_measured);
+void Contacts<Real>::refresh(const LaneView<Real>& view, int a, int b, Real reach, Real travel, List& list) {
+  if (list.built && travel - list.travel_at_build <= kept * reach) return;
   list.built = true;
-  list.travel_when_measured = travel;
-  list.moved = 0;
-  keep_places(view, a, list.places[0]), keep_places(view, b, list.places[1]);
+  list.travel_at_build = travel;
   list.nodes.clear();
   build_direction(view, a, b, reach, list, 0);
   build_direction(view, b, a, reach, list, 1);
   for (int node : list.nodes) listed_[node] = false;
-  return 0;
-}
-
-template <class Real>
-void Contacts<Real>::keep_places(const LaneView<Real>& view, int index, std::vector<Real>& places) const {
-  const Topology::Body& body = topology_.bodies[index];
-  places.clear();
-  for (int n = body.first_node; n < body.last_node && body.moving; ++n)
-    for (int c = 0; c < 3; ++c) places.push_back(view.x[view.state.at(n, c)]);
-}
-
-// Of the node that went farthest.
-template <class Real>
-Real Contacts<Real>::way_since_build(const LaneView<Real>& view, int index,
-                                     const std::vector<Real>& places) const {
-  const Topology::Body& body = topology_.bodies[index];
-  Real farthest2 = 0;
-  const Real* place = places.data();
-  for (int n = body.first_node; n < body.last_node && body.moving; ++n, place += 3) {
-    Real way[3];
-    for (int c = 0; c < 3; ++c) way[c] = view.x[view.state.at(n, c)] - place[c];
-    farthest2 = std::max(farthest2, dot(way, way));
-  }
-  return std::sqrt(farthest2);
 }
 
 // Tet by tet, the points and edges that slabs find in its box; then by point, which keeps the tets of each
@@ -264,6 +231,13 @@ void Contacts<Real>::build_direction(const LaneView<Real>& view, int from, int i
   list_found(slabs_[1], points, reach, list, list.edges[direction]);
 }
 
+template <class Real>
+void Contacts<Real>::fall_asleep(Record& record, const Near& near) {
+  record.asleep_until = near.candidates[record.begin].asleep_until;
+  for (int k = record.begin + 1; k < record.end; ++k)
+    record.asleep_until = std::min(record.asleep_until, near.candidates[k].asleep_until);
+}
+
 // Counting sort by point.
 template <class Real>
 void Contacts<Real>::list_found(Slabs& slabs, int points, Real reach, List& list, Near& near) {
@@ -277,12 +251,9 @@ void Contacts<Real>::list_found(Slabs& slabs, int points, Real reach, List& list
       near.records.push_back({first_point_ + k, counts_[k], counts_[k + 1], 0});
   }
   for (const Found& f : slabs.found)
-    near.candidates[counts_[f.point]++] = {f.tet, f.face, kept * f.distance - rounding * reach};
-  for (Record& r : near.records) {
-    r.asleep_until = near.candidates[r.begin].asleep_until;
-    for (int k = r.begin; k < r.end; ++k)
-      r.asleep_until = std::min(r.asleep_until, near.candidates[k].asleep_until);
-  }
+    near.candidates[counts_[f.point]++] = {f.tet, f.face,
+                                           list.travel_at_build + kept * f.distance - rounding * reach};
+  for (Record& record : near.records) fall_asleep(record, near);
 
   const auto name = [&](const int* node, int count) {
     for (int i = 0; i < count; ++i)
@@ -413,10 +384,10 @@ void Contacts<Real>::collect_near(int t, Real reach) {
 // The first tet that contains the point, in ascending order, has it: a point on a shared face has one owner.
 // Middles count where an end is inside; an edge with neither passes through, if at all.
 template <class Real>
-void Contacts<Real>::find_touches(const LaneView<Real>& view, int into, Real moved, Near& near) {
+void Contacts<Real>::find_touches(const LaneView<Real>& view, int into, Real travel, Near& near) {
   const Span<Real> box(view, into);
   for (const Record& record : near.records) {
-    if (record.asleep_until > moved) continue;
+    if (record.asleep_until > travel) continue;
     const Topology::Point& point = topology_.points[record.point];
     const bool vertex = point.node[0] == point.node[1];
     if (!vertex && touch_of_node_[point.node[0]] < 0 && touch_of_node_[point.node[1]] < 0) continue;
@@ -427,7 +398,7 @@ void Contacts<Real>::find_touches(const LaneView<Real>& view, int into, Real mov
     if (!meets(p, p, box.lower, box.upper)) continue;
     for (int k = record.begin; k < record.end; ++k) {
       Candidate& candidate = near.candidates[k];
-      if (candidate.asleep_until > moved) continue;
+      if (candidate.asleep_until > travel) continue;
       const Topology::Tet& tet = topology_.tets[candidate.tet];
       const auto side = [&](int i) {
         const int* face = tet.face[i];
@@ -452,45 +423,66 @@ void Contacts<Real>::find_touches(const LaneView<Real>& view, int into, Real mov
   }
 }
 
-// Edges with no end inside: cut by the planes of each tet, what is left of them is inside.
+// Edges with no end inside: cut by the planes of each tet, what is left of them is inside. Those that turn
+// out to be apart sleep until they can have met.
 template <class Real>
-void Contacts<Real>::find_passing_edges(const LaneView<Real>& view, int into, Real moved, Near& near) {
+void Contacts<Real>::find_passing_edges(const LaneView<Real>& view, int into, Real reach, Real travel,
+                                        Near& near) {
   const Span<Real> box(view, into);
-  for (const Record& record : near.records) {
-    if (record.asleep_until > moved) continue;
+  awake_.clear(), measured_.clear();
+  for (std::size_t r = 0; r < near.records.size(); ++r) {
+    const Record& record = near.records[r];
+    if (record.asleep_until > travel) continue;
     const int* node = topology_.points[record.point].node;
     if (touch_of_node_[node[0]] >= 0 || touch_of_node_[node[1]] >= 0) continue;
-    const Real *const p = packed_[node[0]].at, *const q = packed_[node[1]].at;
-    if (!meets(p, q, box.lower, box.upper)) continue;
-    stretches_.clear();
+    if (!meets(packed_[node[0]].at, packed_[node[1]].at, box.lower, box.upper)) continue;
     for (int k = record.begin; k < record.end; ++k) {
-      Candidate& candidate = near.candidates[k];
-      if (candidate.asleep_until > moved) continue;
-      const Topology::Tet& tet = topology_.tets[candidate.tet];
-      const auto side = [&](const Real* at, int i) {
-        const int* face = tet.face[i];
-        return Real(tet.sign[i]) *
-               det_from(at, packed_[face[0]].at, packed_[face[1]].at, packed_[face[2]].at);
-      };
-      if (side(p, candidate.face) < 0 && side(q, candidate.face) < 0) continue;
-      Stretch s{candidate.tet, -1, -1, 0, 1, {}, {}};
-      Real sum = 0;
-      for (int i = 0; i < 4 && s.begin < s.end; ++i) {
-        const Real at_p = side(p, i), at_q = side(q, i);
-        s.at_begin[i] = at_p, s.at_end[i] = at_q;
-        sum += at_p;
-        if ((at_p < 0) == (at_q < 0)) {
-          if (at_p < 0) candidate.face = i, s.end = 0;
-          continue;
-        }
-        const Real cut = at_p / (at_p - at_q);
-        if (at_p < 0 && cut > s.begin) s.begin = cut, s.entry = i;
-        if (at_q < 0 && cut < s.end) s.end = cut, s.exit = i;
-      }
-      if (s.begin < s.end && sum > 0) stretches_.push_back(s);
+      const Candidate& candidate = near.candidates[k];
+      if (candidate.asleep_until > travel) continue;
+      const int* corner = topology_.tets[candidate.tet].node;
+      measured_.push_back({{corner[0], corner[1], corner[2], corner[3]}, node[0], node[1]});
+      awake_.push_back({int(r), k});
     }
-    if (!stretches_.empty()) touch_of_stretches(record.point);
   }
+  edge_distance_.resize(measured_.size());
+  kernels_.edge_distances(measured_.data(), int(measured_.size()), packed_[0].at, edge_distance_.data());
+  stretches_.clear();
+  for (std::size_t i = 0; i < awake_.size(); ++i) {
+    const auto [r, index] = awake_[i];
+    Candidate& candidate = near.candidates[index];
+    if (edge_distance_[i] > rounding * reach)
+      candidate.asleep_until = travel + kept * edge_distance_[i] - rounding * reach;
+    else
+      cut_edge(packed_[measured_[i].from].at, packed_[measured_[i].to].at, candidate.tet);
+    if (i + 1 < awake_.size() && awake_[i + 1].first == r) continue;
+    fall_asleep(near.records[r], near);
+    if (!stretches_.empty()) touch_of_stretches(near.records[r].point), stretches_.clear();
+  }
+}
+
+// Appends the part of the edge that is in the tet to stretches_.
+template <class Real>
+void Contacts<Real>::cut_edge(const Real* p, const Real* q, int index) {
+  const Topology::Tet& tet = topology_.tets[index];
+  Stretch s{index, -1, -1, 0, 1, {}, {}};
+  Real sum = 0;
+  for (int i = 0; i < 4 && s.begin < s.end; ++i) {
+    const int* face = tet.face[i];
+    const auto side = [&](const Real* at) {
+      return Real(tet.sign[i]) * det_from(at, packed_[face[0]].at, packed_[face[1]].at, packed_[face[2]].at);
+    };
+    const Real at_p = side(p), at_q = side(q);
+    s.at_begin[i] = at_p, s.at_end[i] = at_q;
+    sum += at_p;
+    if ((at_p < 0) == (at_q < 0)) {
+      if (at_p < 0) s.end = 0;
+      continue;
+    }
+    const Real cut = at_p / (at_p - at_q);
+    if (at_p < 0 && cut > s.begin) s.begin = cut, s.entry = i;
+    if (at_q < 0 && cut < s.end) s.end = cut, s.exit = i;
+  }
+  if (s.begin < s.end && sum > 0) stretches_.push_back(s);
 }
 
 // The longest stretch, and what joins it on both sides (a face cuts the edge at the same number whichever tet

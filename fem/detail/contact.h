@@ -65,7 +65,7 @@ class Contacts {
   struct Candidate {
     int tet;
     int face;           // the face that refused last time, tried first: changes cost, never results
-    Real asleep_until;  // way of the two bodies' nodes since build before which nothing can be in the tet
+    Real asleep_until;  // travel of the two bodies before which nothing can be in the tet
   };
   // Points, or edges (named by their points), and the tets of the other body near them.
   struct Near {
@@ -75,9 +75,7 @@ class Contacts {
   // Candidates of one pair in one lane, [0] a in b, [1] b in a: derived data, a superset of what can touch.
   struct List {
     bool built = false;
-    Real moved = 0;  // how far the two bodies' nodes had come since build when that was measured last
-    Real travel_when_measured = 0;
-    std::vector<Real> places[2];  // of the two bodies' nodes at build; empty when static
+    Real travel_at_build = 0;
     Near points[2], edges[2];
     std::vector<int> nodes;  // every node they name
   };
@@ -113,15 +111,15 @@ class Contacts {
   struct Cell;
 
   void place_of(int point, const Real share[2], Real out[3]) const;  // from packed_
-  Real refresh(const LaneView<Real>&, int a, int b, List&);
-  void keep_places(const LaneView<Real>&, int body, std::vector<Real>& places) const;
-  Real way_since_build(const LaneView<Real>&, int body, const std::vector<Real>& places) const;
+  void refresh(const LaneView<Real>&, int a, int b, Real reach, Real travel, List&);
+  static void fall_asleep(Record&, const Near&);
   void build_direction(const LaneView<Real>&, int from, int into, Real reach, List&, int direction);
   bool sort_near(const LaneView<Real>&, int from, int into, Real reach, Slabs&);
   void collect_near(int tet, Real reach);
   void list_found(Slabs&, int points, Real reach, List&, Near&);
-  void find_touches(const LaneView<Real>&, int into, Real moved, Near&);
-  void find_passing_edges(const LaneView<Real>&, int into, Real moved, Near&);
+  void find_touches(const LaneView<Real>&, int into, Real travel, Near&);
+  void find_passing_edges(const LaneView<Real>&, int into, Real reach, Real travel, Near&);
+  void cut_edge(const Real* p, const Real* q, int tet);
   void touch_of_stretches(int point);
   bool leave_over_ridge(const Stretch& first, const Stretch& last, const Real way[3], Touch<Real>&) const;
   void measure_depths(const LaneView<Real>&, int from, int into, std::size_t first, std::size_t last);
@@ -157,6 +155,10 @@ class Contacts {
   std::vector<Place> packed_;       // by world node; valid for the nodes of the list at hand
   std::vector<int> touch_of_node_;  // index into touches_ of a vertex, until depths are measured, else −1
   std::vector<Stretch> stretches_;  // of the edge at hand
+  // Scratch of find_passing_edges: point and candidate, their nodes, and how far they are apart.
+  std::vector<std::pair<int, int>> awake_;
+  std::vector<TetAndEdge> measured_;
+  std::vector<Real> edge_distance_;
   // Scratch of a touch: the mesh edges' other ends, and where ways to them leave the tet.
   std::vector<Real> ends_[3], share_;
   std::vector<int> exit_;

@@ -128,6 +128,10 @@ struct NearTet {
   Real distance;  // to the tet at least
 };
 
+struct TetAndEdge {
+  int tet[4], from, to;  // nodes
+};
+
 // A point in a tet, for finding how ways lead out of the tet.
 template <class Real>
 struct WayOut {
@@ -151,6 +155,9 @@ struct Kernels {
                      Real reach, NearTet<Real>* found);
   int (*near_segments)(const TetPlanes<Real>&, const Real* const p[3], const Real* const q[3], int count,
                        Real reach, NearTet<Real>* found);
+  // How far each edge is outside of its tet, at least; 0 of a tet that is flat or inverted. `places` has four
+  // numbers a node.
+  void (*edge_distances)(const TetAndEdge*, int count, const Real* places, Real* distance);
   // Through which face (−1: none) straight ways from the point to (x y z) leave the tet, and after which
   // share of the way. Multiples of block_size as above.
   void (*exits)(const WayOut<Real>&, const Real* x, const Real* y, const Real* z, int count, Real* share,
