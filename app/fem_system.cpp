@@ -16,7 +16,10 @@ std::uint64_t hash_of(const fem::World& world) {
   hasher.matrix(world.gravity_m_s2).value(world.dt_s).value(world.contact_dt_s);
   for (const fem::Body& body : world.bodies) {
     const fem::Material& m = body.material;
-    hasher.value(limber::hash_of(body.cage)).value(int(body.moving)).value(int(body.kind));
+    hasher.value(limber::hash_of(body.cage))
+        .value(int(body.moving))
+        .value(int(body.kind))
+        .value(int(body.self_contact));
     for (const double v : {m.youngs_modulus_pa, m.poisson_ratio, m.density_kg_m3, m.damping_ratio, m.friction,
                            body.stiffness_share})
       hasher.value(v);

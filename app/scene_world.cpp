@@ -155,6 +155,7 @@ fem::World build_world(const scenes::Scene& scene, const std::vector<PreparedBod
                          .mesh_independent = body.material.mesh_independent};
     fem_body.fixed_nodes = scenes::fixed_nodes(body, scene.bounds_m, prepared[b].cage.positions);
     fem_body.kind = kind_of(body);
+    fem_body.self_contact = body.self_contact;
     set_parts(body, prepared[b], fem_body);
     spec.bodies.push_back(std::move(fem_body));
   }

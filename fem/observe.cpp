@@ -148,6 +148,18 @@ Penetration deepest_penetration(const World& world, const State& state) {
   return deepest;
 }
 
+int piercing_edges(const World& world, const State& state) {
+  int count = 0;
+  for (int a = 0; a < int(world.bodies.size()); ++a)
+    for (int b = a + 1; b < int(world.bodies.size()); ++b) {
+      const Body &one = world.bodies[a], &two = world.bodies[b];
+      if (one.moving || two.moving)
+        count += detail::passing_edges({body_positions(world, state, a), one.cage.tets, one.surface},
+                                       {body_positions(world, state, b), two.cage.tets, two.surface});
+    }
+  return count;
+}
+
 std::vector<ContactForce> contact_forces(const World& world, const State& state) {
   std::vector<float> x = world.tables.rest_positions, v(x.size(), 0.f), f(x.size(), 0.f);
   std::copy(state.positions.begin(), state.positions.end(), x.begin());

@@ -42,6 +42,10 @@ struct Penetration {
 };
 Penetration deepest_penetration(const World&, const State&);
 
+// Surface edges that pass through another body with no end inside, over all pairs of bodies one of which
+// moves.
+int piercing_edges(const World&, const State&);
+
 // The forces of contact and walls in the step that starts here, by the code that steps and in its float32:
 // they sum to what moves the bodies. Ordered by pair, then as contact finds them.
 struct ContactForce {

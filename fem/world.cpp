@@ -106,6 +106,7 @@ Body make_body(const BodySpec& spec) {
   const int nodes = body.node_count();
   body.fixed.assign(std::size_t(nodes), spec.kind == BodyKind::immovable);
   body.kind = spec.kind;
+  body.self_contact = spec.self_contact && spec.kind == BodyKind::deformable;
   for (int n : spec.fixed_nodes) body.fixed[n] = true;
   body.moving = std::find(body.fixed.begin(), body.fixed.end(), false) != body.fixed.end();
   body.node_mass_kg.assign(std::size_t(nodes), 0.0);
@@ -430,6 +431,7 @@ void append_topology(const Body& body, int index, Topology& topology) {
   range.first_point = int(topology.points.size());
   append_points(body, topology);
   range.last_point = int(topology.points.size());
+  if (body.self_contact) range.self = detail::self_contact(topology, index);
 }
 
 void check_places(const World& world) {

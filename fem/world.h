@@ -42,6 +42,7 @@ struct BodySpec {
   BodyKind kind = BodyKind::deformable;  // all nodes fixed means immovable too; rigid bodies have none fixed
   // (T) each, or empty: the material's everywhere.
   std::vector<double> youngs_modulus_from_tet_pa = {}, density_from_tet_kg_m3 = {};
+  bool self_contact = false;  // parts of the body that are not neighbours push one another apart
 };
 
 struct WorldSpec {
@@ -58,6 +59,7 @@ struct Body {
   std::string name;
   Material material;
   BodyKind kind;
+  bool self_contact;  // as asked for; false unless deformable
   bool moving;        // false: static, not part of State
   TetMesh cage;       // rest; positions rounded to float32, as the simulation has them
   int first_node;     // the body's row 0 among the world's nodes; for moving bodies also among those of State

@@ -400,6 +400,7 @@ BodySpec read_body(const Node& table, const Box& bounds) {
   const std::string what = "bodies." + body.name;
   body.role = read_role(text(table, "role"));
   body.kind = text(table, "kind") == "rigid" ? Kind::rigid : Kind::deformable;
+  body.self_contact = flag(table, "self_contact");
   body.model = read_model(child(table, "model"), what);
   body.cage = read_cage(child(table, "cage"), body.model, what);
   body.material = read_material(table, body.kind, body.role, what);

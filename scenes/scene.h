@@ -99,6 +99,7 @@ struct BodySpec {
   std::string name;  // letters, digits, _ and -: it names a folder
   Role role = Role::obstacle;
   Kind kind = Kind::deformable;
+  bool self_contact = false;  // parts of it that are not neighbours push one another apart
   Model model;
   CageSpec cage;
   MaterialSpec

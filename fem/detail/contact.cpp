@@ -17,6 +17,13 @@ Real dot(const Real a[3], const Real b[3]) {
   return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
+template <class Real>
+void cross(const Real a[3], const Real b[3], Real out[3]) {
+  out[0] = a[1] * b[2] - a[2] * b[1];
+  out[1] = a[2] * b[0] - a[0] * b[2];
+  out[2] = a[0] * b[1] - a[1] * b[0];
+}
+
 // det(a−p, b−p, c−p), computed from the same numbers in the same order whichever tet asks.
 template <class Real>
 Real det_from(const Real* p, const Real* a, const Real* b, const Real* c) {
@@ -40,11 +47,33 @@ void face_normals(const Real* const place[4], Real normal[4][3]) {
     for (int c = 0; c < 3; ++c) edge[i][c] = place[i + 1][c] - place[0][c];
   for (int i = 0; i < 3; ++i) {
     const Real *s = edge[(i + 1) % 3], *t = edge[(i + 2) % 3];
-    normal[i + 1][0] = s[1] * t[2] - s[2] * t[1];
-    normal[i + 1][1] = s[2] * t[0] - s[0] * t[2];
-    normal[i + 1][2] = s[0] * t[1] - s[1] * t[0];
+    cross(s, t, normal[i + 1]);
   }
   for (int c = 0; c < 3; ++c) normal[0][c] = -(normal[1][c] + normal[2][c] + normal[3][c]);
+}
+
+// The way from p to the nearest place of a triangle.
+template <class Real>
+void to_triangle(const Real p[3], const Real corner[3][3], const Real normal[3], Real way[3]) {
+  Real best2 = std::numeric_limits<Real>::max();
+  bool above = true;
+  for (int i = 0; i < 3; ++i) {
+    const Real *a = corner[i], *b = corner[(i + 1) % 3], *c = corner[(i + 2) % 3];
+    Real edge[3], to_p[3], across[3], to_c[3];
+    for (int k = 0; k < 3; ++k) edge[k] = b[k] - a[k], to_p[k] = p[k] - a[k], to_c[k] = c[k] - a[k];
+    cross(normal, edge, across);
+    above &= dot(across, to_p) * dot(across, to_c) >= 0;
+    const Real length2 = dot(edge, edge);
+    const Real share = length2 > 0 ? std::clamp(dot(edge, to_p) / length2, Real(0), Real(1)) : Real(0);
+    Real here[3];
+    for (int k = 0; k < 3; ++k) here[k] = share * edge[k] - to_p[k];
+    if (const Real square = dot(here, here); square < best2) best2 = square, std::copy_n(here, 3, way);
+  }
+  const Real size2 = dot(normal, normal);
+  if (!above || !(size2 > 0)) return;
+  Real height = 0;
+  for (int k = 0; k < 3; ++k) height += normal[k] * (corner[0][k] - p[k]);
+  for (int k = 0; k < 3; ++k) way[k] = height / size2 * normal[k];
 }
 
 // Normal force k d − c ṙ·n, never pulling; friction against the slip, at most μ times that, and at most what
@@ -123,9 +152,11 @@ Contacts<Real>::Contacts(const World& world, const Kernels<Real>& kernels, int l
       kernels_(kernels),
       bodies_(int(world.bodies.size())),
       step_(Real(world.contact_dt_s)) {
-  for (int a = 0; a < bodies_; ++a)
+  for (int a = 0; a < bodies_; ++a) {
+    if (world.bodies[a].moving && world.bodies[a].self_contact) pairs_.emplace_back(a, a);
     for (int b = a + 1; b < bodies_; ++b)
       if (world.bodies[a].moving || world.bodies[b].moving) pairs_.emplace_back(a, b);
+  }
   for (const Body& body : world.bodies)
     if (body.kind == BodyKind::rigid) bearings_.resize(world.bodies.size());
   lists_.resize(std::size_t(lanes) * pairs_.size());
@@ -188,6 +219,13 @@ const std::vector<Touch<Real>>& Contacts<Real>::find(int lane, const LaneView<Re
   refresh(view, a, b, reach, travel, list);
   for (int node : list.nodes) fetch(view, node, packed_[node].at);
   find_touches(view, b, travel, list.points[0]);
+  if (a == b) {
+    for (Touch<Real>& touch : touches_) {
+      touch_of_node_[topology_.points[touch.point].node[0]] = -1;
+      leave_nearest_face(view, a, touch);
+    }
+    return touches_;
+  }
   find_passing_edges(view, b, reach, travel, list.edges[0]);
   const std::size_t second = touches_.size();
   find_touches(view, a, travel, list.points[1]);
@@ -206,7 +244,7 @@ void Contacts<Real>::refresh(const LaneView<Real>& view, int a, int b, Real reac
   list.travel_at_build = travel;
   list.nodes.clear();
   build_direction(view, a, b, reach, list, 0);
-  build_direction(view, b, a, reach, list, 1);
+  if (a != b) build_direction(view, b, a, reach, list, 1);
   for (int node : list.nodes) listed_[node] = false;
 }
 
@@ -222,13 +260,79 @@ void Contacts<Real>::build_direction(const LaneView<Real>& view, int from, int i
   slabs_[0].edges = false, slabs_[1].edges = true;
   near_tet_.resize(std::size_t(points));
   const bool any_points = sort_near(view, from, into, reach, slabs_[0]),
-             any_edges = sort_near(view, from, into, reach, slabs_[1]);
+             any_edges = from != into && sort_near(view, from, into, reach, slabs_[1]);
+  if (from == into) slabs_[1].point.clear(), slabs_[1].found.clear();
   if (any_points || any_edges) {
     for (int n = other.first_node; n < other.last_node; ++n) fetch(view, n, packed_[n].at);
     for (int t = other.first_tet; t < other.last_tet; ++t) collect_near(t, reach);
   }
+  if (from == into)
+    std::erase_if(slabs_[0].found,
+                  [&](const Found& f) { return !may_touch(from, first_point_ + f.point, f.tet); });
   list_found(slabs_[0], points, reach, list, list.points[direction]);
   list_found(slabs_[1], points, reach, list, list.edges[direction]);
+}
+
+// Whether point and tet of one body are no neighbours: no node of the tet shares a tet with a node of the
+// point.
+template <class Real>
+bool Contacts<Real>::may_touch(int index, int point, int tet) const {
+  const Topology::Body& body = topology_.bodies[index];
+  const Lists& near = body.self.near_tets;
+  for (const int node : topology_.points[point].node) {
+    const int k = node - body.first_node;
+    if (std::binary_search(near.items.begin() + near.begin[k], near.items.begin() + near.begin[k + 1], tet))
+      return false;
+  }
+  return true;
+}
+
+// Out through the nearest of the surface faces next to the tet that look towards the point's own: two parts
+// of a body that meet do so face to face. (The point's mesh edges are no guide: in a fold they lead round it
+// and out of the point's own skin.)
+template <class Real>
+void Contacts<Real>::leave_nearest_face(const LaneView<Real>& view, int index, Touch<Real>& touch) const {
+  const Topology::Body& body = topology_.bodies[index];
+  Real p[3], outward[3] = {0, 0, 0}, nearest2 = std::numeric_limits<Real>::max();
+  place_of(touch.point, touch.share, p);
+  struct Face {
+    Real corner[3][3], normal[3];
+  };
+  const auto face_of = [&](int number) {
+    Face face;
+    const Topology::Tet& tet = topology_.tets[number / 4];
+    for (int i = 0; i < 3; ++i) fetch(view, tet.face[number % 4][i], face.corner[i]);
+    Real s[3], t[3];
+    for (int c = 0; c < 3; ++c) {
+      s[c] = Real(tet.sign[number % 4]) * (face.corner[1][c] - face.corner[0][c]);
+      t[c] = face.corner[2][c] - face.corner[0][c];
+    }
+    cross(s, t, face.normal);
+    return face;
+  };
+  for (const int node : topology_.points[touch.point].node) {
+    const Lists& faces = body.self.node_faces;
+    for (int k = faces.begin[node - body.first_node]; k < faces.begin[node - body.first_node + 1]; ++k) {
+      const Face face = face_of(faces.items[k]);
+      for (int c = 0; c < 3; ++c) outward[c] += face.normal[c];
+    }
+  }
+  const Lists& faces = body.self.near_faces;
+  const int tet = touch.tet - body.first_tet;
+  for (int k = faces.begin[tet]; k < faces.begin[tet + 1]; ++k) {
+    const Face face = face_of(faces.items[k]);
+    if (!(dot(face.normal, outward) < 0)) continue;
+    Real way[3];
+    to_triangle(p, face.corner, face.normal, way);
+    const Real distance2 = dot(way, way), length = std::sqrt(dot(face.normal, face.normal));
+    if (!(distance2 < nearest2) || !(length > 0)) continue;
+    nearest2 = distance2;
+    touch.known = true;
+    touch.depth = std::sqrt(distance2);
+    // On the surface the way has no direction; the face has.
+    const bool on_it = !(touch.depth > Real(1e-6) * std::sqrt(length));
+    for (int c = 0; c < 3; ++c) touch.direction[c] = on_it ? face.normal[c] / length : way[c] / touch.depth;
+  }
 }
 
 template <class Real>
@@ -275,7 +379,7 @@ bool Contacts<Real>::sort_near(const LaneView<Real>& view, int from, int into, R
     slabs.lower[c] = std::numeric_limits<Real>::max(), slabs.upper[c] = -slabs.lower[c];
   }
   slabs.found.clear();
-  near_.clear();
+  near_.clear(), slabs.point.clear();
   for (auto* at : {slabs.from, slabs.to})
     for (int c = 0; c < 3; ++c) at[c].clear();
   for (int k = slabs.edges ? int(body.surface_nodes.size()) : 0; k < points; ++k) {
@@ -347,7 +451,7 @@ void Contacts<Real>::collect_near(int t, Real reach) {
   int first[2] = {0, 0}, last[2] = {0, 0};
   for (int s = 0; s < 2; ++s) {
     const Slabs& slabs = slabs_[s];
-    bool meet = true;
+    bool meet = !slabs.point.empty();
     for (int c = 0; c < 3; ++c)
       meet &= planes.lower[c] <= slabs.upper[c] && planes.upper[c] >= slabs.lower[c];
     if (!meet) continue;
@@ -537,9 +641,7 @@ bool Contacts<Real>::leave_over_ridge(const Stretch& first, const Stretch& last,
     const Real sign = Real(k == 0 ? in.sign[first.entry] : out.sign[last.exit]);
     const Real *a = packed_[face[0]].at, *b = packed_[face[1]].at, *c = packed_[face[2]].at;
     const Real s[3] = {b[0] - a[0], b[1] - a[1], b[2] - a[2]}, t[3] = {c[0] - a[0], c[1] - a[1], c[2] - a[2]};
-    normal[k][0] = s[1] * t[2] - s[2] * t[1];
-    normal[k][1] = s[2] * t[0] - s[0] * t[2];
-    normal[k][2] = s[0] * t[1] - s[1] * t[0];
+    cross(s, t, normal[k]);
     const Real length = std::sqrt(dot(normal[k], normal[k]));
     if (!(length > 0)) return false;
     for (Real& n : normal[k]) n *= sign / length;

@@ -53,8 +53,9 @@ class Contacts {
   void add_forces(int lane, const LaneView<Real>& view);
   // From now on add_forces also appends to this list, unless null.
   void tell(std::vector<Exerted<Real>>* list) { told_ = list; }
-  // The touches of bodies a and b, a < b: of a in b vertices and edges with an end inside, then edges that
-  // pass through, each ascending; then those of b in a. For tests and observables; valid until the next call.
+  // The touches of bodies a and b, a ≤ b: of a in b vertices and edges with an end inside, then edges that
+  // pass through, each ascending; then those of b in a; of a body with itself
+  // vertices and edges with an end inside only. For tests and observables; valid until the next call.
   const std::vector<Touch<Real>>& find(int lane, const LaneView<Real>& view, int a, int b);
 
  private:
@@ -113,6 +114,8 @@ class Contacts {
   void place_of(int point, const Real share[2], Real out[3]) const;  // from packed_
   void refresh(const LaneView<Real>&, int a, int b, Real reach, Real travel, List&);
   static void fall_asleep(Record&, const Near&);
+  bool may_touch(int body, int point, int tet) const;
+  void leave_nearest_face(const LaneView<Real>&, int body, Touch<Real>&) const;
   void build_direction(const LaneView<Real>&, int from, int into, Real reach, List&, int direction);
   bool sort_near(const LaneView<Real>&, int from, int into, Real reach, Slabs&);
   void collect_near(int tet, Real reach);

@@ -90,6 +90,25 @@ struct Near {
   }
 };
 
+std::set<std::pair<int, int>> edges_of(const Shape& shape) {
+  std::set<std::pair<int, int>> edges;
+  for (int f = 0; f < shape.surface.rows(); ++f)
+    for (int i = 0; i < 3; ++i) edges.insert(std::minmax(shape.surface(f, i), shape.surface(f, (i + 1) % 3)));
+  return edges;
+}
+
+// Calls each(p, q, places) for the edges of a that cross the surface of b: from p (0) to q (1), ascending.
+template <class Each>
+void for_each_crossing_edge(const Shape& a, const Near& near, const Box& region, const Each& each) {
+  for (const auto& [i, j] : edges_of(a)) {
+    const Vec3 p = a.positions.row(i), q = a.positions.row(j);
+    Box box;
+    box.include(p), box.include(q);
+    if (!meet(box, region)) continue;
+    if (const std::vector<double> at = near.crossings(p, q); !at.empty()) each(p, q, at);
+  }
+}
+
 void include_points_of(const Shape& a, const Shape& b, const Box& region, Overlap& deepest) {
   const Near near(b, region);
   const auto consider = [&](const Vec3& p) {
@@ -97,31 +116,46 @@ void include_points_of(const Shape& a, const Shape& b, const Box& region, Overla
     if (const double depth = near.depth(p); depth > deepest.depth_m) deepest = {depth, p};
   };
   for (int v : vertices_of(a.surface)) consider(a.positions.row(v));
-  std::set<std::pair<int, int>> edges;
-  for (int f = 0; f < a.surface.rows(); ++f)
-    for (int i = 0; i < 3; ++i) edges.insert(std::minmax(a.surface(f, i), a.surface(f, (i + 1) % 3)));
-  for (const auto& [i, j] : edges) {
-    const Vec3 p = a.positions.row(i), q = a.positions.row(j);
-    Box box;
-    box.include(p), box.include(q);
-    if (!meet(box, region)) continue;
-    std::vector<double> at = near.crossings(p, q);
-    if (at.empty()) continue;
+  for_each_crossing_edge(a, near, region, [&](const Vec3& p, const Vec3& q, std::vector<double> at) {
     at.insert(at.begin(), 0.0), at.push_back(1.0);
     for (std::size_t k = 0; k + 1 < at.size(); ++k) consider(p + 0.5 * (at[k] + at[k + 1]) * (q - p));
-  }
+  });
 }
+
+int count_passing_edges(const Shape& a, const Shape& b, const Box& region) {
+  const Near near(b, region);
+  int count = 0;
+  for_each_crossing_edge(a, near, region, [&](const Vec3& p, const Vec3& q, const std::vector<double>& at) {
+    const auto is_inside = [&](double share) { return near.contains(p + share * (q - p)); };
+    bool passes = false;
+    for (std::size_t k = 0; k + 1 < at.size(); ++k) passes |= is_inside(0.5 * (at[k] + at[k + 1]));
+    count += passes && !is_inside(0) && !is_inside(1);
+  });
+  return count;
+}
+
+// Where the boxes of two bodies overlap; lower above upper when they do not.
+Box common_box(const Shape& a, const Shape& b) {
+  const Box box_a = bounding_box(a.positions), box_b = bounding_box(b.positions);
+  return {box_a.lower.cwiseMax(box_b.lower), box_a.upper.cwiseMin(box_b.upper)};
+}
+bool is_empty(const Box& box) { return (box.lower.array() > box.upper.array()).any(); }
 
 }  // namespace
 
 Overlap deepest_overlap(const Shape& a, const Shape& b) {
-  const Box box_a = bounding_box(a.positions), box_b = bounding_box(b.positions);
   Overlap deepest;
-  if (!meet(box_a, box_b)) return deepest;
-  const Box region{box_a.lower.cwiseMax(box_b.lower), box_a.upper.cwiseMin(box_b.upper)};
+  const Box region = common_box(a, b);
+  if (is_empty(region)) return deepest;
   include_points_of(a, b, region, deepest);
   include_points_of(b, a, region, deepest);
   return deepest;
+}
+
+int passing_edges(const Shape& a, const Shape& b) {
+  const Box region = common_box(a, b);
+  if (is_empty(region)) return 0;
+  return count_passing_edges(a, b, region) + count_passing_edges(b, a, region);
 }
 
 }  // namespace limber::fem::detail

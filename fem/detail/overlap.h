@@ -22,4 +22,7 @@ struct Overlap {
 // corner is seen too).
 Overlap deepest_overlap(const Shape& a, const Shape& b);
 
+// Surface edges of either body that pass through the other with no end inside.
+int passing_edges(const Shape& a, const Shape& b);
+
 }  // namespace limber::fem::detail

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "fem/detail/kernels.h"
+#include "fem/detail/self_contact.h"
 
 namespace limber::fem::detail {
 
@@ -82,6 +83,7 @@ struct Topology {
     int first_node, last_node, first_tet, last_tet, first_point, last_point;
     bool moving;
     std::vector<int> surface_nodes;  // world nodes, ascending
+    SelfContact self;                // empty where the body does not touch itself
   };
   std::vector<Body> bodies;
 };

@@ -493,5 +493,69 @@ TEST(Contact, TouchingAtRestIsNoForce) {
   EXPECT_LT(mean_speed_m_s(world, end, 0) + mean_speed_m_s(world, end, 1), 1e-5);
 }
 
+// Bodies that are not the robot touch one another like any others: two soft cubes come to rest on one another
+// and on the floor.
+TEST(Contact, FreeBodiesStackUp) {
+  WorldSpec spec;
+  Material material;
+  material.youngs_modulus_pa = 1e5;
+  material.damping_ratio = 0.3;
+  spec.bodies = {{"robot", cube({4, 0, 0.5}, 1, 2), material, {}},
+                 {"lower", cube({0, 0, 0.51}, 1, 2), material, {}},
+                 {"upper", cube({0.1, 0.05, 1.55}, 1, 3), material, {}}};
+  spec.bounds_m = {Vec3(-5, -5, 0), Vec3(8, 5, 10)};
+  spec.gravity_m_s2 = {0, 0, -10};
+  const World world = build_world(spec);
+  Control coast;
+  coast.steps = int(4 / world.dt_s);
+  const State end = propagate(world, rest_state(world), coast).end;
+  EXPECT_LT(mean_speed_m_s(world, end, 1) + mean_speed_m_s(world, end, 2), 0.02);
+  EXPECT_GT(center_of_mass_m(world, end, 2).z(), center_of_mass_m(world, end, 1).z() + 0.9);
+  EXPECT_NEAR(center_of_mass_m(world, end, 2).x(), 0.1, 0.05);
+  EXPECT_LT(deepest_penetration(world, end).depth_m, 0.01);
+}
+
+// A push goes down a row of four bodies, none of them through another, and their momentum stays.
+TEST(Contact, AChainPassesAPushOn) {
+  WorldSpec spec = two_bodies(cube({0, 0, 0}, 0.5, 2), ball({0.6, 0, 0}, 0.25, 3));
+  spec.bodies.push_back({"c", cube({1.2, 0.05, 0}, 0.5, 3), spec.bodies[0].material, {}});
+  spec.bodies.push_back({"d", ball({1.8, 0, 0.05}, 0.25, 2), spec.bodies[0].material, {}});
+  const World world = build_world(spec);
+  State state = rest_state(world);
+  for (int n = 0; n < world.bodies[0].node_count(); ++n) state.velocities[3 * n] = 3;
+  const auto momentum = [&](const State& s) {
+    Vec3 sum = Vec3::Zero();
+    for (int n = 0; n < world.nodes; ++n)
+      sum += world.tables64.node_mass[n] * Eigen::Map<const Vec3f>(&s.velocities[3 * n]).cast<double>();
+    return sum;
+  };
+  Control coast;
+  coast.steps = int(1 / world.dt_s);
+  const State end = propagate(world, state, coast).end;
+  for (int b = 0; b < 3; ++b)
+    EXPECT_LT(center_of_mass_m(world, end, b).x(), center_of_mass_m(world, end, b + 1).x()) << b;
+  EXPECT_GT(center_of_mass_m(world, end, 3).x(), 2.2);  // the push arrived
+  EXPECT_LT((momentum(end) - momentum(state)).norm(), 1e-5 * momentum(state).norm());
+}
+
+// An edge over an edge is a piercing edge until contact has pushed it out; a corner that is inside is not.
+TEST(Contact, PiercingEdgesAreCounted) {
+  const Eigen::AngleAxisd on_edge(M_PI / 4, Vec3::UnitX()), turn(M_PI / 2, Vec3::UnitZ());
+  TetMesh a = cube(Vec3::Zero(), 1, 1), b = cube(Vec3::Zero(), 1, 1);
+  for (int n = 0; n < a.positions.rows(); ++n) {
+    const Vec3 p = a.positions.row(n), q = b.positions.row(n);
+    a.positions.row(n) = (on_edge * p + Vec3(0.2, 0, std::sqrt(0.5) + 0.1)).transpose();
+    b.positions.row(n) = (turn * (on_edge * q + Vec3(0.17, 0, -std::sqrt(0.5)))).transpose();
+  }
+  const World world = build_world(two_bodies(a, b));
+  State state = rest_state(world);
+  EXPECT_EQ(piercing_edges(world, state), 0);
+  for (int n = 0; n < world.bodies[0].node_count(); ++n) state.positions[3 * n + 2] -= 0.15f;
+  EXPECT_EQ(piercing_edges(world, state), 2);  // each in the other
+  Control coast;
+  coast.steps = int(0.5 / world.dt_s);
+  EXPECT_EQ(piercing_edges(world, propagate(world, state, coast).end), 0);
+}
+
 }  // namespace
 }  // namespace limber::fem

@@ -373,7 +373,7 @@ std::string another_value(const Key& key) {
     case Type::integer:
       return "77";
     case Type::boolean:
-      return "false";
+      return key.fallback == "true" ? "false" : "true";
     case Type::vector:
       return key.count == 2 ? "[0.5, 0.25]" : "[0.5, 0.25, 0.125]";
     case Type::integers:
@@ -493,12 +493,12 @@ std::string all_of(const Scene& s) {
                               v(s.gravity_m_s2), s.max_dt_s.value_or(-1));
   for (const BodySpec& body : s.bodies) {
     const MaterialSpec& m = body.material;
-    t += fmt::format("{} {} {} {} | {} {} {} {} {} | {} {} {} {} {} {} {} | {} {} {} {} | {}", body.name,
-                     int(body.role), int(body.kind), all_of(body.model), body.cage.tets, v(body.cage.cells),
-                     body.cage.cell_m, body.cage.mode, body.cage.shells, m.model, m.youngs_modulus_pa,
-                     m.poisson_ratio, m.density_kg_m3, m.damping_ratio, m.friction, m.mesh_independent,
-                     v(body.pose.position_m), v(body.pose.axis), body.pose.angle_deg, body.pose.anchor,
-                     v(body.color_srgb));
+    t += fmt::format("{} {} {} {} {} | {} {} {} {} {} | {} {} {} {} {} {} {} | {} {} {} {} | {}", body.name,
+                     int(body.role), int(body.kind), body.self_contact, all_of(body.model), body.cage.tets,
+                     v(body.cage.cells), body.cage.cell_m, body.cage.mode, body.cage.shells, m.model,
+                     m.youngs_modulus_pa, m.poisson_ratio, m.density_kg_m3, m.damping_ratio, m.friction,
+                     m.mesh_independent, v(body.pose.position_m), v(body.pose.axis), body.pose.angle_deg,
+                     body.pose.anchor, v(body.color_srgb));
     t += fmt::format(" {}", body.fixed.walls);
     for (const Box& box : body.fixed.boxes_m) t += b(box);
     for (const PartSpec& part : body.parts)
