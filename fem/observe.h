@@ -57,7 +57,7 @@ struct ContactForce {
 std::vector<ContactForce> contact_forces(const World&, const State&);
 
 struct PairForce {
-  int body, other;  // body < other, or other −1: the walls
+  int body, other;  // body < other, or equal: it touches itself; other −1: the walls
   Vec3 force_n;     // on `body`, the sum
   int contacts;
 };
