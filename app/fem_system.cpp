@@ -58,7 +58,17 @@ class FemSystem::Propagator final : public plan::Propagator {
   std::vector<fem::Rollout> work_;
 };
 
-FemSystem::FemSystem(const fem::World& world) : world_(world), hash_(hash_of(world)) {}
+FemSystem::FemSystem(const fem::World& world, const MovingGoal& goal)
+    : world_(world), goal_(goal), goal_body_start_m_(Vec3::Zero()), hash_(hash_of(world)) {
+  if (goal.body < 0) return;
+  goal_body_start_m_ = fem::center_of_mass_m(world, start(), goal.body);
+  Hasher hasher;
+  hasher.value(hash_)
+      .value(goal.body)
+      .value(int(goal.lost_below_m.has_value()))
+      .value(goal.lost_below_m.value_or(0));
+  hash_ = hasher.digest();
+}
 
 State FemSystem::start() const { return fem::rest_state(world_); }
 Vec3 FemSystem::robot_center(const State& state) const {
@@ -71,7 +81,18 @@ int FemSystem::robot_nodes() const { return world_.bodies[std::size_t(world_.rob
 Box FemSystem::sample_bounds() const { return world_.bounds_m; }
 double FemSystem::dt_s() const { return world_.dt_s; }
 std::uint64_t FemSystem::hash() const { return hash_; }
-bool FemSystem::acceptable(const State& state) const { return fem::inverted_tets(world_, state) == 0; }
+bool FemSystem::acceptable(const State& state) const {
+  if (goal_.lost_below_m) {
+    const fem::Body& body = world_.bodies[std::size_t(goal_.body)];
+    for (int n = body.first_node; body.moving && n < body.first_node + body.node_count(); ++n)
+      if (double(state.positions[std::size_t(3 * n + 2)]) < *goal_.lost_below_m) return false;
+  }
+  return fem::inverted_tets(world_, state) == 0;
+}
+Vec3 FemSystem::goal_shift(const State& state) const {
+  if (goal_.body < 0) return Vec3::Zero();
+  return fem::center_of_mass_m(world_, state, goal_.body) - goal_body_start_m_;
+}
 int FemSystem::lanes() const { return preferred_lanes; }
 std::unique_ptr<plan::Propagator> FemSystem::make_propagator() const {
   return std::make_unique<Propagator>(*this);

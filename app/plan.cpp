@@ -118,7 +118,7 @@ Outcome plan(const PlanOptions& options, const scenes::Scene& scene) {
   make_folder(options.out);
   const std::vector<PreparedBody> bodies = prepare_bodies(scene, options.scene.data, options.out);
   const fem::World world = build_world(scene, bodies);
-  const FemSystem system(world);
+  const FemSystem system(world, moving_goal_of(scene));
   const plan::Settings settings = settings_of(scene, options);
   const fs::path file = options.out / "plan.npz";
 
@@ -151,7 +151,7 @@ bool plan_is_up_to_date(const PlanOptions& options, const scenes::Scene& scene) 
     const fem::World world = build_world(scene, bodies);
     const PlanFolder folder = read_plan_folder(options.out);
     const plan::Settings settings = settings_of(scene, options);
-    return folder.plan.system_hash == FemSystem(world).hash() &&
+    return folder.plan.system_hash == FemSystem(world, moving_goal_of(scene)).hash() &&
            plan::first_difference(folder.plan.settings, settings).empty() && finished(folder.plan) &&
            (folder.plan.solved() || folder.plan.settings.max_iterations >= settings.max_iterations) &&
            folder.plan.settings.frames_per_second == settings.frames_per_second;

@@ -138,6 +138,10 @@ void set_parts(const scenes::BodySpec& body, const PreparedBody& prepared, fem::
 
 }  // namespace
 
+MovingGoal moving_goal_of(const scenes::Scene& scene) {
+  return {scene.goal.moves_with, scene.goal.lost_below_m};
+}
+
 fem::World build_world(const scenes::Scene& scene, const std::vector<PreparedBody>& prepared) {
   fem::WorldSpec spec;
   for (std::size_t b = 0; b < prepared.size(); ++b) {

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "app/body.h"
+#include "app/fem_system.h"
 #include "fem/world.h"
 #include "scenes/scene.h"
 
@@ -18,6 +19,8 @@ std::vector<PreparedBody> prepare_bodies(const scenes::Scene&, const std::vector
 
 // Throws InputError when a body is missing or damaged.
 std::vector<PreparedBody> read_bodies(const scenes::Scene&, const fs::path& work_folder);
+
+MovingGoal moving_goal_of(const scenes::Scene&);
 
 fem::World build_world(const scenes::Scene&, const std::vector<PreparedBody>&);
 

@@ -66,7 +66,7 @@ void check_body(const std::string& name, const PreparedBody& body, Table& table)
 MotionFigures check_plan(const PlanFolder& planned, const fem::World& world, Table& table) {
   const plan::Plan& plan = planned.plan;
   const plan::Trajectory& path = plan.trajectory;
-  const FemSystem system(world);
+  const FemSystem system(world, moving_goal_of(planned.scene));
   table.row("the plan is of this world", plan.system_hash == system.hash(), hex(system.hash()));
 
   const plan::Trajectory replay = plan::simulate(system, path.controls, path.frames_per_second);
@@ -75,12 +75,14 @@ MotionFigures check_plan(const PlanFolder& planned, const fem::World& world, Tab
             fmt::format("{} frames, end {}", replay.frames.size(), hex(hash_of(replay.end))));
 
   const MotionFigures figures = measure_motion(world, replay);
-  const double distance = (system.robot_center(plan.tree.states[std::size_t(plan.best_node)]) -
-                           plan.settings.goal.center_of_mass_m)
-                              .norm();
+  const auto distance_in = [&](const State& state) {
+    return (system.robot_center(state) - system.goal_shift(state) - plan.settings.goal.center_of_mass_m)
+        .norm();
+  };
+  const double distance = distance_in(plan.tree.states[std::size_t(plan.best_node)]);
   table.row("the robot reaches the goal", distance <= plan.settings.goal.radius_m,
             fmt::format("{:.3f} m from it, radius {:.3f} m", distance, plan.settings.goal.radius_m));
-  const double end_distance = (system.robot_center(replay.end) - plan.settings.goal.center_of_mass_m).norm();
+  const double end_distance = distance_in(replay.end);
   const double end_speed = system.mean_speed(replay.end);
   table.row("and comes to rest near it",
             end_distance <= plan.settings.goal.radius_m && (plan.settings.settle.max_duration_s == 0 ||

@@ -38,16 +38,17 @@ Draw draw(const Settings& s, const System& system, std::int64_t iteration) {
   return d;
 }
 
-Control control_of(const Draw& d, const Settings& s, const Vec3& center) {
+Control control_of(const Draw& d, const Settings& s, const Vec3& center, const Vec3& goal_shift) {
   Control control;
   control.manipulation = d.manipulation;
   control.steps = d.steps;
   if (d.manipulation == Manipulation::interpolation) {
-    control.target_m = s.goal.center_of_mass_m.cast<float>();
+    control.target_m = (s.goal.center_of_mass_m + goal_shift).cast<float>();
     control.max_force_n = float(d.force_n * just_below_one);
     return control;
   }
-  const Vec3 way = d.point - center;
+  const Vec3 point = d.towards_goal ? Vec3(d.point + goal_shift) : d.point;
+  const Vec3 way = point - center;
   const double length = way.norm();
   if (length > 0) control.force_n = (way * (d.force_n * just_below_one / length)).cast<float>();
   if (d.manipulation == Manipulation::control_point) {

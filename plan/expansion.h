@@ -19,7 +19,8 @@ Draw draw(const Settings&, const System&, std::int64_t iteration);
 // The control of an expansion from a node whose robot has its centre of mass at `center`: body and control
 // point push along point − center, interpolation draws to the goal. largest_force() never exceeds
 // max_force_n.
-Control control_of(const Draw&, const Settings&, const Vec3& center);
+// The goal is where the settings have it, moved by `goal_shift`.
+Control control_of(const Draw&, const Settings&, const Vec3& center, const Vec3& goal_shift = Vec3::Zero());
 
 // The interpolation that ends a path; `steps` long.
 Control settle_control(const Settings&, int steps);

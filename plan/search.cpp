@@ -23,6 +23,7 @@ struct Outcome {
   enum Kind { node, diverged, rejected } kind = diverged;
   State state;
   Vec3 center = Vec3::Zero();
+  Vec3 goal_shift = Vec3::Zero();
 };
 
 Outcome outcome_of(const System& system, Rollout& rollout) {
@@ -32,6 +33,7 @@ Outcome outcome_of(const System& system, Rollout& rollout) {
   LIMBER_CHECK(rollout.to.step == expected_step, rollout.to.step, expected_step);
   o.center = system.robot_center(rollout.to);
   LIMBER_CHECK(o.center.allFinite(), o.center.x(), o.center.y(), o.center.z());
+  o.goal_shift = system.goal_shift(rollout.to);
   o.kind = system.acceptable(rollout.to) ? Outcome::node : Outcome::rejected;
   o.state = std::move(rollout.to);
   return o;
@@ -64,6 +66,8 @@ class Search {
     threads_ = std::min(threads, window_);
     share_ = std::min(lanes, (window_ + threads_ - 1) / threads_);
     next_iteration_ = plan.statistics.iterations;
+    for (int node = 0; node < plan.tree.size(); ++node)
+      add_shift(plan.tree.centers[node], system.goal_shift(plan.tree.states[std::size_t(node)]));
   }
 
   void run() {
@@ -120,16 +124,27 @@ class Search {
       e.iteration = next_iteration_++;
       e.draw = draw(settings_, system_, e.iteration);
       e.point = e.draw.point.cast<float>();
-      aim(e, nearest(plan_.tree.centers, e.point));
+      aim(e, nearest(e.draw.towards_goal ? centers_from_goal_ : plan_.tree.centers, e.point));
       queue_.push_back(std::move(e));
     }
   }
 
   void aim(Expansion& e, int node) const {
-    const Vec3f center = plan_.tree.centers[node];
     e.near = node;
-    e.near_distance2 = squared_distance(center, e.point);
-    e.control = control_of(e.draw, settings_, center.cast<double>());
+    e.near_distance2 = distance2(e, node);
+    e.control = control_of(e.draw, settings_, plan_.tree.centers[node].cast<double>(),
+                           goal_shifts_[std::size_t(node)]);
+  }
+
+  // A goal that moves is where it is at that node's time.
+  float distance2(const Expansion& e, int node) const {
+    return squared_distance(e.draw.towards_goal ? centers_from_goal_[node] : plan_.tree.centers[node],
+                            e.point);
+  }
+
+  void add_shift(const Vec3f& center, const Vec3& goal_shift) {
+    goal_shifts_.push_back(goal_shift);
+    centers_from_goal_.push_back(center - goal_shift.cast<float>());
   }
 
   void take(std::vector<Expansion*>& mine, std::vector<Rollout>& rollouts) {
@@ -179,14 +194,15 @@ class Search {
     if (e.outcome.kind == Outcome::node) {
       const int node = plan_.tree.add(std::move(e.outcome.state), e.near, e.control, e.iteration,
                                       e.outcome.center.cast<float>());
-      consider_for_goal(node, e.outcome.center);
+      add_shift(plan_.tree.centers[node], e.outcome.goal_shift);
+      consider_for_goal(node, e.outcome.center - e.outcome.goal_shift);
       aim_overtaken(node);
     }
     progress_.update(statistics.iterations, fmt::format("{} nodes, {:.3g} m from the goal", plan_.tree.size(),
                                                         plan_.best_distance_m));
   }
 
-  void consider_for_goal(int node, const Vec3& center) {
+  void consider_for_goal(int node, const Vec3& center) {  // as seen from the goal's start
     const double distance = (center - settings_.goal.center_of_mass_m).norm();
     const bool solves = distance <= settings_.goal.radius_m &&
                         comes_to_rest(system_, settings_, plan_.tree.states[std::size_t(node)]);
@@ -199,9 +215,8 @@ class Search {
   }
 
   void aim_overtaken(int node) {
-    const Vec3f center = plan_.tree.centers[node];
     for (Expansion& e : queue_) {
-      if (!(squared_distance(center, e.point) < e.near_distance2)) continue;  // the first of equals stays
+      if (!(distance2(e, node) < e.near_distance2)) continue;  // the first of equals stays
       aim(e, node);
       if (e.status == Expansion::running) e.overtaken = true;
       if (e.status == Expansion::finished) compute_again(e);
@@ -229,6 +244,8 @@ class Search {
 
   std::mutex mutex_;  // guards all below, and plan_ (states already in the tree are read without it)
   std::condition_variable changed_;
+  Centers centers_from_goal_;      // of the tree's nodes, less the goal's shift there
+  std::vector<Vec3> goal_shifts_;  // of the tree's nodes
   std::deque<Expansion>
       queue_;  // in order of iteration; a deque, so that pointers to the taken ones stay good
   std::int64_t next_iteration_ = 0;

@@ -39,7 +39,9 @@ class System {
   virtual double dt_s() const = 0;                              // length of a step
   virtual std::uint64_t hash() const = 0;                       // of all that a rollout's result depends on
   virtual bool acceptable(const State&) const { return true; }  // false: no node is made of this state
-  virtual int lanes() const { return 1; }                       // rollouts a Propagator likes at once
+  // How far the goal has moved since the start: it may hang on a body that moves by itself. Metres.
+  virtual Vec3 goal_shift(const State&) const { return Vec3::Zero(); }
+  virtual int lanes() const { return 1; }  // rollouts a Propagator likes at once
   virtual std::unique_ptr<Propagator> make_propagator() const = 0;
 };
 

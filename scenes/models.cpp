@@ -74,6 +74,17 @@ const Vec3* box_size(const Model& model) {
   return nullptr;
 }
 
+SurfaceMesh make_named(const std::string& made) {
+  if (made == "bunny") return make_bunny();
+  if (made == "dragon") return make_dragon();
+  if (made == "heart") return make_heart();
+  if (made == "lung_left") return make_lung(1);
+  if (made == "lung_right") return make_lung(-1);
+  if (made == "liver") return make_liver();
+  LIMBER_CHECK(made == "spine", made);
+  return make_spine();
+}
+
 }  // namespace
 
 std::array<int, 2> plate_plane(const Vec3& size_m) {
@@ -83,15 +94,16 @@ std::array<int, 2> plate_plane(const Vec3& size_m) {
 }
 
 std::optional<SurfaceMesh> made_surface(const BodySpec& body) {
-  auto surface = std::visit(Overloaded{[](const FileModel& m) {
-                                         return m.made.empty() ? std::nullopt : std::optional(make_bunny());
-                                       },
-                                       [](const MadeModel&) { return std::optional(make_bunny()); },
-                                       [](const BoxModel& m) { return std::optional(make_box(m)); },
-                                       [](const PlateModel& m) { return std::optional(make_plate(m)); },
-                                       [](const SphereModel& m) { return std::optional(make_sphere(m)); },
-                                       [](const BlocksModel& m) { return std::optional(make_blocks(m)); }},
-                            body.model);
+  auto surface =
+      std::visit(Overloaded{[](const FileModel& m) {
+                              return m.made.empty() ? std::nullopt : std::optional(make_named(m.made));
+                            },
+                            [](const MadeModel& m) { return std::optional(make_named(m.made)); },
+                            [](const BoxModel& m) { return std::optional(make_box(m)); },
+                            [](const PlateModel& m) { return std::optional(make_plate(m)); },
+                            [](const SphereModel& m) { return std::optional(make_sphere(m)); },
+                            [](const BlocksModel& m) { return std::optional(make_blocks(m)); }},
+                 body.model);
   if (body.cage.tets == 0 && body.cage.cell_m == 0) surface->positions *= 1 - 1e-6;
   return surface;
 }

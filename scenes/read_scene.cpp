@@ -442,8 +442,30 @@ void read_bodies(const Node& root, Scene& scene) {
     complain(child(root, "bodies"), "there is no robot; give the body that is to move role = \"robot\"");
 }
 
-Goal read_goal(const Node& table, const Box& bounds) {
-  const Goal goal{vector(table, "center_of_mass_m"), number(table, "radius_m")};
+// The body that takes the goal along; settling in a goal that moves has no meaning.
+int read_moving_goal(const Node& node, const Scene& scene, double settle_time_s) {
+  std::vector<std::string> names;
+  for (const BodySpec& body : scene.bodies) names.push_back(body.name);
+  const auto at = std::find(names.begin(), names.end(), as_text(node));
+  if (at == names.end() || at - names.begin() == scene.robot)
+    complain(node, fmt::format("goal.moves_with is \"{}\"; it must be a body other than the robot: {}",
+                               as_text(node), fmt::join(names, ", ")));
+  if (settle_time_s > 0)
+    complain(node, "the robot cannot come to rest in a goal that moves; write planner.settle_time_s = 0");
+  return int(at - names.begin());
+}
+
+Goal read_goal(const Node& root, const Scene& scene) {
+  const Node& table = child(root, "goal");
+  const Box& bounds = scene.bounds_m;
+  Goal goal;
+  goal.center_of_mass_m = vector(table, "center_of_mass_m");
+  goal.radius_m = number(table, "radius_m");
+  goal.lost_below_m = maybe_number(table, "lost_below_m");
+  if (const Node* body = table.find("moves_with"))
+    goal.moves_with = read_moving_goal(*body, scene, number(child(root, "planner"), "settle_time_s"));
+  else if (goal.lost_below_m)
+    complain(child(table, "lost_below_m"), "goal.lost_below_m goes with goal.moves_with only; remove it");
   for (int i = 0; i < 3; ++i)
     if (goal.center_of_mass_m[i] < bounds.lower[i] || goal.center_of_mass_m[i] > bounds.upper[i])
       complain(
@@ -530,7 +552,7 @@ Scene read_scene(const std::string& toml, const std::string& name_for_messages,
   scene.gravity_m_s2 = vector(world, "gravity_m_s2");
   scene.max_dt_s = maybe_number(world, "max_dt_s");
   read_bodies(root, scene);
-  scene.goal = read_goal(child(root, "goal"), scene.bounds_m);
+  scene.goal = read_goal(root, scene);
   scene.planner = read_planner(child(root, "planner"));
   scene.camera = read_camera(child(root, "camera"));
   scene.film = read_film(child(root, "film"));

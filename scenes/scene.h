@@ -29,7 +29,7 @@ struct FileModel {
   Vec3 front = Vec3::UnitX();
 };
 struct MadeModel {   // its origin is the middle of its bounding box
-  std::string made;  // "bunny"
+  std::string made;  // "bunny", "dragon", "heart", "lung_left", "lung_right", "liver" or "spine"
   double height_m = 1;
 };
 struct BoxModel {  // its origin is its middle
@@ -113,6 +113,9 @@ struct BodySpec {
 
 struct Goal {
   Vec3 center_of_mass_m = Vec3::Zero();
+  int moves_with = -1;  // index of the body whose centre of mass takes the goal along; −1: none
+  std::optional<double>
+      lost_below_m;  // the goal is lost once the lowest node of that body is below this height
   double radius_m = 0;
 };
 

@@ -107,7 +107,7 @@ constexpr Key all_keys[] = {
      0,
      may_lack,
      "a model that limber makes; beside `file`: used where the file cannot be had",
-     "bunny",
+     "bunny, dragon, heart, lung_left, lung_right, liver, spine",
      ""},
     {"bodies[].model.scale", Type::number, positive, 0, may_lack,
      "m a file unit; with file; 1 when not given", "", ""},
@@ -303,6 +303,18 @@ constexpr Key all_keys[] = {
      "",
      ""},
     {"goal.center_of_mass_m", Type::vector, any, 3, required, "m; within the bounds", "", ""},
+    {"goal.moves_with",
+     Type::text,
+     {},
+     0,
+     may_lack,
+     "a body that moves by itself: the goal, given for the start, moves as its centre of mass does; goes "
+     "with "
+     "planner.settle_time_s = 0",
+     "",
+     ""},
+    {"goal.lost_below_m", Type::number, any, 0, may_lack,
+     "m; with moves_with: the goal is lost once the lowest node of that body is below this height", "", ""},
     {"goal.radius_m", Type::number, positive, 0, required, "m; half the robot's radius is usual", "", ""},
 
     {"planner", Type::table, {}, 0, required, "how the motion is searched", "", ""},

@@ -81,6 +81,48 @@ TEST(Search, SameBytesForAnyNumberInFlightThreadsAndLanes) {
   });
 }
 
+// The goal flees along the corridor: what reaches it is where it is by then, and far from where it was.
+TEST(Search, FollowsAGoalThatMoves) {
+  for_each_toy([](Toy& toy) {
+    toy.goal_velocity_m_s = Vec3(-0.2, 0.1, 0);
+    Settings s = toy_settings();
+    s.settle.max_duration_s = 0;
+    const std::uint64_t expected = hash_of(sequential_tree(toy, s));
+    const Plan p = plan(toy, s);
+    ASSERT_TRUE(p.solved());
+    EXPECT_EQ(hash_of(p.tree), expected);
+    s.in_flight = 7;
+    EXPECT_EQ(hash_of(plan(toy, s).tree), expected);
+    const State& reached = p.tree.states[std::size_t(p.goal_node)];
+    const Vec3 gap = toy.robot_center(reached) - toy.goal_shift(reached) - s.goal.center_of_mass_m;
+    EXPECT_LE(gap.norm(), s.goal.radius_m);
+    EXPECT_NEAR(gap.norm(), p.best_distance_m, 1e-12);
+    EXPECT_GT(toy.goal_shift(reached).norm(), s.goal.radius_m);
+
+    Settings cut = s;
+    cut.max_iterations = p.statistics.iterations / 2;
+    EXPECT_EQ(hash_of(plan(toy, s, plan(toy, cut)).tree), expected) << "resumed";
+  });
+}
+
+// Towards the goal, a push and an interpolation aim at where it is now.
+TEST(Expansion, AimsAtTheGoalWhereItHasMovedTo) {
+  const Settings s = toy_settings();
+  const Vec3 center(1, 2, 1), shift(0.5, -3, 0.25);
+  Draw d;
+  d.towards_goal = true;
+  d.point = s.goal.center_of_mass_m;
+  d.force_n = 1;
+  d.manipulation = Manipulation::body;
+  const Vec3 way = (s.goal.center_of_mass_m + shift - center).normalized();
+  EXPECT_LT((control_of(d, s, center, shift).force_n.cast<double>() - way).norm(), 1e-5);
+  d.manipulation = Manipulation::interpolation;
+  EXPECT_EQ(control_of(d, s, center, shift).target_m, (s.goal.center_of_mass_m + shift).cast<float>());
+  d.towards_goal = false;
+  d.manipulation = Manipulation::body;
+  EXPECT_EQ(control_of(d, s, center, shift).force_n, control_of(d, s, center).force_n);
+}
+
 TEST(Search, SeedsDiffer) {
   const Toy toy;
   Settings s = toy_settings();

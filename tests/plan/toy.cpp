@@ -116,19 +116,23 @@ Tree sequential_tree(const System& system, const Settings& settings) {
   tree.add(start, -1, Control{}, -1, system.robot_center(start).cast<float>());
   for (std::int64_t i = 0; i < settings.max_iterations; ++i) {
     const Draw d = draw(settings, system, i);
+    const auto shift = [&](int node) { return system.goal_shift(tree.states[std::size_t(node)]); };
+    const auto distance2 = [&](int node) {
+      const Vec3f from_goal = tree.centers[node] - shift(node).cast<float>();
+      return squared_distance(d.towards_goal ? from_goal : tree.centers[node], d.point.cast<float>());
+    };
     int near = 0;
     for (int node = 1; node < tree.size(); ++node)
-      if (squared_distance(tree.centers[node], d.point.cast<float>()) <
-          squared_distance(tree.centers[near], d.point.cast<float>()))
-        near = node;
+      if (distance2(node) < distance2(near)) near = node;
     Rollout r;
     r.from = &tree.states[std::size_t(near)];
-    r.control = control_of(d, settings, tree.centers[near].cast<double>());
+    r.control = control_of(d, settings, tree.centers[near].cast<double>(), shift(near));
     propagator->propagate({&r, 1});
     if (!r.ok || !system.acceptable(r.to)) continue;
     const Vec3 center = system.robot_center(r.to);
     tree.add(r.to, near, r.control, i, center.cast<float>());
-    if ((center - settings.goal.center_of_mass_m).norm() <= settings.goal.radius_m) break;
+    if ((center - system.goal_shift(r.to) - settings.goal.center_of_mass_m).norm() <= settings.goal.radius_m)
+      break;
   }
   return tree;
 }

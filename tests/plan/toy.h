@@ -18,6 +18,7 @@ struct Toy final : System {
   bool wall = false;                // across x = 5, 0.4 thick, open for 2 < y < 4
   bool lava = false;                // a rollout through y < 0.5 diverges
   float unacceptable_above_z = 99;  // no node may be there
+  Vec3 goal_velocity_m_s = Vec3::Zero();
   int lanes_wanted = 1;
   bool jitter = false;                        // threads finish in a scrambled order
   std::function<void()> before_each_rollout;  // called by the propagators
@@ -35,6 +36,7 @@ struct Toy final : System {
   double dt_s() const override { return 0.01; }
   std::uint64_t hash() const override;
   bool acceptable(const State&) const override;
+  Vec3 goal_shift(const State& s) const override { return goal_velocity_m_s * (double(s.step) * dt_s()); }
   int lanes() const override { return lanes_wanted; }
   std::unique_ptr<Propagator> make_propagator() const override;
 

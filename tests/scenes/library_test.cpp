@@ -152,10 +152,8 @@ TEST(Library, UnknownSceneNamesTheNearest) {
     find_scene("bariers1");
     FAIL();
   } catch (const InputError& error) {
-    EXPECT_THAT(
-        error.what(),
-        HasSubstr(
-            "did you mean \"barriers1\"? known scenes: barriers1, barriers2, bunny_gate, squeeze, windows"));
+    EXPECT_THAT(error.what(), HasSubstr("did you mean \"barriers1\"? known scenes: barriers1, barriers2, "
+                                        "body_parts, bunny_gate, falling_objects, squeeze, windows"));
   }
 }
 
@@ -192,7 +190,7 @@ TEST(BunnyGateSetup, EndsWellAndSaysSoWithoutThePackage) {
   TemporaryFolder folder;
   for (const char* apt_get : {"exit 100", "exit 0", "echo junk > libcgal-demo_1_all.deb"}) {
     EXPECT_EQ(run_setup(folder, apt_get), 0);
-    EXPECT_THAT(read_file(folder / "said"), HasSubstr("the scene will use the made rabbit instead"));
+    EXPECT_THAT(read_file(folder / "said"), HasSubstr("the scene will use made models instead"));
     EXPECT_TRUE(fs::is_empty(folder / "models")) << "left something behind";
   }
 }

@@ -209,6 +209,12 @@ TEST(ReadScene, ComplainsWithLineAndColumn) {
        "3 }]", "bodies.robot is rigid; remove it"},
       {"material = { youngs_modulus_pa = 5e3, density_kg_m3 = 100 }\n", "", "[[bodies]]", "lacks a material"},
       {"youngs_modulus_pa = 5e3, ", "", "{ density", "bodies.robot.material lacks \"youngs_modulus_pa\""},
+      {"radius_m = 0.25\n", "radius_m = 0.25\nmoves_with = \"robot\"\n", "\"robot\"\n[planner]",
+       "must be a body other than the robot"},
+      {"radius_m = 0.25\n", "radius_m = 0.25\nmoves_with = \"gate\"\n", "\"gate\"\n[planner]",
+       "write planner.settle_time_s = 0"},
+      {"radius_m = 0.25\n", "radius_m = 0.25\nlost_below_m = 1\n", "1\n[planner]",
+       "goes with goal.moves_with only"},
       {"radius_m = 0.25\n", "", "[goal]", "goal lacks \"radius_m\""},
       {"[goal]\ncenter_of_mass_m = [9, 1.5, 1.5]\nradius_m = 0.25\n", "", "name", "add [goal]"},
       {"name = \"gate\"", "name = \"robot\"", "\"robot\"\nrole = \"obst", "two bodies are called \"robot\""},
@@ -354,6 +360,7 @@ std::string another_value(const Key& key) {
       {"bodies[].cage.cells", "[2, 2, 2]"},
       {"bodies[].model.up", "\"+y\""},
       {"bodies[].model.front", "\"-y\""},
+      {"goal.moves_with", "\"gate\""},
       {"camera.keyframes[].at", "0.5"},
       {"camera.keyframes[].eye_m", "[0, -8, 1]"},
       {"camera.keyframes[].target_m", "[0, 0.5, 1]"},
@@ -411,6 +418,8 @@ TEST(Keys, EveryKeyChangesTheScene) {
     if (key.path == "bodies[].cage.tets" || key.path == "bodies[].cage.mode" ||
         key.path == "bodies[].cage.shells")
       sets = {tets_robot};
+    if (key.path == "goal.moves_with") sets = {"planner.settle_time_s=0"};
+    if (key.path == "goal.lost_below_m") sets = {"planner.settle_time_s=0", "goal.moves_with=gate"};
     if (key.path == "bodies[].pose.axis") sets = {"bodies.robot.pose.angle_deg=90"};
     if (key.parent() == "bodies[].parts[]")
       sets = {key.name() == "box_m"
@@ -507,7 +516,8 @@ std::string all_of(const Scene& s) {
     t += "\n";
   }
   const PlannerSpec& p = s.planner;
-  t += fmt::format("{} {} {}\n", s.robot, v(s.goal.center_of_mass_m), s.goal.radius_m);
+  t += fmt::format("{} {} {} {} {}\n", s.robot, v(s.goal.center_of_mass_m), s.goal.radius_m,
+                   s.goal.moves_with, s.goal.lost_below_m.value_or(-1));
   t += fmt::format("{} {} {} {} {} {} {} {} {} {} {} {} {} {} {} {}\n", p.preset, p.seed, p.iterations,
                    p.goal_bias, p.weight_body, p.weight_control_point, p.weight_interpolation, p.max_force_n,
                    p.min_force_share, p.max_force_share, p.min_duration_s, p.max_duration_s,

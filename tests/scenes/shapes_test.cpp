@@ -53,6 +53,12 @@ std::vector<Shape> shapes() {
       {"one-piece sphere", make_sphere({1, 9}), 2, 0.31702,
        1e-4},  // 5(3+√5)/12 a³ of the icosahedron, a = 1/(2 sin 72°)
       {"bunny", make_bunny(), 2, 0, 0},
+      {"dragon", make_dragon(), 2, 0, 0},
+      {"heart", make_heart(), 2, 0, 0},
+      {"left lung", make_lung(1), 2, 0, 0},
+      {"right lung", make_lung(-1), 2, 0, 0},
+      {"liver", make_liver(), 2, 0, 0},
+      {"spine", make_spine(), 0, 0, 0},  // two of its processes touch
       {"one block", make_blocks({{{Vec3(1, 1, 1), Vec3(1, 1, 1) + size}}, {}, 0, 0.1}), 2, 1, 1e-4},
       {"rounded block", make_blocks({{{Vec3::Zero(), size}}, {}, 0.1, 0.1}), 2, rounded_box_volume(size, 0.1),
        2e-3},
