@@ -13,7 +13,7 @@ constexpr int preferred_lanes = 16;
 std::uint64_t hash_of(const fem::World& world) {
   Hasher hasher;
   hasher.value(world.robot).matrix(world.bounds_m.lower).matrix(world.bounds_m.upper).value(int(world.walls));
-  hasher.matrix(world.gravity_m_s2).value(world.dt_s).value(world.contact_dt_s);
+  hasher.matrix(world.gravity_m_s2).value(world.dt_s).value(world.contact_dt_s).value(world.rest_speed_m_s);
   for (const fem::Body& body : world.bodies) {
     const fem::Material& m = body.material;
     hasher.value(limber::hash_of(body.cage))

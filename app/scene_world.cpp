@@ -167,6 +167,7 @@ fem::World build_world(const scenes::Scene& scene, const std::vector<PreparedBod
   spec.bounds_m = scene.bounds_m;
   spec.walls = scene.walls;
   spec.gravity_m_s2 = scene.gravity_m_s2;
+  spec.rest_speed_m_s = scene.rest_speed_m_s;
   spec.max_dt_s = scene.max_dt_s.value_or(0);
   try {
     return fem::build_world(spec);

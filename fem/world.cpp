@@ -262,9 +262,10 @@ double largest_stable_step(const Body& body, const ElementTables<double>& elemen
   return detail::stable_step(detail::fastest_mode(elements, positions, inverse_mass));
 }
 
-void append(const ElementTables<double>& of_body, int first_node, ElementTables<double>& all) {
+void append(const ElementTables<double>& of_body, int body, int first_node, ElementTables<double>& all) {
   detail::for_each_table(
       [&](const auto& from, auto& to) {
+        to.ranges[std::size_t(body)] = {int(to.elements.size()), 0, int(from.elements.size())};
         for (auto element : from.elements) {
           for (int& n : element.node) n += first_node;
           to.elements.push_back(element);
@@ -316,17 +317,21 @@ double mean_edge(const Body& body) {
   return sum / double(6 * body.cage.tets.rows());
 }
 
-// The last block repeats the last element.
+// Each body's last block repeats its last element.
 template <class E>
 void pack(detail::ElementTable<E>& table) {
   constexpr std::size_t size = detail::block_size;
-  table.blocks.resize((table.elements.size() + size - 1) / size);
-  for (std::size_t e = 0; e < table.blocks.size() * size; ++e) {
-    const E& element = table.elements[std::min(e, table.elements.size() - 1)];
-    auto& block = table.blocks[e / size];
-    for (int i = 0; i < E::nodes; ++i) block.node[i][e % size] = element.node[i];
-    const float* numbers = reinterpret_cast<const float*>(&element.law);
-    for (int i = 0; i < detail::Block<E>::numbers; ++i) block.law[i][e % size] = numbers[i];
+  for (auto& range : table.ranges) {
+    range.block = int(table.blocks.size());
+    const std::size_t count = std::size_t(range.count), blocks = (count + size - 1) / size;
+    table.blocks.resize(table.blocks.size() + blocks);
+    for (std::size_t e = 0; e < blocks * size; ++e) {
+      const E& element = table.elements[std::size_t(range.element) + std::min(e, count - 1)];
+      auto& block = table.blocks[std::size_t(range.block) + e / size];
+      for (int i = 0; i < E::nodes; ++i) block.node[i][e % size] = element.node[i];
+      const float* numbers = reinterpret_cast<const float*>(&element.law);
+      for (int i = 0; i < detail::Block<E>::numbers; ++i) block.law[i][e % size] = numbers[i];
+    }
   }
 }
 
@@ -347,6 +352,7 @@ detail::Tables<float> single_precision(const detail::Tables<double>& t) {
           std::copy(std::begin(element.node), std::end(element.node), copy.node);
           convert(element.law, copy.law);
         }
+        for (const auto& [element, block, count] : from.ranges) to.ranges.push_back({element, block, count});
         pack(to);
       },
       t.elements, out.elements);
@@ -469,6 +475,10 @@ void check(const WorldSpec& spec) {
   if (!box.lower.allFinite() || !box.upper.allFinite() || !(box.size().array() > 0).all())
     throw InputError("bounds_m must be two finite corners, the first below the second on every axis");
   if (!spec.gravity_m_s2.allFinite()) throw InputError("gravity_m_s2 is not finite");
+  if (!(spec.rest_speed_m_s >= 0 && std::isfinite(spec.rest_speed_m_s)))
+    throw InputError(
+        fmt::format("rest_speed_m_s is {}; it must be 0 (bodies never fall asleep) or a positive speed",
+                    spec.rest_speed_m_s));
   if (!(spec.max_dt_s >= 0 && std::isfinite(spec.max_dt_s)))
     throw InputError(
         fmt::format("max_dt_s is {}; it must be 0 (automatic) or a positive time", spec.max_dt_s));
@@ -500,6 +510,7 @@ World build_world(const WorldSpec& spec) {
   world.bounds_m = spec.bounds_m;
   world.walls = spec.walls;
   world.gravity_m_s2 = spec.gravity_m_s2;
+  world.rest_speed_m_s = spec.rest_speed_m_s;
   for (const BodySpec& body : spec.bodies) world.bodies.push_back(make_body(body));
   if (!world.bodies[spec.robot].moving)
     throw InputError(
@@ -507,6 +518,7 @@ World build_world(const WorldSpec& spec) {
 
   find_stiffness_shares(world.bodies);
   auto& tables = world.tables64;
+  detail::for_each_table([&](auto& table) { table.ranges.resize(world.bodies.size()); }, tables.elements);
   world.topology.bodies.resize(world.bodies.size());
   world.rigid_tables.resize(world.bodies.size());
   world.nodes = 0;
@@ -523,7 +535,7 @@ World build_world(const WorldSpec& spec) {
       if (!moving || body.kind == BodyKind::rigid) continue;
       const ElementTables<double> elements = make_elements(body);
       body.elastic_dt_limit_s = largest_stable_step(body, elements);
-      append(elements, body.first_node, tables.elements);
+      append(elements, int(b), body.first_node, tables.elements);
     }
     if (moving) world.moving_nodes = world.nodes;
   }

@@ -52,6 +52,10 @@ struct WorldSpec {
   bool walls = true;                 // the bounds are rigid walls
   Vec3 gravity_m_s2 = Vec3::Zero();  // on every node that is not fixed
   double max_dt_s = 0;               // 0: automatic; a scene may only lower the step
+  // A soft body all of whose nodes are slower, and would gain less than this in a second, comes to a stand;
+  // one that stands goes on standing until a node would gain as much in a tenth of a second. 0: only where
+  // nothing would move.
+  double rest_speed_m_s = 0;
 };
 
 // The rest cage and what follows from it and the material; constant.
@@ -84,6 +88,7 @@ struct World {
   Box bounds_m;
   bool walls;
   Vec3 gravity_m_s2;
+  double rest_speed_m_s;
   double dt_s;  // time step, exactly a float32
   double
       contact_dt_s;  // step from which contact stiffness follows: the automatic one, also when dt_s is lower

@@ -549,6 +549,7 @@ Scene read_scene(const std::string& toml, const std::string& name_for_messages,
   const Node& world = child(root, "world");
   scene.bounds_m = box(world, "bounds_m");
   scene.walls = flag(world, "walls");
+  scene.rest_speed_m_s = number(world, "rest_speed_m_s");
   scene.gravity_m_s2 = vector(world, "gravity_m_s2");
   scene.max_dt_s = maybe_number(world, "max_dt_s");
   read_bodies(root, scene);

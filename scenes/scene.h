@@ -158,6 +158,7 @@ struct Scene {
   Box bounds_m;
   bool walls = true;  // the bounds are closed by rigid walls
   Vec3 gravity_m_s2 = Vec3::Zero();
+  double rest_speed_m_s = 0;
   std::optional<double> max_dt_s;  // only ever lowers the automatic time step
   std::vector<BodySpec> bodies;
   int robot = -1;  // index of the one body whose role is robot

@@ -179,9 +179,12 @@ void Contacts<Real>::forget(int lane) {
 template <class Real>
 void Contacts<Real>::add_forces(int lane, const LaneView<Real>& view) {
   if (!bearings_.empty()) return add_forces_with_rigid(lane, view);
-  for (const auto& [a, b] : pairs_)
+  for (const auto& [a, b] : pairs_) {
+    if (view.sleeps(a) && view.sleeps(b)) continue;
     for (const Touch<Real>& touch : find(lane, view, a, b)) respond(view, a, b, touch);
-  for (int body = 0; body < bodies_; ++body) add_wall_forces(view, body);
+  }
+  for (int body = 0; body < bodies_; ++body)
+    if (!view.sleeps(body)) add_wall_forces(view, body);
 }
 
 // The mass that a rigid body sets against a contact depends on all it has, so these are found first.
@@ -189,12 +192,14 @@ template <class Real>
 void Contacts<Real>::add_forces_with_rigid(int lane, const LaneView<Real>& view) {
   held_.clear();
   for (Bearing& bearing : bearings_) bearing.depths = 0;
-  for (const auto& [a, b] : pairs_)
+  for (const auto& [a, b] : pairs_) {
+    if (view.sleeps(a) && view.sleeps(b)) continue;
     for (const Touch<Real>& touch : find(lane, view, a, b)) {
       if (!(touch.depth > 0)) continue;
       held_.push_back({a, b, touch});
       bearings_[a].depths += double(touch.depth), bearings_[b].depths += double(touch.depth);
     }
+  }
   for (int body = 0; body < bodies_; ++body) {
     Bearing& bearing = bearings_[body];
     if (world_.bodies[body].kind != BodyKind::rigid) continue;
@@ -202,7 +207,8 @@ void Contacts<Real>::add_forces_with_rigid(int lane, const LaneView<Real>& view)
     if (bearing.depths > 0) bearing.measure(view, topology_.bodies[body], tables_.node_mass);
   }
   for (const Held& held : held_) respond(view, held.a, held.b, held.touch);
-  for (int body = 0; body < bodies_; ++body) add_wall_forces(view, body);
+  for (int body = 0; body < bodies_; ++body)
+    if (!view.sleeps(body)) add_wall_forces(view, body);
 }
 
 template <class Real>

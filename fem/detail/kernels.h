@@ -140,6 +140,15 @@ struct WayOut {
   Real height[4];     // of the point above the faces, in lengths of the normals
 };
 
+// When a body stands still, [lane].
+template <class Real>
+struct Rest {
+  Real most_speed2;                      // largest |v|² of a node, before and after
+  Real most_gain2, most_gain2_of_still;  // largest |Δv|², where it moved, and where it stood still
+  const Real *asleep, *speed2_before;
+  Real* stands;  // out: v is 0 now and x as before; `asleep` and `stands` are 0 or 1
+};
+
 template <class Real>
 struct Kernels {
   int lanes;
@@ -147,6 +156,9 @@ struct Kernels {
   void (*elastic)(const Elements<Real>&, const Real* x, const Real* v, Real* f);
   // v += dt (f/m + g + push), x += dt v, f = 0.
   void (*integrate)(const Motion<Real>&, Real* x, Real* v, Real* f);
+  // The same where a body may stand still: it does in lanes where it is asleep, and where it was slow, stays
+  // slow and gains little.
+  void (*integrate_resting)(const Motion<Real>&, const Rest<Real>&, Real* x, Real* v, Real* f);
   // The same for a body whose nodes keep their distances. They are drawn onto the nearest rigid place first.
   void (*move_rigid)(const RigidMotion<Real>&, Real* x, Real* v, Real* f);
   // The points p, or segments from p to q, whose boxes meet the tet's and that are outside of its planes by

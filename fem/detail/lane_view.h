@@ -14,6 +14,9 @@ struct LaneView {
   // Boxes of the bodies, [(3 body + c) stride], and how far each body's fastest node can have come since
   // load, [body stride].
   const Real *lower, *upper, *travel;
+  // Bodies that take no part in this step, [body stride], or null: nothing is looked for between two of them.
+  const Real* asleep = nullptr;
+  bool sleeps(int body) const { return asleep && asleep[body * stride] > 0; }
 };
 
 }  // namespace limber::fem::detail

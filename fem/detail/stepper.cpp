@@ -36,13 +36,20 @@ Stepper<Real>::Stepper(const World& world, int lanes, Isa isa)
       force_layout_(force_layout(lanes)),
       first_velocity_(lanes == 1 ? 4 : world.nodes * state_layout_.node),
       controls_(std::size_t(lanes)),
-      contact_(std::size_t(lanes), false) {
+      contact_(std::size_t(lanes), false),
+      rest_speed2_(Real(world.rest_speed_m_s * world.rest_speed_m_s)),
+      rest_gain2_(rest_speed2_ * Real(world.dt_s * world.dt_s)),  // gained within a second
+      still_gain2_(100 * rest_gain2_),                            // within a tenth of it
+      speed2_before_(std::size_t(lanes), 0) {
   const std::size_t nodes = std::size_t(world.nodes), bodies = world.bodies.size() * std::size_t(lanes);
   state_.assign(nodes * std::size_t(lanes == 1 ? 8 : 6 * lanes), 0);
   f_.assign(nodes * std::size_t(force_layout_.node), 0);
   push_.assign(std::size_t(3 * world.bodies[world.robot].node_count() * lanes), 0);
   lower_.resize(3 * bodies), upper_.resize(3 * bodies);
   speed2_.assign(bodies, 0), travel_.assign(bodies, 0);
+  unchanged_.assign(bodies, 0), asleep_.assign(bodies, 0), stands_.assign(bodies, 0);
+  met_.assign(world.bodies.size() * bodies, false);
+  all_asleep_.assign(world.bodies.size(), false), pushed_asleep_ = all_asleep_;
   for (int n = 0; n < world.nodes; ++n)
     for (int c = 0; c < 3; ++c) std::fill_n(&x(0, n, c), lanes, tables_.rest_positions[3 * n + c]);
   const std::vector<Real> still(std::size_t(3 * world.moving_nodes), 0);
@@ -69,6 +76,12 @@ void Stepper<Real>::load(int lane, const Real* positions, const Real* velocities
       upper_[(3 * b + c) * lanes_ + lane] = upper;
     }
     travel_[b * lanes_ + lane] = 0;
+    Real speed2 = 0;
+    for (int n = body.first_node; n < body.last_node && body.moving; ++n)
+      speed2 = std::max(speed2, v(lane, n, 0) * v(lane, n, 0) + v(lane, n, 1) * v(lane, n, 1) +
+                                    v(lane, n, 2) * v(lane, n, 2));
+    speed2_[b * lanes_ + lane] = speed2;
+    unchanged_[b * lanes_ + lane] = body.moving ? 0 : 1;
   }
   contacts_.forget(lane);
   contact_[lane] = contact;
@@ -94,11 +107,11 @@ void Stepper<Real>::store(int lane, Real* positions, Real* velocities) const {
 
 template <class Real>
 LaneView<Real> Stepper<Real>::view(int lane) {
-  return {&state_[lane], &state_[first_velocity_ + lane],
-          &f_[lane],     state_layout_,
-          force_layout_, lanes_,
-          &lower_[lane], &upper_[lane],
-          &travel_[lane]};
+  return {&state_[lane],  &state_[first_velocity_ + lane],
+          &f_[lane],      state_layout_,
+          force_layout_,  lanes_,
+          &lower_[lane],  &upper_[lane],
+          &travel_[lane], &asleep_[lane]};
 }
 
 template <class Real>
@@ -130,15 +143,52 @@ void Stepper<Real>::pull_towards_goal(int lane) {
 template <class Real>
 void Stepper<Real>::step() {
   if (cost_.steps++ % Cost::sampled != Cost::sampled / 2) {
-    add_contact_forces(), find_pushes(), add_elastic_forces(), integrate();
+    find_sleepers(), add_contact_forces(), find_pushes(), add_elastic_forces(), integrate();
     return;
   }
   Stopwatch watch;
   const auto spent = [&] { return Cost::sampled * watch.lap_s(); };
-  add_contact_forces(), cost_.contact_s += spent();
+  find_sleepers(), add_contact_forces(), cost_.contact_s += spent();
   find_pushes(), cost_.controls_s += spent();
   add_elastic_forces(), cost_.elastic_s += spent();
   integrate(), cost_.integration_s += spent();
+}
+
+// A body that did not change in the last step, and whose boxes met only such bodies' then and now, will not
+// change in this one either: every force is what it was. Lanes without contact are idle, and may sleep
+// altogether.
+template <class Real>
+void Stepper<Real>::find_sleepers() {
+  const int bodies = int(world_.bodies.size());
+  std::fill(all_asleep_.begin(), all_asleep_.end(), true);
+  std::fill(pushed_asleep_.begin(), pushed_asleep_.end(), false);
+  for (int lane = 0; lane < lanes_; ++lane) {
+    const auto at = [&](int body) { return std::size_t(body * lanes_ + lane); };
+    for (int b = 0; b < bodies; ++b) asleep_[at(b)] = contact_[lane] ? unchanged_[at(b)] : 1;
+    const auto meet = [&](int a, int b) {
+      for (int c = 0; c < 3; ++c)
+        if (lower_[at(3 * a + c)] > upper_[at(3 * b + c)] || lower_[at(3 * b + c)] > upper_[at(3 * a + c)])
+          return false;
+      return true;
+    };
+    for (int a = 0; a < bodies && contact_[lane]; ++a)
+      for (int b = a + 1; b < bodies; ++b) {
+        const std::size_t pair = at(a * bodies + b);
+        const bool met = met_[pair], now = meet(a, b);
+        met_[pair] = now;
+        if (!met && !now) continue;
+        if (unchanged_[at(a)] == 0) asleep_[at(b)] = 0;
+        if (unchanged_[at(b)] == 0) asleep_[at(a)] = 0;
+      }
+    for (int b = 0; b < bodies; ++b) {
+      if (!world_.bodies[b].moving) asleep_[at(b)] = 1;
+      if (asleep_[at(b)] == 0) all_asleep_[b] = false;
+    }
+    for (int a = 0; a < bodies && contact_[lane]; ++a)
+      for (int b = a + 1; b < bodies; ++b)
+        if (met_[at(a * bodies + b)] && asleep_[at(a)] != asleep_[at(b)])
+          pushed_asleep_[asleep_[at(a)] > 0 ? a : b] = true;
+  }
 }
 
 template <class Real>
@@ -155,7 +205,10 @@ void Stepper<Real>::find_pushes() {
 
 template <class Real>
 void Stepper<Real>::add_elastic_forces() {
-  kernels_.elastic(elements_of(tables_.elements), state_.data(), &state_[first_velocity_], f_.data());
+  for (std::size_t b = 0; b < world_.bodies.size(); ++b)
+    if (world_.topology.bodies[b].moving && !all_asleep_[b])
+      kernels_.elastic(elements_of(tables_.elements, int(b)), state_.data(), &state_[first_velocity_],
+                       f_.data());
 }
 
 template <class Real>
@@ -163,24 +216,48 @@ void Stepper<Real>::integrate() {
   for (std::size_t b = 0; b < world_.bodies.size(); ++b) {
     const Topology::Body& body = world_.topology.bodies[b];
     if (!body.moving) continue;
+    const std::size_t first = b * std::size_t(lanes_);
+    if (all_asleep_[b]) {
+      if (pushed_asleep_[b])
+        std::fill(&f_[force_layout_.at(body.first_node, 0)],
+                  &f_[force_layout_.at(body.last_node - 1, 0)] + force_layout_.node, Real(0));
+      continue;
+    }
     Motion<Real> motion{body.first_node,
                         body.last_node,
                         tables_.inverse_mass.data(),
                         Real(world_.dt_s),
                         {},
                         int(b) == world_.robot ? push_.data() : nullptr,
-                        &lower_[3 * b * lanes_],
-                        &upper_[3 * b * lanes_],
-                        &speed2_[b * lanes_]};
+                        &lower_[3 * first],
+                        &upper_[3 * first],
+                        &speed2_[first]};
     for (int c = 0; c < 3; ++c) motion.gravity[c] = Real(world_.gravity_m_s2[c]);
     Real *const x = state_.data(), *const v = &state_[first_velocity_];
+    std::fill_n(&stands_[first], lanes_, Real(0));
+    std::copy_n(&speed2_[first], lanes_, speed2_before_.data());
     if (world_.bodies[b].kind == BodyKind::rigid)
       kernels_.move_rigid({motion, world_.rigid_tables[b].body()}, x, v, f_.data());
+    else if (may_stand(b))
+      kernels_.integrate_resting(
+          motion,
+          {rest_speed2_, rest_gain2_, still_gain2_, &asleep_[first], speed2_before_.data(), &stands_[first]},
+          x, v, f_.data());
     else
       kernels_.integrate(motion, x, v, f_.data());
     for (int lane = 0; lane < lanes_; ++lane)
-      travel_[b * lanes_ + lane] += motion.dt * std::sqrt(speed2_[b * lanes_ + lane]);
+      unchanged_[first + lane] = stands_[first + lane] > 0 && speed2_before_[lane] == 0;
+    for (int lane = 0; lane < lanes_; ++lane)
+      travel_[first + lane] += motion.dt * std::sqrt(speed2_[first + lane]);
   }
+}
+
+template <class Real>
+bool Stepper<Real>::may_stand(std::size_t body) const {
+  for (int lane = 0; lane < lanes_; ++lane)
+    if (contact_[lane] && speed2_[body * std::size_t(lanes_) + std::size_t(lane)] <= rest_speed2_)
+      return true;
+  return false;
 }
 
 template class Stepper<float>;

@@ -40,6 +40,8 @@ class Stepper {
   Real& x(int lane, int node, int c) { return state_[state_layout_.at(node, c) + lane]; }
   Real& v(int lane, int node, int c) { return state_[first_velocity_ + state_layout_.at(node, c) + lane]; }
   void pull_towards_goal(int lane);
+  void find_sleepers();
+  bool may_stand(std::size_t body) const;
   void add_contact_forces();
   void find_pushes();
   void add_elastic_forces();
@@ -54,11 +56,18 @@ class Stepper {
   int first_velocity_;
   using Numbers = std::vector<Real, LineAllocator<Real>>;
   Numbers state_, f_;
-  Numbers push_;                   // [robot node][xyz][lane] accelerations
-  Numbers lower_, upper_;          // [body][xyz][lane]
-  Numbers speed2_, travel_;        // [body][lane]
-  std::vector<Control> controls_;  // [lane]
-  std::vector<bool> contact_;      // [lane]
+  Numbers push_;             // [robot node][xyz][lane] accelerations
+  Numbers lower_, upper_;    // [body][xyz][lane]
+  Numbers speed2_, travel_;  // [body][lane]
+  // Sleep (docs/dynamics.md), all [body][lane], 0 or 1: is as it was a step ago; takes no part in this step;
+  // stood still in this step. And [pair of bodies][lane]: their boxes met a step ago.
+  Numbers unchanged_, asleep_, stands_;
+  std::vector<bool> met_;
+  std::vector<bool> all_asleep_, pushed_asleep_;  // [body] in all lanes; some force fell on it there
+  std::vector<Control> controls_;                 // [lane]
+  std::vector<bool> contact_;                     // [lane]
+  Real rest_speed2_, rest_gain2_, still_gain2_;
+  Numbers speed2_before_;  // [lane]
   Cost cost_;
 };
 

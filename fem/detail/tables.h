@@ -11,12 +11,23 @@ namespace limber::fem::detail {
 template <class E>
 struct ElementTable {
   std::vector<E> elements;
-  std::vector<Block<E>> blocks;  // the same in columns
+  std::vector<Block<E>> blocks;  // the same in columns; a body begins with a block of its own
+  struct Range {
+    int element, block, count;
+  };
+  std::vector<Range> ranges;  // of a body
 };
 
 template <class E>
 List<E> list_of(const ElementTable<E>& table) {
   return {table.elements.data(), table.blocks.data(), int(table.elements.size())};
+}
+
+// Those of one body.
+template <class E>
+List<E> list_of(const ElementTable<E>& table, int body) {
+  const auto [element, block, count] = table.ranges[std::size_t(body)];
+  return {table.elements.data() + element, table.blocks.data() + block, count};
 }
 
 // Of the moving bodies.
@@ -30,6 +41,11 @@ struct ElementTables {
 template <class Real>
 Elements<Real> elements_of(const ElementTables<Real>& t) {
   return {list_of(t.springs), list_of(t.dashpots), list_of(t.volumes), list_of(t.neo_hookeans)};
+}
+template <class Real>
+Elements<Real> elements_of(const ElementTables<Real>& t, int body) {
+  return {list_of(t.springs, body), list_of(t.dashpots, body), list_of(t.volumes, body),
+          list_of(t.neo_hookeans, body)};
 }
 // Calls each(table) for the four of them, or each(a, b) for those of two.
 template <class Each, class... Tables>

@@ -27,6 +27,11 @@ constexpr Key all_keys[] = {
     {"world.bounds_m", Type::box, any, 0, required, "m; lower and upper corner", "", ""},
     {"world.walls", Type::boolean, {}, 0, "true", "the bounds are closed by rigid walls", "", ""},
     {"world.gravity_m_s2", Type::vector, from_to(-1000, 1000), 3, "[0, 0, 0]", "m/s²", "", ""},
+    {"world.rest_speed_m_s", Type::number, from_to(0, 1000), 0, "0.001",
+     "m/s; a soft body all of whose nodes are slower, and would gain less in a second, comes to a stand and "
+     "costs nothing "
+     "until it is touched; 0: only where nothing would move",
+     "", ""},
     {"world.max_dt_s",
      Type::number,
      {0, 1, true},

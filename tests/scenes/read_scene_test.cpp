@@ -498,8 +498,8 @@ std::string all_of(const Model& model) {
 std::string all_of(const Scene& s) {
   const auto v = [](const auto& x) { return fmt::format("{} {} {} ", x[0], x[1], x[2]); };
   const auto b = [&](const Box& x) { return v(x.lower) + v(x.upper); };
-  std::string t = fmt::format("{} {} {} {} {} {}\n", s.name, s.description, b(s.bounds_m), s.walls,
-                              v(s.gravity_m_s2), s.max_dt_s.value_or(-1));
+  std::string t = fmt::format("{} {} {} {} {} {} {}\n", s.name, s.description, b(s.bounds_m), s.walls,
+                              v(s.gravity_m_s2), s.rest_speed_m_s, s.max_dt_s.value_or(-1));
   for (const BodySpec& body : s.bodies) {
     const MaterialSpec& m = body.material;
     t += fmt::format("{} {} {} {} {} | {} {} {} {} {} | {} {} {} {} {} {} {} | {} {} {} {} | {}", body.name,
