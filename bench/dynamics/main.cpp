@@ -6,6 +6,7 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <chrono>
+#include <cstdio>
 #include <thread>
 
 #include "bench/dynamics/bullet.h"
@@ -386,6 +387,7 @@ Json compare_threads(const Work& work, int repetitions) {
 }
 
 int main(int argc, char** argv) {
+  std::setvbuf(stdout, nullptr, _IOLBF, 0);  // what was measured is seen, however the run ends
   CLI::App program("What dynamics cost.");
   int repetitions = 5;
   bool quick = false;

@@ -66,14 +66,18 @@ void Stepper<Real>::load(int lane, const Real* positions, const Real* velocities
     }
   for (std::size_t b = 0; b < world_.bodies.size(); ++b) {
     const Topology::Body& body = world_.topology.bodies[b];
-    for (int c = 0; c < 3; ++c) {
-      Real lower = std::numeric_limits<Real>::max(), upper = -lower;
-      for (int n = body.first_node; n < body.last_node; ++n) {
-        lower = std::min(lower, x(lane, n, c));
-        upper = std::max(upper, x(lane, n, c));
+    // Not from the lane, whose numbers lie a cache line apart.
+    const Real* place = body.moving ? positions : tables_.rest_positions.data();
+    constexpr Real huge = std::numeric_limits<Real>::max();
+    Real lower[3] = {huge, huge, huge}, upper[3] = {-huge, -huge, -huge};
+    for (int n = body.first_node; n < body.last_node; ++n)
+      for (int c = 0; c < 3; ++c) {
+        lower[c] = std::min(lower[c], place[3 * n + c]);
+        upper[c] = std::max(upper[c], place[3 * n + c]);
       }
-      lower_[(3 * b + c) * lanes_ + lane] = lower;
-      upper_[(3 * b + c) * lanes_ + lane] = upper;
+    for (int c = 0; c < 3; ++c) {
+      lower_[(3 * b + c) * lanes_ + lane] = lower[c];
+      upper_[(3 * b + c) * lanes_ + lane] = upper[c];
     }
     travel_[b * lanes_ + lane] = 0;
     Real speed2 = 0;
@@ -88,10 +92,11 @@ void Stepper<Real>::load(int lane, const Real* positions, const Real* velocities
   controls_[lane] = control;
 
   const Body& robot = world_.bodies[world_.robot];
+  Real acceleration[3];
+  for (int c = 0; c < 3; ++c) acceleration[c] = Real(control.force_n[c]) / Real(robot.mass_kg);
   for (int n = 0; n < robot.node_count(); ++n) {
     const bool pushed = !robot.fixed[n] && is_pushed(world_, control, n);
-    for (int c = 0; c < 3; ++c)
-      push_[(3 * n + c) * lanes_ + lane] = pushed ? Real(control.force_n[c]) / Real(robot.mass_kg) : Real(0);
+    for (int c = 0; c < 3; ++c) push_[(3 * n + c) * lanes_ + lane] = pushed ? acceleration[c] : Real(0);
   }
 }
 
