@@ -39,6 +39,8 @@ Json summary_of(const plan::Plan& plan, const fem::World& world, const fem::Cost
             {"explanation", plan::explain(plan)},
             {"seed", plan.settings.seed},
             {"nodes", plan.tree.size()},
+            {"node_bytes", plan.tree.states.bytes() / std::size_t(plan.tree.size())},
+            {"node_bytes_unshared", plan.tree.states.bytes_unshared() / std::size_t(plan.tree.size())},
             {"distance_m", plan.best_distance_m},
             {"statistics", plan::json_of(plan.statistics)},
             {"dynamics", json_of(cost)},
@@ -60,6 +62,7 @@ std::string text_of(const Json& s, const fs::path& file) {
   return fmt::format(
       "{}\n"
       "  search       {} iterations, {} nodes, {} diverged, {} rejected; {:.2f} CPU s, {:.2f} s\n"
+      "  memory       {:.1f} kB a node, {:.1f} where nothing is shared with the parent\n"
       "  dynamics     contact {:.2f} × the force step; a lane takes {:.1f} µs to load, {:.1f} µs to store\n"
       "  motion       {:.2f} s in {} frames, time step {:.3g} ms\n"
       "  volume       changes at most: {}\n"
@@ -70,7 +73,8 @@ std::string text_of(const Json& s, const fs::path& file) {
       "  file         {}\n",
       s.at("explanation").get<std::string>(), t.at("iterations").get<std::int64_t>(),
       s.at("nodes").get<int>(), t.at("diverged").get<std::int64_t>(), t.at("rejected").get<std::int64_t>(),
-      t.at("cpu_s").get<double>(), t.at("wall_s").get<double>(), d.at("contact_of_force_step").get<double>(),
+      t.at("cpu_s").get<double>(), t.at("wall_s").get<double>(), 1e-3 * s.at("node_bytes").get<double>(),
+      1e-3 * s.at("node_bytes_unshared").get<double>(), d.at("contact_of_force_step").get<double>(),
       d.at("load_us").get<double>(), d.at("store_us").get<double>(), s.at("motion_s").get<double>(),
       s.at("frames").get<int>(), 1e3 * s.at("dt_s").get<double>(), volumes,
       s.at("deepest_penetration_m").get<double>(),

@@ -11,17 +11,18 @@ namespace {
 constexpr const char* format_name = "limber plan 1";
 
 // A list of states is three arrays: NAME_step (n), NAME_positions and NAME_velocities (n × 3N).
-template <class States>
-void put_states(Npz& file, const std::string& name, const States& states) {
+template <class StateList>
+void put_states(Npz& file, const std::string& name, const StateList& states) {
   std::vector<std::int64_t> steps;
   std::vector<float> positions, velocities;
-  for (const State& s : states) {
+  for (std::size_t i = 0; i < std::size_t(states.size()); ++i) {
+    const State& s = states[i];
     steps.push_back(s.step);
     positions.insert(positions.end(), s.positions.begin(), s.positions.end());
     velocities.insert(velocities.end(), s.velocities.begin(), s.velocities.end());
   }
   const std::int64_t n = std::int64_t(states.size());
-  const std::int64_t width = states.empty() ? 0 : std::int64_t(states.begin()->positions.size());
+  const std::int64_t width = n == 0 ? 0 : std::int64_t(positions.size()) / n;
   file.arrays[name + "_step"] = NpyArray::of<std::int64_t>(steps, {n});
   file.arrays[name + "_positions"] = NpyArray::of<float>(positions, {n, width});
   file.arrays[name + "_velocities"] = NpyArray::of<float>(velocities, {n, width});
@@ -91,13 +92,12 @@ class Reader {
     return a.shape[1];
   }
 
-  template <class States>
-  States states(const std::string& name, std::int64_t width) const {
+  std::vector<State> states(const std::string& name, std::int64_t width) const {
     const auto steps = array<std::int64_t>(name + "_step", -1, 1);
     const std::int64_t n = std::int64_t(steps.size());
     const auto positions = array<float>(name + "_positions", n, width);
     const auto velocities = array<float>(name + "_velocities", n, width);
-    States states;
+    std::vector<State> states;
     for (std::int64_t i = 0; i < n; ++i) {
       const auto x = positions.subspan(std::size_t(i * width), std::size_t(width));
       const auto v = velocities.subspan(std::size_t(i * width), std::size_t(width));
@@ -132,8 +132,8 @@ class Reader {
 
   Tree tree() const {
     Tree t;
-    t.states = states<std::deque<State>>("tree", width_of("tree_positions"));
-    const std::int64_t n = t.size();
+    const std::vector<State> all = states("tree", width_of("tree_positions"));
+    const std::int64_t n = std::int64_t(all.size());
     require(n > 0, "the tree is empty");
     const auto parents = array<std::int32_t>("tree_parent", n, 1);
     const auto iterations = array<std::int64_t>("tree_iteration", n, 1);
@@ -146,6 +146,7 @@ class Reader {
       const std::int32_t parent = parents[std::size_t(i)];
       require(i == 0 ? parent == -1 : parent >= 0 && parent < i,
               fmt::format("node {} has parent {}", i, parent));
+      t.states.push_back(all[std::size_t(i)], parent);
     }
     return t;
   }
@@ -244,9 +245,9 @@ PlanFile read_plan(const fs::path& path) {
 
     Trajectory& t = plan.trajectory;
     t.controls = reader.controls("path", -1);
-    const std::int64_t width = std::int64_t(plan.tree.states.front().positions.size());
-    t.frames = reader.states<std::vector<State>>("frame", width);
-    const auto end = reader.states<std::vector<State>>("end", width);
+    const std::int64_t width = std::int64_t(plan.tree.states.numbers());
+    t.frames = reader.states("frame", width);
+    const auto end = reader.states("end", width);
     reader.require(end.size() == 1, "end is not one state");
     t.end = end.front();
     meta.at("settle_steps").get_to(t.settle_steps);

@@ -90,6 +90,7 @@ class Search {
     const std::unique_ptr<Propagator> propagator = system_.make_propagator();
     std::vector<Expansion*> mine;
     std::vector<Rollout> rollouts;
+    std::vector<State> starts;
     std::vector<Outcome> outcomes;
     std::unique_lock lock(mutex_);
     while (true) {
@@ -97,7 +98,7 @@ class Search {
       look_at_limits();
       if (ended_) break;
       draw_ahead();
-      take(mine, rollouts);
+      take(mine, rollouts, starts);
       if (mine.empty()) {
         changed_.wait(lock);
         continue;
@@ -147,16 +148,17 @@ class Search {
     centers_from_goal_.push_back(center - goal_shift.cast<float>());
   }
 
-  void take(std::vector<Expansion*>& mine, std::vector<Rollout>& rollouts) {
+  void take(std::vector<Expansion*>& mine, std::vector<Rollout>& rollouts, std::vector<State>& starts) {
     mine.clear();
     for (Expansion& e : queue_) {
       if (int(mine.size()) == share_) break;
       if (e.status == Expansion::waiting) mine.push_back(&e);
     }
-    rollouts.resize(mine.size());
+    rollouts.resize(mine.size()), starts.resize(mine.size());
     for (std::size_t i = 0; i < mine.size(); ++i) {
       mine[i]->status = Expansion::running;
-      rollouts[i].from = &plan_.tree.states[std::size_t(mine[i]->near)];
+      starts[i] = plan_.tree.states[std::size_t(mine[i]->near)];
+      rollouts[i].from = &starts[i];
       rollouts[i].control = mine[i]->control;
     }
   }

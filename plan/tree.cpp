@@ -9,8 +9,9 @@
 
 namespace limber::plan {
 
-int Tree::add(State state, int parent, const Control& control, std::int64_t iteration, const Vec3f& center) {
-  states.push_back(std::move(state));
+int Tree::add(const State& state, int parent, const Control& control, std::int64_t iteration,
+              const Vec3f& center) {
+  states.push_back(state, parent);
   parents.push_back(parent);
   controls.push_back(control);
   iterations.push_back(iteration);
@@ -64,7 +65,7 @@ std::vector<int> path_to(const Tree& tree, int node) {
 std::uint64_t hash_of(const Tree& tree) {
   Hasher hasher;
   hasher.value(std::int64_t(tree.size()));
-  for (const State& state : tree.states) hasher.value(limber::hash_of(state));
+  for (int i = 0; i < tree.size(); ++i) hasher.value(limber::hash_of(tree.states[std::size_t(i)]));
   hasher.values(std::span<const std::int32_t>(tree.parents));
   hasher.values(std::span<const std::int64_t>(tree.iterations));
   for (const Control& control : tree.controls) detail::hash_control(hasher, control);

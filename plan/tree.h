@@ -1,10 +1,10 @@
 // The tree of states that the search grows. Flat arrays; a node is an index, and its parent's is smaller.
 #pragma once
 
-#include <deque>
 #include <vector>
 
 #include "core/state.h"
+#include "plan/states.h"
 
 namespace limber::plan {
 
@@ -16,16 +16,16 @@ struct Centers {
   void push_back(const Vec3f& p) { x.push_back(p.x()), y.push_back(p.y()), z.push_back(p.z()); }
 };
 
-// A deque of states: a pointer to one stays good while the tree grows.
 struct Tree {
-  std::deque<State> states;              // [0] is the start
+  States states;                         // [0] is the start
   std::vector<std::int32_t> parents;     // −1 for the start
   std::vector<Control> controls;         // led from the parent here; the start's is Control{}
   std::vector<std::int64_t> iterations;  // the expansion that made the node; −1 for the start
   Centers centers;                       // the planner's metric: distances between these
 
   int size() const { return int(states.size()); }
-  int add(State, int parent, const Control&, std::int64_t iteration, const Vec3f& center);  // the new node
+  int add(const State&, int parent, const Control&, std::int64_t iteration,
+          const Vec3f& center);  // the new node
 };
 
 float squared_distance(const Vec3f&, const Vec3f&);

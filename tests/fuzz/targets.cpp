@@ -48,7 +48,8 @@ ConvexShell shell() {
 plan::Plan small_plan() {
   const State state{3, {0, 0, 0, 1, 2, 3}, {0, 0, 0, 0, 0, 1}};
   plan::Plan made;
-  made.tree.states = {state, state};
+  made.tree.states.push_back(state);
+  made.tree.states.push_back(state, 0);
   made.tree.parents = {-1, 0};
   made.tree.controls = {Control{}, Control{}};
   made.tree.centers.push_back({0, 0, 0});

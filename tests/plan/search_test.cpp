@@ -93,7 +93,7 @@ TEST(Search, FollowsAGoalThatMoves) {
     EXPECT_EQ(hash_of(p.tree), expected);
     s.in_flight = 7;
     EXPECT_EQ(hash_of(plan(toy, s).tree), expected);
-    const State& reached = p.tree.states[std::size_t(p.goal_node)];
+    const State reached = p.tree.states[std::size_t(p.goal_node)];
     const Vec3 gap = toy.robot_center(reached) - toy.goal_shift(reached) - s.goal.center_of_mass_m;
     EXPECT_LE(gap.norm(), s.goal.radius_m);
     EXPECT_NEAR(gap.norm(), p.best_distance_m, 1e-12);

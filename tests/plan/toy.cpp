@@ -125,7 +125,8 @@ Tree sequential_tree(const System& system, const Settings& settings) {
     for (int node = 1; node < tree.size(); ++node)
       if (distance2(node) < distance2(near)) near = node;
     Rollout r;
-    r.from = &tree.states[std::size_t(near)];
+    const State from = tree.states[std::size_t(near)];
+    r.from = &from;
     r.control = control_of(d, settings, tree.centers[near].cast<double>(), shift(near));
     propagator->propagate({&r, 1});
     if (!r.ok || !system.acceptable(r.to)) continue;

@@ -43,22 +43,29 @@ TEST(Nearest, TheFirstOfEqualsWins) {
 }
 
 TEST(Tree, HashSeesEveryField) {
-  const auto make = [] {
+  const auto make_with = [](const State& state) {
     Tree tree;
     tree.add({0, {0, 0, 0}, {0, 0, 0}}, -1, Control{}, -1, Vec3f(0, 0, 0));
     Control control;
     control.manipulation = Manipulation::body;
     control.force_n = Vec3f(1, 2, 3);
     control.steps = 4;
-    tree.add({4, {1, 0, 0}, {2, 0, 0}}, 0, control, 0, Vec3f(1, 0, 0));
+    tree.add(state, 0, control, 0, Vec3f(1, 0, 0));
     return tree;
   };
+  const auto make = [&] { return make_with({4, {1, 0, 0}, {2, 0, 0}}); };
   const std::uint64_t hash = hash_of(make());
   EXPECT_EQ(hash_of(make()), hash);
   const std::vector<std::function<void(Tree&)>> changes = {
-      [](Tree& t) { t.states[1].step = 5; },
-      [](Tree& t) { t.states[1].positions[2] = 1e-30f; },
-      [](Tree& t) { t.states[1].velocities[0] = 3; },
+      [&](Tree& t) {
+        t = make_with({5, {1, 0, 0}, {2, 0, 0}});
+      },
+      [&](Tree& t) {
+        t = make_with({4, {1, 0, 1e-30f}, {2, 0, 0}});
+      },
+      [&](Tree& t) {
+        t = make_with({4, {1, 0, 0}, {3, 0, 0}});
+      },
       [](Tree& t) { t.parents[1] = 1; },
       [](Tree& t) { t.iterations[1] = 1; },
       [](Tree& t) { t.centers.z[1] = 1; },
@@ -74,6 +81,35 @@ TEST(Tree, HashSeesEveryField) {
     changes[i](changed);
     EXPECT_NE(hash_of(changed), hash) << "change " << i;
   }
+}
+
+// Two bodies of 1,000 nodes; only the first moves. What comes out has the very bits that went in, also where
+// 0 became −0, and the second body is held once.
+TEST(States, ShareWhatDidNotChangeAndGiveItBack) {
+  Rng rng(13, 0);
+  constexpr std::size_t body = 3000;
+  std::vector<State> given;
+  std::vector<int> parents;
+  States states;
+  for (int i = 0; i < 200; ++i) {
+    const int parent = i == 0 ? -1 : rng.below(i);
+    State state = i == 0 ? State{0, std::vector<float>(2 * body + 3), std::vector<float>(2 * body + 3)}
+                         : given[std::size_t(parent)];
+    state.step = i;
+    for (std::size_t k = 0; k < body; ++k) {
+      state.positions[k] = float(rng.uniform(-1, 1));
+      state.velocities[k] = rng.below(2) == 0 ? 0.0f : -0.0f;
+    }
+    given.push_back(state);
+    parents.push_back(parent);
+    states.push_back(state, parent);
+  }
+  ASSERT_EQ(states.size(), 200);
+  for (std::size_t i = 0; i < given.size(); ++i)
+    EXPECT_EQ(limber::hash_of(states[i]), limber::hash_of(given[i])) << i;
+  const double changed = double(given.size()) * double(2 * body * sizeof(float));
+  EXPECT_LT(double(states.bytes()), 1.1 * changed);
+  EXPECT_GT(double(states.bytes_unshared()), 2 * changed);
 }
 
 TEST(Tree, PathLeadsFromTheStart) {
