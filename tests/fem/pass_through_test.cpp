@@ -1,12 +1,12 @@
-// Up to which speed nothing passes through, and at which it fails: found by bisection, printed, and held to
-// what docs/contact.md states.
+// Up to which speed nothing passes through, and at which it fails: found by bisection, and held to what
+// docs/contact.md states.
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <cstdio>
 
 #include "fem/batch.h"
 #include "fem/observe.h"
+#include "tests/fem/proofs.h"
 #include "tests/fem/worlds.h"
 
 namespace limber::fem {
@@ -56,9 +56,9 @@ double failing_speed(double lowest, const Fails& does_fail) {
   return bad;
 }
 
-void expect_above(const char* what, double stated, double found) {
-  std::printf("%-34s fails at %6.1f m/s; stated: none up to %g\n", what, found, stated);
-  EXPECT_GT(found, stated) << what;
+void prove_above(const std::string& what, double stated, double found) {
+  testing::prove_at_least(15, what + ": speed at which it fails, m/s", fmt::format("none up to {}", stated),
+                          found, std::nextafter(stated, 1000));
 }
 
 TEST(PassThrough, ACubeAtAPlate) {
@@ -66,8 +66,8 @@ TEST(PassThrough, ACubeAtAPlate) {
     WorldSpec spec = thrown(cube({0, 0, 0}, 1, 3));
     spec.bodies.push_back(plate(is_static ? BodyKind::immovable : BodyKind::deformable));
     const World world = build_world(spec);
-    expect_above(is_static ? "cube at a static plate" : "cube at a soft plate", is_static ? 16 : 12,
-                 failing_speed(1, [&](double speed) { return fails(world, speed, 0.8); }));
+    prove_above(is_static ? "cube at a static plate" : "cube at a soft plate", is_static ? 16 : 12,
+                failing_speed(1, [&](double speed) { return fails(world, speed, 0.8); }));
   }
 }
 
@@ -79,8 +79,8 @@ TEST(PassThrough, ABallAtRollers) {
     spec.bodies.push_back({"rod", rod, soft, {}, BodyKind::immovable});
   }
   const World world = build_world(spec);
-  expect_above("ball at static rollers", 12,
-               failing_speed(1, [&](double speed) { return fails(world, speed, 0.9); }));
+  prove_above("ball at static rollers", 12,
+              failing_speed(1, [&](double speed) { return fails(world, speed, 0.9); }));
 }
 
 TEST(PassThrough, AChainOfBodies) {
@@ -99,7 +99,7 @@ TEST(PassThrough, AChainOfBodies) {
       bad |= center_of_mass_m(world, end.end, b).x() > center_of_mass_m(world, end.end, b + 1).x();
     return bad;
   };
-  expect_above("chain of four bodies", 16, failing_speed(1, out_of_order));
+  prove_above("chain of four bodies", 16, failing_speed(1, out_of_order));
 }
 
 // A ball of 1 m pushed through a slit of 0.6 m between two soft jaws: it comes through whole.
@@ -125,9 +125,9 @@ TEST(PassThrough, ABallThroughASlit) {
     state = next.end, time += 0.05;
     deepest = std::max(deepest, deepest_penetration(world, state).depth_m);
   }
-  std::printf("ball through a slit of 0.6: %.2f s, deepest %.4f m\n", time, deepest);
   EXPECT_GT(center_of_mass_m(world, state, 0).x(), 2.2);
-  EXPECT_LT(deepest, 0.03);
+  testing::prove_at_most(15, "ball of 1 m through a slit of 0.6: deepest overlap, m",
+                         fmt::format("through in {:.1f} s", time), deepest, 0.03);
   Control rest;
   rest.steps = int(3 / world.dt_s);
   const State end = propagate(world, state, rest).end;
