@@ -68,7 +68,7 @@ TEST(Library, Barriers1IsTheTableOfThePaper) {
   for (const BodySpec& body : scene.bodies) {
     tets += int(made_cage(body)->tets.rows());
     EXPECT_EQ(body.material.youngs_modulus_pa, 5e3);
-    EXPECT_EQ(body.material.poisson_ratio, 0.45);
+    EXPECT_EQ(body.material.poisson_ratio, 0.48);
     EXPECT_EQ(body.material.density_kg_m3, 100);
   }
   EXPECT_EQ(tets, 675);
