@@ -76,6 +76,11 @@ void to_triangle(const Real p[3], const Real corner[3][3], const Real normal[3],
   for (int k = 0; k < 3; ++k) way[k] = height / size2 * normal[k];
 }
 
+template <class Real>
+Real damping_of(Real beta) {
+  return Real(2 * contact_damping_ratio) * std::sqrt(beta);
+}
+
 // Normal force k d − c ṙ·n, never pulling; friction against the slip, at most μ times that, and at most what
 // takes a share of the slip away in one step. `mass_along` a unit vector is what is set against a push.
 // False: no force.
@@ -83,7 +88,7 @@ template <class Real, class Mass>
 bool penalty_force(Real beta, Real depth, const Real normal[3], const Real relative_velocity[3],
                    const Mass& mass_along, Real step, Real friction, Real force[3]) {
   const Real mass = mass_along(normal);
-  const Real damping = Real(2 * contact_damping_ratio) * std::sqrt(beta);
+  const Real damping = damping_of(beta);
   const Real speed = dot(relative_velocity, normal);
   const Real push = mass / step * (beta * depth / step - damping * speed);
   if (!(push > 0)) return false;
@@ -183,8 +188,7 @@ void Contacts<Real>::add_forces(int lane, const LaneView<Real>& view) {
     if (view.sleeps(a) && view.sleeps(b)) continue;
     for (const Touch<Real>& touch : find(lane, view, a, b)) respond(view, a, b, touch);
   }
-  for (int body = 0; body < bodies_; ++body)
-    if (!view.sleeps(body)) add_wall_forces(view, body);
+  add_wall_forces(view);
 }
 
 // The mass that a rigid body sets against a contact depends on all it has, so these are found first.
@@ -207,8 +211,7 @@ void Contacts<Real>::add_forces_with_rigid(int lane, const LaneView<Real>& view)
     if (bearing.depths > 0) bearing.measure(view, topology_.bodies[body], tables_.node_mass);
   }
   for (const Held& held : held_) respond(view, held.a, held.b, held.touch);
-  for (int body = 0; body < bodies_; ++body)
-    if (!view.sleeps(body)) add_wall_forces(view, body);
+  add_wall_forces(view);
 }
 
 template <class Real>
@@ -898,22 +901,50 @@ void Contacts<Real>::for_each_beyond_wall(const LaneView<Real>& view, int body, 
 }
 
 template <class Real>
-void Contacts<Real>::add_wall_forces(const LaneView<Real>& view, int body) const {
-  const bool rigid = world_.bodies[body].kind == BodyKind::rigid;
-  for_each_beyond_wall(view, body, [&](int n, int axis, Real out, Real depth) {
-    Real normal[3] = {0, 0, 0}, place[3], velocity[3], force[3];
-    normal[axis] = out;
-    for (int c = 0; c < 3; ++c)
-      place[c] = view.x[view.state.at(n, c)], velocity[c] = view.v[view.state.at(n, c)];
-    const auto mass_along = [&](const Real along[3]) {
-      return rigid ? Real(1 / bearings_[body].inverse_mass(place, along, depth)) : tables_.node_mass[n];
-    };
-    if (!penalty_force(Real(contact_beta), depth, normal, velocity, mass_along, step_,
-                       tables_.pair_friction[body * bodies_ + body], force))
-      return;
-    for (int c = 0; c < 3; ++c) view.f[view.force.at(n, c)] += force[c];
-    if (told_) told_->push_back({{n, n}, {1, 0}, -1, depth, {force[0], force[1], force[2]}});
-  });
+void Contacts<Real>::add_wall_forces(const LaneView<Real>& view) const {
+  for (int body = 0; body < bodies_; ++body) {
+    const bool rigid = world_.bodies[body].kind == BodyKind::rigid;
+    if (view.sleeps(body) || (!rigid && !told_)) continue;
+    for_each_beyond_wall(view, body, [&](int n, int axis, Real out, Real depth) {
+      Real normal[3] = {0, 0, 0}, place[3], velocity[3], force[3];
+      normal[axis] = out;
+      for (int c = 0; c < 3; ++c)
+        place[c] = view.x[view.state.at(n, c)], velocity[c] = view.v[view.state.at(n, c)];
+      const auto mass_along = [&](const Real along[3]) {
+        return rigid ? Real(1 / bearings_[body].inverse_mass(place, along, depth)) : tables_.node_mass[n];
+      };
+      if (!penalty_force(Real(contact_beta), depth, normal, velocity, mass_along, step_,
+                         tables_.pair_friction[body * bodies_ + body], force))
+        return;
+      for (int c = 0; c < 3; ++c) view.f[view.force.at(n, c)] += force[c];
+      if (told_) told_->push_back({{n, n}, {1, 0}, -1, depth, {force[0], force[1], force[2]}});
+    });
+  }
+}
+
+template <class Real>
+void Contacts<Real>::add_forces_of_walls(const LaneView<Real>& view) const {
+  for (int body = 0; body < bodies_ && world_.walls; ++body) {
+    const Topology::Body& nodes = topology_.bodies[body];
+    if (!nodes.moving || world_.bodies[body].kind == BodyKind::rigid) continue;
+    Wall<Real> wall{};
+    wall.nodes = nodes.surface_nodes.data(), wall.count = int(nodes.surface_nodes.size());
+    wall.mass = tables_.node_mass.data(), wall.inverse_mass = tables_.inverse_mass.data();
+    wall.beta = Real(contact_beta), wall.damping = damping_of(wall.beta);
+    wall.slip_stop = Real(contact_slip_stop), wall.friction = tables_.pair_friction[body * bodies_ + body];
+    wall.step = step_;
+    wall.asleep = view.asleep + body * view.stride;
+    for (int side = 0; side < 6; ++side) {
+      const bool upper = side % 2 == 1;
+      wall.axis = side / 2, wall.inward = Real(upper ? -1 : 1);
+      wall.place = Real((upper ? world_.bounds_m.upper : world_.bounds_m.lower)[wall.axis]);
+      const Real* reach = (upper ? view.upper : view.lower) + (3 * body + wall.axis) * view.stride;
+      bool beyond = false;
+      for (int lane = 0; lane < view.stride; ++lane)
+        beyond |= !(wall.asleep[lane] > 0) && wall.inward * (wall.place - reach[lane]) > 0;
+      if (beyond) kernels_.push_off(wall, view.x, view.v, view.f);
+    }
+  }
 }
 
 template class Contacts<float>;

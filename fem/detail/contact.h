@@ -49,9 +49,11 @@ class Contacts {
  public:
   Contacts(const World&, const Kernels<Real>&, int lanes);
   void forget(int lane);  // the lane holds another state now
-  // Adds the forces of all contacts and walls to view.f.
+  // Adds to view.f the forces of all contacts, and of the walls on rigid bodies.
   void add_forces(int lane, const LaneView<Real>& view);
-  // From now on add_forces also appends to this list, unless null.
+  // After that in every lane: adds those of the walls on soft bodies that are awake. The view of lane 0.
+  void add_forces_of_walls(const LaneView<Real>& view) const;
+  // From now on add_forces also appends to this list, unless null, and adds the forces of all walls.
   void tell(std::vector<Exerted<Real>>* list) { told_ = list; }
   // The touches of bodies a and b, a ≤ b: of a in b vertices and edges with an end inside, then edges that
   // pass through, each ascending; then those of b in a; of a body with itself
@@ -135,7 +137,7 @@ class Contacts {
   void respond(const LaneView<Real>&, int a, int b, const Touch<Real>&) const;
   template <class Each>
   void for_each_beyond_wall(const LaneView<Real>&, int body, const Each&) const;
-  void add_wall_forces(const LaneView<Real>&, int body) const;
+  void add_wall_forces(const LaneView<Real>&) const;
 
   const World& world_;
   const Topology& topology_;

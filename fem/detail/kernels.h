@@ -149,6 +149,20 @@ struct Rest {
   Real* stands;  // out: v is 0 now and x as before; `asleep` and `stands` are 0 or 1
 };
 
+// A wall square to an axis, and the surface nodes of a soft body that may be beyond it. The law is that of
+// contact (docs/contact.md), with the node's mass against the push.
+template <class Real>
+struct Wall {
+  const int* nodes;  // of the world
+  int count;
+  const Real *mass, *inverse_mass;  // a world node; inverse 0 where it never moves
+  int axis;
+  Real inward, place;  // inward: ±1 along the axis
+  Real beta, damping;  // of depth per step and of speed, as masses per step
+  Real slip_stop, friction, step;
+  const Real* asleep;  // [lane] > 0: no force
+};
+
 template <class Real>
 struct Kernels {
   int lanes;
@@ -161,6 +175,8 @@ struct Kernels {
   void (*integrate_resting)(const Motion<Real>&, const Rest<Real>&, Real* x, Real* v, Real* f);
   // The same for a body whose nodes keep their distances. They are drawn onto the nearest rigid place first.
   void (*move_rigid)(const RigidMotion<Real>&, Real* x, Real* v, Real* f);
+  // Adds the forces of the wall on what is beyond it.
+  void (*push_off)(const Wall<Real>&, const Real* x, const Real* v, Real* f);
   // The points p, or segments from p to q, whose boxes meet the tet's and that are outside of its planes by
   // `reach` at most. Reads multiples of block_size: all arrays must be that long. Returns how many are near.
   int (*near_points)(const TetPlanes<Real>&, const Real* const p[3], const Real* const q[3], int count,

@@ -200,6 +200,7 @@ template <class Real>
 void Stepper<Real>::add_contact_forces() {
   for (int lane = 0; lane < lanes_; ++lane)
     if (contact_[lane]) contacts_.add_forces(lane, view(lane));
+  contacts_.add_forces_of_walls(view(0));
 }
 
 template <class Real>

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstring>
 #include <optional>
 
 #include "core/random.h"
@@ -356,6 +357,52 @@ TEST(Contact, TwoBallsKeepMomentumByEqualAndOppositeForces) {
                 1e-6);
   prove_at_most(13, "two balls: momentum and angular momentum lost, of Σ mv", "springs",
                 (testing::momenta(world, state) - before).norm() / before.head<3>().norm(), 1e-5);
+}
+
+// A ball that sticks out of a room on all sides, held by a few nodes, in lanes that differ, of which every
+// third sleeps: bit for bit the forces that walls give to one lane, node by node.
+TEST(Contact, WallsGiveTheSameForcesInLanesAsOneByOne) {
+  WorldSpec spec = testing::alone({"ball", ball({0, 0, 0}, 0.5, 4), {}, {0, 1, 2, 3}, BodyKind::deformable});
+  spec.bounds_m = {Vec3::Constant(-0.6), Vec3::Constant(0.6)};
+  spec.walls = true;
+  const World world = build_world(spec);
+  Rng rng(44, 0);
+  for (const detail::Isa isa : {detail::Isa::sse2, detail::Isa::avx2, detail::Isa::avx512})
+    for (const int lanes : {1, 4, 8, 16}) {
+      if (!detail::machine_has(isa)) continue;
+      SCOPED_TRACE(::testing::Message() << lanes << " lanes, instruction set " << int(isa));
+      detail::Contacts<float> contacts(world, detail::kernels<float>(isa, lanes), lanes);
+      const detail::Layout state = detail::state_layout(lanes), force = detail::force_layout(lanes);
+      const std::size_t count = std::size_t(lanes);
+      std::vector<float> x(std::size_t(world.nodes * state.node)), v(x),
+          f(std::size_t(world.nodes * force.node)), expected, lower(3 * count), upper(lower), travel(count),
+          asleep(count);
+      for (float& number : f) number = rng.uniform(0, 1) < 0.5 ? -0.f : float(rng.uniform(-1, 1));
+      expected = f;
+      for (int l = 0; l < lanes; ++l) {
+        Lane one(world);
+        for (int n = 0; n < world.nodes; ++n)
+          for (int c = 0; c < 3; ++c) {
+            one.x[3 * n + c] = float(1.8 * one.x[3 * n + c] + rng.uniform(-0.3, 0.3));
+            one.v[3 * n + c] = n % 5 == 0 ? 0.f : float(rng.uniform(-3, 3));
+            one.f[3 * n + c] = f[force.at(n, c) + l];
+            x[state.at(n, c) + l] = one.x[3 * n + c], v[state.at(n, c) + l] = one.v[3 * n + c];
+          }
+        one.update_boxes();
+        for (int c = 0; c < 3; ++c) lower[c * lanes + l] = one.lower[c], upper[c * lanes + l] = one.upper[c];
+        asleep[l] = l % 3 == 1;
+        if (asleep[l] > 0) continue;
+        std::vector<detail::Exerted<float>> exerted;
+        contacts.tell(&exerted);
+        contacts.add_forces(0, one.view());
+        EXPECT_GT(exerted.size(), 20u);
+        for (int n = 0; n < world.nodes; ++n)
+          for (int c = 0; c < 3; ++c) expected[force.at(n, c) + l] = one.f[3 * n + c];
+      }
+      contacts.add_forces_of_walls({x.data(), v.data(), f.data(), state, force, lanes, lower.data(),
+                                    upper.data(), travel.data(), asleep.data()});
+      EXPECT_EQ(std::memcmp(f.data(), expected.data(), f.size() * sizeof(float)), 0);
+    }
 }
 
 // A cube at rest on the floor: every bottom node carries its share, so depth = g h²/β · (all mass)/(mass of
