@@ -36,23 +36,32 @@ bool touches(const fem::World& world, const State& state) {
   return deepest.depth_m > 0 && deepest.other >= 0;
 }
 
-// Pushed towards the goal until something is in the way, and a little further; then on in many ways.
+// Pushed towards the goal, or else towards one of the other bodies, until something is in the way, and a
+// little further; then on in many ways.
 Cases pressed_cases(const fem::World& world, const scenes::Scene& scene) {
   Cases cases;
-  cases.start = rest_state(world);
-  const Vec3 towards =
-      (scene.goal.center_of_mass_m - center_of_mass_m(world, cases.start, world.robot)).normalized();
+  const State rest = rest_state(world);
+  const Vec3 from = center_of_mass_m(world, rest, world.robot);
+  std::vector<Vec3> places{scene.goal.center_of_mass_m};
+  for (int b = 0; b < int(world.bodies.size()); ++b)
+    if (b != world.robot) places.push_back(center_of_mass_m(world, rest, b));
   const double force_n = scene.planner.max_force_n;
   const int fifty_ms = std::max(1, int(0.05 / world.dt_s));
+  Vec3 towards;
   const auto go_on = [&] {
     cases.start = propagate(world, cases.start, push(0.7 * force_n * towards, fifty_ms)).end;
   };
-  for (int i = 0; i < 200 && !touches(world, cases.start); ++i) go_on();
+  for (const Vec3& place : places) {
+    cases.start = rest;
+    towards = (place - from).normalized();
+    for (int i = 0; i < 100 && !touches(world, cases.start); ++i) go_on();
+    if (touches(world, cases.start)) break;
+  }
   EXPECT_TRUE(touches(world, cases.start));
   for (int i = 0; i < 4; ++i) go_on();
   Rng rng(61, 0);
   for (int i = 0; i < rollouts; ++i) {
-    Control control = push(force_n * (0.7 * towards + 0.3 * rng.direction()), 300 + rng.below(200));
+    Control control = push(force_n * (0.7 * towards + 0.3 * rng.direction()), 400 + rng.below(200));
     control.manipulation = Manipulation(i % 4);
     control.node = rng.below(world.bodies[std::size_t(world.robot)].node_count());
     control.radius_m = 0.4f;
