@@ -21,7 +21,7 @@ const std::map<std::string, int> tets_of_scene{
     {"barriers1", 675}, {"barriers2", 2335},      {"bunny_gate", 620}, {"squeeze", 957},
     {"windows", 1710},  {"falling_objects", 370}, {"body_parts", 500}};
 
-TEST(SceneWorld, EveryScenePreparesBuildsAndSteps_slow) {
+TEST(SceneWorld, EveryScenePreparesBuildsAndSteps) {
   TemporaryFolder folder;
   ::setenv("LIMBER_MODELS", folder.path().c_str(), 1);  // the made models, on every machine
   for (const scenes::KnownScene& known : scenes::known_scenes()) {
