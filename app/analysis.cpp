@@ -7,6 +7,7 @@
 
 #include "core/threads.h"
 #include "render/plot.h"
+#include "render/png_file.h"
 
 namespace limber::app {
 
@@ -109,7 +110,7 @@ void write_observables(const fs::path& csv, const fem::World& world, const Motio
   write_file(csv, text);
 }
 
-void write_volume_plot(const fs::path& file, const scenes::Scene& scene, const fem::World& world,
+void write_volume_plot(const fs::path& folder, const scenes::Scene& scene, const fem::World& world,
                        const MotionFigures& figures, double frames_per_second) {
   std::vector<render::Curve> curves;
   for (std::size_t b = 0; b < world.bodies.size(); ++b) {
@@ -123,7 +124,8 @@ void write_volume_plot(const fs::path& file, const scenes::Scene& scene, const f
   }
   const render::PlotLook look{
       .title = scene.name, .x_label = "time (s)", .y_label = "change of volume (%)", .limits = {-10, 10}};
-  write_file(file, render::plot_svg(curves, look));
+  write_file(folder / "volume.svg", render::plot_svg(curves, look));
+  render::write_png(folder / "volume.png", render::plot_image(curves, look));
 }
 
 }  // namespace limber::app

@@ -48,7 +48,8 @@ Json json_of(const MotionFigures&);  // strain, contact and penetration, as plan
 // A row a frame, for each body its figures and then what is of all: docs/files.md.
 void write_observables(const fs::path& csv, const fem::World&, const MotionFigures&);
 
-void write_volume_plot(const fs::path&, const scenes::Scene&, const fem::World&, const MotionFigures&,
+// volume.svg and volume.png.
+void write_volume_plot(const fs::path& folder, const scenes::Scene&, const fem::World&, const MotionFigures&,
                        double frames_per_second);
 
 }  // namespace limber::app

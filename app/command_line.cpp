@@ -34,33 +34,29 @@ void add_threads(CLI::App& command, GlobalOptions& options) {
       ->capture_default_str();
 }
 
-void add_scene(CLI::App& command, SceneOptions& options) {
+void add_edits(CLI::App& command, std::vector<std::string>& sets, std::vector<fs::path>& data) {
   command
-      .add_option("SCENE", options.scene,
-                  "a scene file, or the name of a scene that comes with limber (see limber scenes)")
-      ->required();
-  command
-      .add_option("--set", options.sets,
+      .add_option("--set", sets,
                   "edit the scene before it is read: --set bodies.robot.material.youngs_modulus_pa=5e4")
       ->type_name("KEY=VALUE")
       ->allow_extra_args(false);
-  command
-      .add_option("--data", options.data, "a folder in which model files of the scene are looked for first")
+  command.add_option("--data", data, "a folder in which model files of the scene are looked for first")
       ->type_name("DIR")
       ->check(CLI::ExistingDirectory)
       ->allow_extra_args(false);
 }
 
-void add_plan(CLI::App& command, PlanOptions& options) {
-  command.add_option("-o,--out", options.out, "work folder; it is made where it is missing")
-      ->required()
-      ->type_name("DIR");
-  command.add_option("--seed", options.seed, "seed of the random numbers, 0 … 2^53; default: the scene's")
-      ->check(CLI::Range(0.0, 0x1p53));
+void add_scene(CLI::App& command, SceneOptions& options) {
   command
-      .add_option("--preset", options.preset,
-                  "paper: Algorithm 1 of Rodriguez, Lien and Amato 2006; default: the scene's")
-      ->check(CLI::IsMember({"paper"}));
+      .add_option("SCENE", options.scene,
+                  "a scene file, or the name of a scene that comes with limber (see limber scenes)")
+      ->required();
+  add_edits(command, options.sets, options.data);
+}
+
+// Of one search: PlanOptions or BenchOptions.
+template <class Options>
+void add_limits(CLI::App& command, Options& options) {
   command
       .add_option("--iterations", options.iterations, "limit of the search, 0 … 1e9; default: the scene's")
       ->check(CLI::Range(0.0, 1e9));
@@ -77,6 +73,41 @@ void add_plan(CLI::App& command, PlanOptions& options) {
       ->capture_default_str();
 }
 
+void add_plan(CLI::App& command, PlanOptions& options) {
+  command.add_option("-o,--out", options.out, "work folder; it is made where it is missing")
+      ->required()
+      ->type_name("DIR");
+  command.add_option("--seed", options.seed, "seed of the random numbers, 0 … 2^53; default: the scene's")
+      ->check(CLI::Range(0.0, 0x1p53));
+  command
+      .add_option("--preset", options.preset,
+                  "paper: Algorithm 1 of Rodriguez, Lien and Amato 2006; fast: what we found to be better; "
+                  "default: the scene's")
+      ->check(CLI::IsMember({"paper", "fast"}));
+  add_limits(command, options);
+  command
+      .add_option("--stats", options.stats,
+                  "how the search goes, a line of JSON for every tenth iteration; whole at any time")
+      ->type_name("FILE.jsonl");
+}
+
+void add_shortcut(CLI::App& command, PlanOptions& options) {
+  command
+      .add_option("--shortcut", options.shortcut_rounds,
+                  "rounds of sixteen changes to the path that is found, each simulated, 0 … 100000; default: "
+                  "the scene's")
+      ->check(CLI::Range(0, 100000))
+      ->type_name("N");
+  command
+      .add_option("--cost", options.cost,
+                  "what they make less of: duration (s), effort (N s), strain (the largest elastic energy), "
+                  "volume (the largest change)")
+      ->check(CLI::IsMember({"duration", "effort", "strain", "volume"}))
+      ->capture_default_str();
+  command.add_flag("--improve", options.improve,
+                   "go on after the first path until --iterations or --time-limit, and keep the best");
+}
+
 void add_render(CLI::App& command, RenderOptions& options) {
   command.add_option(
       "--frames", options.frames,
@@ -88,6 +119,30 @@ void add_render(CLI::App& command, RenderOptions& options) {
   command
       .add_option("--video", options.video,
                   "the film, made when every frame is there; default: film.mp4 in the work folder")
+      ->type_name("FILE");
+}
+
+void add_bench(CLI::App& command, BenchOptions& options) {
+  command.add_option("SCENE", options.scenes,
+                     "scene files, or names of scenes that come with limber (see limber scenes)");
+  command.add_option("-o,--out", options.out, "folder of the records; what is in it is not run again")
+      ->type_name("DIR");
+  command.add_option("--seeds", options.seeds, "seeds of the runs: 1-30,40,50-90:10")->capture_default_str();
+  command
+      .add_option("--presets", options.presets, "presets of the planner, as paper,fast; default: the scene's")
+      ->type_name("PRESET[,PRESET…]")
+      ->delimiter(',')
+      ->allow_extra_args(false);
+  add_edits(command, options.sets, options.data);
+  add_limits(command, options);
+  command.add_option("--chunk", options.chunk, "do the i-th of n parts of the runs, 1 ≤ i ≤ n")
+      ->type_name("I/N");
+  command.add_option("--merge", options.merge, "run nothing: make one table of the records in these folders")
+      ->type_name("DIR…")
+      ->check(CLI::ExistingDirectory);
+  command
+      .add_option("--ompl-log", options.ompl_log,
+                  "also write OMPL's benchmark log, for Planner Arena; of several scenes one each")
       ->type_name("FILE");
 }
 
@@ -121,6 +176,7 @@ int run_command_line(int argc, const char* const* argv) {
   PrepareOptions prepare_options;
   PlanOptions plan_options;
   RenderOptions render_options;
+  BenchOptions bench_options;
   fs::path folder;
   std::optional<fs::path> observables;
   std::function<Outcome()> chosen;
@@ -187,6 +243,7 @@ int run_command_line(int argc, const char* const* argv) {
 
   CLI::App& plan_command = *program.add_subcommand("plan", "scene → bodies, tree, path");
   add_scene(plan_command, plan_options.scene), add_plan(plan_command, plan_options);
+  add_shortcut(plan_command, plan_options);
   plan_command.add_flag("--resume", plan_options.resume,
                         "go on from the plan in the work folder: more iterations, or after it was stopped");
   add_global(plan_command, global), add_threads(plan_command, global);
@@ -203,9 +260,15 @@ int run_command_line(int argc, const char* const* argv) {
   CLI::App& run_command =
       *program.add_subcommand("run", "all of it: prepare, plan, render; what is up to date is skipped");
   add_scene(run_command, plan_options.scene), add_plan(run_command, plan_options),
-      add_render(run_command, render_options);
+      add_shortcut(run_command, plan_options), add_render(run_command, render_options);
   add_global(run_command, global), add_threads(run_command, global);
   run_command.callback([&] { chosen = [&] { return run(plan_options, render_options); }; });
+
+  CLI::App& bench_command = *program.add_subcommand(
+      "bench", "many runs: scenes × seeds × presets → a record a run, a table; what is done is skipped");
+  add_bench(bench_command, bench_options);
+  add_global(bench_command, global), add_threads(bench_command, global);
+  bench_command.callback([&] { chosen = [&] { return bench(bench_options); }; });
 
   CLI::App& verify_command =
       *program.add_subcommand("verify", "replays the plan bit for bit, checks every promise, prints a table");
@@ -218,6 +281,54 @@ int run_command_line(int argc, const char* const* argv) {
           "the strongest contact and the deepest penetration")
       ->type_name("FILE.csv");
   verify_command.callback([&] { chosen = [&] { return verify(folder, observables); }; });
+
+  RobustOptions robust_options;
+  CLI::App& robust_command = *program.add_subcommand(
+      "robust", "replays the plan with other materials and forces, and reports how often it still works");
+  robust_command.add_option("DIR", robust_options.folder, "work folder with a plan")->required();
+  robust_command
+      .add_option("-n,--perturbations", robust_options.perturbations,
+                  "replays, 1 … 10000, in at most four worlds of other materials")
+      ->check(CLI::Range(1, 10000))
+      ->capture_default_str();
+  robust_command.add_option("--seed", robust_options.seed, "seed of the perturbations, 0 … 2^53")
+      ->check(CLI::Range(0.0, 0x1p53))
+      ->capture_default_str();
+  robust_command
+      .add_option("--materials", robust_options.material_share,
+                  "Young's modulus, density and friction of each body change by up to this share, 0 … 0.9")
+      ->check(CLI::Range(0.0, 0.9))
+      ->capture_default_str();
+  robust_command
+      .add_option("--forces", robust_options.force_share,
+                  "each control's force changes by up to this share, 0 … 0.9")
+      ->check(CLI::Range(0.0, 0.9))
+      ->capture_default_str();
+  robust_command
+      .add_option("--turn", robust_options.force_deg, "and is turned by up to so many degrees, 0 … 90")
+      ->check(CLI::Range(0.0, 90.0))
+      ->capture_default_str();
+  add_global(robust_command, global), add_threads(robust_command, global);
+  robust_command.callback([&] { chosen = [&] { return robust(robust_options); }; });
+
+  RefineOptions refine_options;
+  CLI::App& refine_command =
+      *program.add_subcommand("refine", "carries a plan to finer cages of the same bodies");
+  refine_command.add_option("DIR", refine_options.folder, "work folder with a plan that reaches the goal")
+      ->required();
+  refine_command.add_option("-o,--out", refine_options.out, "another work folder, for the finer bodies")
+      ->required()
+      ->type_name("DIR");
+  refine_command
+      .add_option(
+          "--tets-factor", refine_options.tets_factor,
+          "tets of each cage, about, as a multiple of the coarse one's; 0.1 … 1000; 1: only --set counts")
+      ->check(CLI::Range(0.1, 1000.0))
+      ->capture_default_str();
+  add_edits(refine_command, refine_options.sets, refine_options.data);
+  add_limits(refine_command, refine_options);
+  add_global(refine_command, global), add_threads(refine_command, global);
+  refine_command.callback([&] { chosen = [&] { return refine(refine_options); }; });
 
   CLI::App& info_command = *program.add_subcommand("info", "what is in a file or folder");
   info_command

@@ -58,6 +58,11 @@ struct PlanOptions {
   double time_limit_s = std::numeric_limits<double>::infinity();
   int in_flight = 0;  // 0: chosen from threads and lanes
   bool resume = false;
+  std::optional<fs::path> stats;  // JSON lines: how the search went
+
+  std::optional<int> shortcut_rounds;  // nothing: the scene's
+  std::string cost = "duration";       // what shortcutting and improving make less of
+  bool improve = false;                // go on after the first solution
 };
 Outcome plan(const PlanOptions&);
 
@@ -74,8 +79,49 @@ Outcome render(const RenderOptions&);
 // prepare, plan and render; stages that are up to date are skipped.
 Outcome run(const PlanOptions&, const RenderOptions&);
 
+// Scenes × seeds × presets, each planned as `plan` would, one record a run. docs/bench.md.
+struct BenchOptions {
+  std::vector<std::string> scenes;  // files, or names of scenes that come with limber
+  std::vector<std::string> sets;
+  std::vector<fs::path> data;
+  std::string seeds = "1-30";
+  std::vector<std::string> presets;  // empty: each scene's own
+  std::optional<std::int64_t> iterations;
+  double time_limit_s = std::numeric_limits<double>::infinity();  // of a run
+  int in_flight = 0;
+  std::string chunk;                 // "i/n": the i-th of n parts of the runs; empty: all
+  std::vector<fs::path> merge;       // nothing is run: folders whose records make one table
+  fs::path out;                      // may be empty with `merge`
+  std::optional<fs::path> ompl_log;  // also OMPL's benchmark log
+};
+Outcome bench(const BenchOptions&);
+
 // With `observables`, of a work folder: also a CSV with the figures of every frame.
 Outcome verify(const fs::path& folder, const std::optional<fs::path>& observables = {});
+
+struct RobustOptions {
+  fs::path folder;
+  int perturbations = 16;
+  std::uint64_t seed = 1;
+  double material_share = 0.1;  // Young's modulus, density and friction of each body: ± this
+  double force_share = 0.1;     // each control's force: ± this,
+  double force_deg = 5;         // and turned by up to so much
+};
+// The found plan replayed in worlds that are a little different: a report, no verdict.
+Outcome robust(const RobustOptions&);
+
+struct RefineOptions {
+  fs::path folder, out;
+  double tets_factor = 4;
+  std::vector<std::string> sets;  // after those of the plan and of the factor
+  std::vector<fs::path> data;
+  std::optional<std::int64_t> iterations;
+  double time_limit_s = std::numeric_limits<double>::infinity();
+  int in_flight = 0;
+};
+// Carries a plan to finer cages of the same bodies, in another work folder.
+Outcome refine(const RefineOptions&);
+
 Outcome info(const fs::path& path);
 Outcome list_scenes();
 

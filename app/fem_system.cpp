@@ -1,5 +1,9 @@
 #include "app/fem_system.h"
 
+#include <algorithm>
+#include <array>
+
+#include "app/workspace.h"
 #include "core/hash.h"
 #include "fem/batch.h"
 #include "fem/observe.h"
@@ -9,10 +13,12 @@ namespace limber::app {
 namespace {
 
 constexpr int preferred_lanes = 16;
+constexpr int widths[] = {1, 4, 8, 16};
 
 std::uint64_t hash_of(const fem::World& world) {
   Hasher hasher;
   hasher.value(world.robot).matrix(world.bounds_m.lower).matrix(world.bounds_m.upper).value(int(world.walls));
+  hasher.matrix(world.goal_shape_m);
   hasher.matrix(world.gravity_m_s2).value(world.dt_s).value(world.contact_dt_s).value(world.rest_speed_m_s);
   for (const fem::Body& body : world.bodies) {
     const fem::Material& m = body.material;
@@ -34,39 +40,112 @@ std::uint64_t hash_of(const fem::World& world) {
 
 class FemSystem::Propagator final : public plan::Propagator {
  public:
-  explicit Propagator(const FemSystem& system)
-      : system_(system), batch_(system.world_, preferred_lanes), single_(system.world_, 1) {}
+  explicit Propagator(const FemSystem& system) : system_(system) {}
   ~Propagator() override {
     const std::lock_guard lock(system_.mutex_);
-    system_.cost_ += batch_.cost(), system_.cost_ += single_.cost();
+    for (const auto& batch : batches_)
+      if (batch) system_.cost_ += batch->cost();
   }
 
   void propagate(std::span<plan::Rollout> rollouts) override {
     work_.resize(rollouts.size());
     for (std::size_t i = 0; i < rollouts.size(); ++i)
       work_[i].start = rollouts[i].from, work_[i].control = rollouts[i].control;
-    fem::propagate(rollouts.size() == 1 ? single_ : batch_, work_);
+    fem::propagate(batch_for(int(rollouts.size())), work_);
     for (std::size_t i = 0; i < rollouts.size(); ++i) {
       rollouts[i].ok = work_[i].outcome.status == fem::RunStatus::ok;
       rollouts[i].to = std::move(work_[i].end);
     }
   }
 
+  void run(plan::Supply& supply, int look_every) override {
+    while (true) {
+      std::vector<plan::Rollout*> first;
+      const int lanes = std::min(supply.at_once(), preferred_lanes);
+      while (int(first.size()) < lanes)
+        if (plan::Rollout* rollout = supply.next())
+          first.push_back(rollout);
+        else
+          break;
+      if (first.empty()) return;
+      run(batch_for(first.size() == 1 ? 1 : lanes), std::move(first), supply, look_every);
+    }
+  }
+
  private:
+  void run(fem::Batch& batch, std::vector<plan::Rollout*> in_lane, plan::Supply& supply, int look_every) {
+    const auto load = [&](std::size_t lane) {
+      batch.load(int(lane), *in_lane[lane]->from, in_lane[lane]->control);
+    };
+    in_lane.resize(std::size_t(batch.lanes()), nullptr);
+    for (std::size_t lane = 0; lane < in_lane.size(); ++lane)
+      if (in_lane[lane]) load(lane);
+    for (bool any = true; any;) {
+      int steps = look_every;
+      for (std::size_t lane = 0; lane < in_lane.size(); ++lane)
+        if (in_lane[lane])
+          steps = std::min(steps, look_every - taken(batch, *in_lane[lane], lane) % look_every);
+      batch.advance(steps);
+      for (std::size_t lane = 0; lane < in_lane.size(); ++lane) {
+        if (!in_lane[lane]) continue;
+        plan::Rollout& rollout = *in_lane[lane];
+        const int steps_taken = taken(batch, rollout, lane);
+        if (batch.steps_left(int(lane)) > 0) {
+          if (steps_taken % look_every) continue;
+          const plan::Look seen = look(batch, int(lane), steps_taken);
+          // Numbers that are none stay so: it has diverged, and nobody need look.
+          const bool finite =
+              seen.center.allFinite() && seen.velocity.allFinite() && seen.goal_shift.allFinite();
+          if (finite && supply.goes_on(rollout, seen)) continue;
+          batch.stop(int(lane));
+          rollout.control.steps = steps_taken;
+        }
+        batch.store(int(lane), rollout.to);
+        rollout.ok = batch.outcome(int(lane)).status == fem::RunStatus::ok;
+        in_lane[lane] = nullptr;
+        supply.done(rollout);
+      }
+      any = false;
+      for (std::size_t lane = 0; lane < in_lane.size(); ++lane) {
+        if (!in_lane[lane] && (in_lane[lane] = supply.next())) load(lane);
+        any = any || in_lane[lane];
+      }
+    }
+  }
+
+  // The smallest that has so many lanes, if any: idle lanes cost as much as busy ones.
+  fem::Batch& batch_for(int lanes) {
+    const auto width = std::lower_bound(std::begin(widths), std::end(widths) - 1, lanes);
+    auto& batch = batches_[std::size_t(width - std::begin(widths))];
+    if (!batch) batch.emplace(system_.world_, *width);
+    return *batch;
+  }
+
+  static int taken(const fem::Batch& batch, const plan::Rollout& rollout, std::size_t lane) {
+    return rollout.control.steps - batch.steps_left(int(lane));
+  }
+
+  plan::Look look(const fem::Batch& batch, int lane, int steps) const {
+    const auto [center, velocity] = batch.motion(lane, system_.world_.robot);
+    plan::Look look{steps, center, velocity};
+    if (system_.goal_.body >= 0)
+      look.goal_shift = batch.motion(lane, system_.goal_.body).center_m - system_.goal_body_start_m_;
+    return look;
+  }
+
   const FemSystem& system_;
-  fem::Batch batch_, single_;  // a path is simulated one rollout at a time; fifteen idle lanes would cost
+  std::array<std::optional<fem::Batch>, std::size(widths)> batches_;
   std::vector<fem::Rollout> work_;
 };
 
-FemSystem::FemSystem(const fem::World& world, const MovingGoal& goal)
+FemSystem::FemSystem(const fem::World& world, const GoalRules& goal)
     : world_(world), goal_(goal), goal_body_start_m_(Vec3::Zero()), hash_(hash_of(world)) {
-  if (goal.body < 0) return;
-  goal_body_start_m_ = fem::center_of_mass_m(world, start(), goal.body);
+  if (goal.body >= 0) goal_body_start_m_ = fem::center_of_mass_m(world, start(), goal.body);
   Hasher hasher;
-  hasher.value(hash_)
-      .value(goal.body)
-      .value(int(goal.lost_below_m.has_value()))
-      .value(goal.lost_below_m.value_or(0));
+  hasher.value(hash_);
+  for (const int body : {goal.body, goal.above, goal.below, goal.clear_of}) hasher.value(body);
+  for (const auto& rule : {goal.lost_below_m, goal.turn_tolerance_deg, goal.shape_tolerance_m})
+    hasher.value(int(rule.has_value())).value(rule.value_or(0));
   hash_ = hasher.digest();
 }
 
@@ -74,6 +153,10 @@ State FemSystem::start() const { return fem::rest_state(world_); }
 Vec3 FemSystem::robot_center(const State& state) const {
   return fem::center_of_mass_m(world_, state, world_.robot);
 }
+Vec3 FemSystem::robot_velocity(const State& state) const {
+  return fem::center_velocity_m_s(world_, state, world_.robot);
+}
+double FemSystem::robot_mass_kg() const { return world_.bodies[std::size_t(world_.robot)].mass_kg; }
 double FemSystem::mean_speed(const State& state) const {
   return fem::mean_speed_m_s(world_, state, world_.robot);
 }
@@ -89,10 +172,35 @@ bool FemSystem::acceptable(const State& state) const {
   }
   return fem::inverted_tets(world_, state) == 0;
 }
+bool FemSystem::goal_holds(const State& state) const {
+  if (goal_.turn_tolerance_deg && fem::turn_from_goal_shape_deg(world_, state) > *goal_.turn_tolerance_deg)
+    return false;
+  if (goal_.shape_tolerance_m && fem::distance_from_goal_shape_m(world_, state) > *goal_.shape_tolerance_m)
+    return false;
+  const auto height = [&](int body, bool top) {
+    const Points places = fem::body_positions(world_, state, body);
+    return top ? places.col(2).maxCoeff() : places.col(2).minCoeff();
+  };
+  if (goal_.above >= 0 && height(world_.robot, false) <= height(goal_.above, true)) return false;
+  if (goal_.below >= 0 && height(world_.robot, true) >= height(goal_.below, false)) return false;
+  if (goal_.clear_of < 0) return true;
+  for (const fem::ContactForce& c : fem::contact_forces(world_, state))
+    if ((c.body == goal_.clear_of && c.other == world_.robot) ||
+        (c.other == goal_.clear_of && c.body == world_.robot))
+      return false;
+  return true;
+}
 Vec3 FemSystem::goal_shift(const State& state) const {
   if (goal_.body < 0) return Vec3::Zero();
   return fem::center_of_mass_m(world_, state, goal_.body) - goal_body_start_m_;
 }
+plan::Measures FemSystem::measures(const State& state) const {
+  return {fem::elastic_energy_j(world_, state), fem::largest_volume_change(world_, state)};
+}
+Vec3 FemSystem::goal_velocity(const State& state) const {
+  return goal_.body < 0 ? Vec3::Zero() : fem::center_velocity_m_s(world_, state, goal_.body);
+}
+plan::Workspace FemSystem::workspace() const { return workspace_of(world_); }
 int FemSystem::lanes() const { return preferred_lanes; }
 std::unique_ptr<plan::Propagator> FemSystem::make_propagator() const {
   return std::make_unique<Propagator>(*this);

@@ -10,25 +10,35 @@
 
 namespace limber::app {
 
-// A goal that a body takes along.
-struct MovingGoal {
-  int body = -1;                       // index; −1: the goal stays where it is
+// What a goal asks for besides the place of the robot's centre of mass. Bodies by index, −1: none.
+struct GoalRules {
+  int body = -1;                       // takes the goal along; −1: the goal stays where it is
   std::optional<double> lost_below_m;  // the goal is lost once that body's lowest node is below this height
+  std::optional<double> turn_tolerance_deg;  // the robot is turned as fem::World::goal_shape_m is
+  std::optional<double> shape_tolerance_m;   // no node is farther from its place in that shape
+  int above = -1, below = -1;                // the whole robot is higher, lower than all of this body
+  int clear_of = -1;                         // no contact with this body pushes the robot
 };
 
 class FemSystem final : public plan::System {
  public:
-  explicit FemSystem(const fem::World& world, const MovingGoal& = {});  // the world must outlive it
+  explicit FemSystem(const fem::World& world, const GoalRules& = {});  // the world must outlive it
 
   State start() const override;
   Vec3 robot_center(const State&) const override;
+  Vec3 robot_velocity(const State&) const override;
+  double robot_mass_kg() const override;
   double mean_speed(const State&) const override;
   int robot_nodes() const override;
   Box sample_bounds() const override;
   double dt_s() const override;
   std::uint64_t hash() const override;
   bool acceptable(const State&) const override;  // no tet is inverted, and the goal is not lost
+  bool goal_holds(const State&) const override;
   Vec3 goal_shift(const State&) const override;
+  plan::Measures measures(const State&) const override;
+  Vec3 goal_velocity(const State&) const override;
+  plan::Workspace workspace() const override;
   int lanes() const override;
   std::unique_ptr<plan::Propagator> make_propagator() const override;
   fem::Cost cost() const;  // of all propagators that have ended
@@ -36,7 +46,7 @@ class FemSystem final : public plan::System {
  private:
   class Propagator;
   const fem::World& world_;
-  MovingGoal goal_;
+  GoalRules goal_;
   Vec3 goal_body_start_m_;
   std::uint64_t hash_;
   mutable std::mutex mutex_;

@@ -28,21 +28,15 @@ std::optional<std::pair<int, int>> pair_of(std::string_view text, char separator
   return std::pair(*a, *b);
 }
 
-}  // namespace
+struct Range {
+  int first, last, step;
+};
 
-std::vector<int> parse_frames(const std::string& text, int count, int* left_out) {
-  std::set<int> frames;
-  int beyond = 0;
-  const auto add_range = [&](int first, int last, int step) {
-    for (std::int64_t f = first; f <= last; f += step) {
-      if (f < count)
-        frames.insert(int(f));
-      else
-        ++beyond;
-    }
-  };
+// "3,5-9:2": what a render farm writes. `what` is the option and `one` the thing that is numbered, for
+// complaints.
+std::vector<Range> ranges_of(const std::string& text, const char* what, const char* one) {
+  std::vector<Range> ranges;
   std::string_view rest = text;
-  if (text.empty()) add_range(0, count - 1, 1);
   while (!rest.empty()) {
     const auto comma = rest.find(',');
     const std::string_view part = rest.substr(0, comma);
@@ -53,16 +47,46 @@ std::vector<int> parse_frames(const std::string& text, int count, int* left_out)
     const auto single = whole_number(range);
     const auto ends = single ? std::optional(std::pair(*single, *single)) : pair_of(range, '-');
     if (!step || *step == 0 || !ends || ends->first > ends->second)
-      throw InputError(fmt::format(
-          "--frames {}: \"{}\" is not a frame, a range like 3-30, or a range with a step like 3-30:2", text,
-          part));
-    add_range(ends->first, ends->second, *step);
+      throw InputError(
+          fmt::format("{} {}: \"{}\" is not {}, a range like 3-30, or a range with a step like 3-30:2", what,
+                      text, part, one));
+    ranges.push_back({ends->first, ends->second, *step});
   }
+  return ranges;
+}
+
+}  // namespace
+
+std::vector<int> parse_frames(const std::string& text, int count, int* left_out) {
+  std::set<int> frames;
+  int beyond = 0;
+  std::vector<Range> ranges = ranges_of(text, "--frames", "a frame");
+  if (text.empty()) ranges.push_back({0, count - 1, 1});
+  for (const Range& range : ranges)
+    for (std::int64_t f = range.first; f <= range.last; f += range.step) {
+      if (f < count)
+        frames.insert(int(f));
+      else
+        ++beyond;
+    }
   if (frames.empty())
     throw InputError(
         fmt::format("--frames {}: names no frame of this motion, which has 0 … {}", text, count - 1));
   if (left_out) *left_out = beyond;
   return {frames.begin(), frames.end()};
+}
+
+std::vector<int> parse_seeds(const std::string& text) {
+  constexpr std::size_t most = 100000;
+  std::set<int> seeds;
+  for (const Range& range : ranges_of(text, "--seeds", "a seed"))
+    for (std::int64_t s = range.first; s <= range.last; s += range.step) {
+      seeds.insert(int(s));
+      if (seeds.size() > most)
+        throw InputError(fmt::format("--seeds {}: names more than {} seeds; ask for fewer", text, most));
+    }
+  if (seeds.empty()) throw InputError("--seeds: names no seed; give some, like 1-30");
+  return {seeds.begin(), seeds.end()};
 }
 
 std::vector<int> chunk_of(const std::vector<int>& frames, const std::string& chunk) {

@@ -1,4 +1,4 @@
-// Which frames to render, as a render farm writes it.
+// Which frames to render, and which seeds to run, as a farm of machines writes it.
 #pragma once
 
 #include <string>
@@ -11,7 +11,10 @@ namespace limber::app {
 // part that is wrong, or when no frame is left.
 std::vector<int> parse_frames(const std::string& text, int count, int* left_out = nullptr);
 
-// The i-th of n parts, "i/n" with 1 ≤ i ≤ n, cut so that the parts differ by at most one frame and together
+// The same form, of the seeds of a benchmark; at most 100,000, none beyond 2³¹ − 1.
+std::vector<int> parse_seeds(const std::string& text);
+
+// The i-th of n parts, "i/n" with 1 ≤ i ≤ n, cut so that the parts differ by at most one element and together
 // are all. May be empty. Throws InputError when the text is not of that form.
 std::vector<int> chunk_of(const std::vector<int>& frames, const std::string& chunk);
 

@@ -1,15 +1,18 @@
 #include "app/analysis.h"
 #include "app/commands.h"
+#include "app/diagnosis.h"
 #include "app/fem_system.h"
 #include "app/manifest.h"
 #include "app/plan_folder.h"
 #include "app/scene_world.h"
+#include "app/search_log.h"
+#include "app/tree_plot.h"
 #include "core/error.h"
 #include "core/hash.h"
 #include "core/log.h"
 #include "core/progress.h"
 #include "core/threads.h"
-#include "plan/search.h"
+#include "plan/anytime.h"
 #include "scenes/library.h"
 
 namespace limber::app {
@@ -54,7 +57,34 @@ Json summary_of(const plan::Plan& plan, const fem::World& world, const fem::Cost
   return json;
 }
 
-std::string text_of(const Json& s, const fs::path& file) {
+std::string text_of_shortcut(const Json& report) {
+  const Json &before = report.at("before"), &after = report.at("after");
+  const auto change = [&](const char* key, double unit) {
+    return fmt::format("{:.3g} → {:.3g}", unit * before.at(key).get<double>(),
+                       unit * after.at(key).get<double>());
+  };
+  return fmt::format(
+      "  shortcut     {} changes accepted in {} rounds, {:.2f} CPU s: {} s, effort {} N s, elastic energy {} "
+      "J, "
+      "volume change {} %\n",
+      report.at("accepted").get<int>(), report.at("rounds").get<int>(), report.at("cpu_s").get<double>(),
+      change("duration_s", 1), change("effort_n_s", 1), change("strain_energy_j", 1),
+      change("volume_change", 100));
+}
+
+std::string text_of_improvements(const plan::AnytimeReport& report) {
+  std::string text = fmt::format(
+      "  improve      {} searches, {} of them reached the goal, {} iterations in all; {:.2f} CPU s, {:.2f} "
+      "s\n",
+      report.searches, report.solved, report.iterations, report.cpu_s, report.wall_s);
+  for (const plan::Improvement& i : report.improvements)
+    text += fmt::format("               {} {:.4g} after {:.2f} s and {} iterations\n",
+                        plan::name_of(report.settings.cost), plan::cost_in(i.costs, report.settings.cost),
+                        i.wall_s, i.iterations);
+  return text;
+}
+
+std::string text_of(const Json& s, const std::string& extra, const fs::path& file) {
   std::string volumes;
   for (const auto& [name, percent] : s.at("largest_volume_change_percent").items())
     volumes += fmt::format("{}{} {:.2f} %", volumes.empty() ? "" : ", ", name, percent.get<double>());
@@ -69,6 +99,7 @@ std::string text_of(const Json& s, const fs::path& file) {
       "  penetration  at most {:.4f} m, {:.2f} % of the robot's size ({})\n"
       "  strain       at most {:.3f} ({})\n"
       "  contact      at most {:.1f} N ({})\n"
+      "{}"
       "  hashes       tree {}, trajectory {}\n"
       "  file         {}\n",
       s.at("explanation").get<std::string>(), t.at("iterations").get<std::int64_t>(),
@@ -81,16 +112,39 @@ std::string text_of(const Json& s, const fs::path& file) {
       100 * s.at("deepest_penetration_of_robot_size").get<double>(),
       s.at("penetration_between").get<std::string>(), s.at("largest_strain").get<double>(),
       s.at("largest_strain_of").get<std::string>(), s.at("largest_contact_force_n").get<double>(),
-      s.at("contact_between").get<std::string>(), s.at("tree_hash").get<std::string>(),
+      s.at("contact_between").get<std::string>(), extra, s.at("tree_hash").get<std::string>(),
       s.at("trajectory_hash").get<std::string>(), file.string());
 }
+
+// `earlier` is the summary of the plan that this one goes on from, null for none: a solved one has its rounds
+// behind it.
+plan::ShortcutSettings shortcuts_of(const scenes::Scene& scene, const PlanOptions& options,
+                                    const Json& earlier) {
+  plan::ShortcutSettings s;
+  s.rounds = options.shortcut_rounds.value_or(scene.planner.shortcut_rounds);
+  s.cost = plan::cost_kind_from(options.cost);
+  if (earlier.contains("shortcut") && earlier.at("shortcut").at("cost") == options.cost)
+    s.rounds_done = earlier.at("shortcut").at("rounds").get<int>();
+  return s;
+}
+
+// Whether nothing is left to do for a plan with that summary.
+bool shortened(const Json& summary, const plan::ShortcutSettings& wanted) {
+  return summary.contains("shortcut") ? summary.at("shortcut").at("cost") == plan::name_of(wanted.cost) &&
+                                            summary.at("shortcut").at("rounds") == wanted.rounds
+                                      : wanted.rounds == 0;
+}
+
+bool finished(const plan::Plan& plan) { return plan.solved() || plan.ending == plan::Ending::iterations; }
+
+}  // namespace
 
 plan::Settings settings_of(const scenes::Scene& scene, const PlanOptions& options) {
   const scenes::PlannerSpec& p = scene.planner;
   plan::Settings s;
   s.seed = std::uint64_t(options.seed.value_or(p.seed));
   s.max_iterations = options.iterations.value_or(p.iterations);
-  s.goal = {scene.goal.center_of_mass_m, scene.goal.radius_m};
+  s.goal = {scene.goal.center_of_mass_m, scene.goal.radius_m, scene.goal.box_m};
   s.goal_bias = p.goal_bias;
   s.weights = {p.weight_body, p.weight_control_point, p.weight_interpolation};
   s.max_force_n = p.max_force_n;
@@ -100,15 +154,22 @@ plan::Settings settings_of(const scenes::Scene& scene, const PlanOptions& option
   s.settle = {.max_duration_s = p.settle_time_s,
               .mean_speed_m_s = p.settle_speed_m_s,
               .max_force_share = p.settle_force_share};
+  s.laws = {.lag = p.lag,
+            .metric = p.metric == "distance" ? plan::Metric::distance : plan::Metric::time_to_go,
+            .time_weight = p.time_weight,
+            .guidance = p.guidance,
+            .soft_price = p.soft_price,
+            .learn_prices = p.learn_prices,
+            .steer = p.steer,
+            .look_s = p.look_s,
+            .stop_in_goal = p.stop_in_goal,
+            .hold = p.hold && !scene.goal.shape,  // which would leave the shape alone
+            .end_hopeless = p.end_hopeless};
   s.frames_per_second = scene.film.frames_per_second;
   s.in_flight = options.in_flight;
   s.time_limit_s = options.time_limit_s;
   return s;
 }
-
-bool finished(const plan::Plan& plan) { return plan.solved() || plan.ending == plan::Ending::iterations; }
-
-}  // namespace
 
 scenes::Scene read_scene(const PlanOptions& options) {
   std::vector<std::string> sets = options.scene.sets;
@@ -122,30 +183,67 @@ Outcome plan(const PlanOptions& options, const scenes::Scene& scene) {
   make_folder(options.out);
   const std::vector<PreparedBody> bodies = prepare_bodies(scene, options.scene.data, options.out);
   const fem::World world = build_world(scene, bodies);
-  const FemSystem system(world, moving_goal_of(scene));
+  const FemSystem system(world, goal_rules_of(scene));
   const plan::Settings settings = settings_of(scene, options);
   const fs::path file = options.out / "plan.npz";
 
   std::optional<plan::Plan> earlier;
+  Json earlier_summary;
   if (options.resume) {
-    earlier = read_plan_folder(options.out).plan;
+    PlanFolder folder = read_plan_folder(options.out);
+    earlier = std::move(folder.plan);
+    earlier_summary = std::move(folder.summary);
     if (earlier->system_hash != system.hash())
       throw InputError(fmt::format(
           "{}: was made for another world than this scene's; plan anew without --resume", file.string()));
     log::info("{}: going on after {} iterations", file.string(), earlier->statistics.iterations);
   }
-  plan::Plan plan = plan::plan(system, settings, std::move(earlier));
+  std::optional<SearchLog> search_log;
+  if (options.stats) search_log.emplace(*options.stats, earlier ? earlier->statistics.iterations : 0);
+  plan::Plan plan = plan::plan(system, settings, std::move(earlier), [&](const plan::Moment& moment) {
+    if (search_log) search_log->add(moment);
+  });
+  if (search_log) search_log->finish();
 
-  const MotionFigures figures = measure_motion(world, plan.trajectory);
-  const Json summary = summary_of(plan, world, system.cost(), figures);
-  write_plan_folder(options.out, plan, scene, bodies, summary);
-  write_volume_plot(options.out / "volume.svg", scene, world, figures, settings.frames_per_second);
-  update_manifest(options.out, "plan", summary);
-  if (plan.ending == plan::Ending::stopped) {
+  const plan::ShortcutSettings shortcuts = shortcuts_of(scene, options, earlier_summary);
+  Json extra;
+  std::string extra_text;
+  if (earlier_summary.contains("shortcut")) extra["shortcut"] = earlier_summary.at("shortcut");
+  if (plan.solved() && shortcuts.rounds > shortcuts.rounds_done) {
+    extra["shortcut"] = plan::json_of(plan::shorten(system, plan, shortcuts));
+    extra_text += text_of_shortcut(extra.at("shortcut"));
+  }
+  if (plan.solved() && options.improve) {
+    const plan::AnytimeReport report =
+        plan::improve(system, plan, {.cost = shortcuts.cost, .shortcut_rounds = shortcuts.rounds});
+    extra["improve"] = plan::json_of(report);
+    extra_text += text_of_improvements(report);
+  }
+  const Outcome outcome = keep_plan(options.out, scene, bodies, world, system, plan, extra, extra_text);
+  if (stop_signal() != 0) {
     log::info("{}: the plan so far is kept; go on with --resume", file.string());
     throw_if_stopped();
   }
-  return {plan.solved() ? exit_done : exit_no_plan, summary, text_of(summary, file)};
+  return outcome;
+}
+
+Outcome keep_plan(const fs::path& folder, const scenes::Scene& scene, const std::vector<PreparedBody>& bodies,
+                  const fem::World& world, const FemSystem& system, const plan::Plan& plan, const Json& extra,
+                  const std::string& extra_text) {
+  const MotionFigures figures = measure_motion(world, plan.trajectory);
+  Json summary = summary_of(plan, world, system.cost(), figures);
+  if (!plan.solved()) {
+    const Diagnosis diagnosis = diagnose(world, system, plan);
+    summary["explanation"] = summary["explanation"].get<std::string>() + " " + diagnosis.text;
+    summary["diagnosis"] = diagnosis.json;
+  }
+  if (!extra.is_null()) summary.update(extra);
+  write_plan_folder(folder, plan, scene, bodies, summary);
+  write_volume_plot(folder, scene, world, figures, plan.settings.frames_per_second);
+  write_file(folder / "tree.svg", tree_svg(scene, world, plan));
+  update_manifest(folder, "plan", summary);
+  return {plan.solved() ? exit_done : exit_no_plan, summary,
+          text_of(summary, extra_text, folder / "plan.npz")};
 }
 
 bool plan_is_up_to_date(const PlanOptions& options, const scenes::Scene& scene) {
@@ -155,10 +253,12 @@ bool plan_is_up_to_date(const PlanOptions& options, const scenes::Scene& scene) 
     const fem::World world = build_world(scene, bodies);
     const PlanFolder folder = read_plan_folder(options.out);
     const plan::Settings settings = settings_of(scene, options);
-    return folder.plan.system_hash == FemSystem(world, moving_goal_of(scene)).hash() &&
+    return folder.plan.system_hash == FemSystem(world, goal_rules_of(scene)).hash() &&
            plan::first_difference(folder.plan.settings, settings).empty() && finished(folder.plan) &&
            (folder.plan.solved() || folder.plan.settings.max_iterations >= settings.max_iterations) &&
-           folder.plan.settings.frames_per_second == settings.frames_per_second;
+           folder.plan.settings.frames_per_second == settings.frames_per_second &&
+           (!options.improve || folder.summary.contains("improve")) &&
+           (!folder.plan.solved() || shortened(folder.summary, shortcuts_of(scene, options, {})));
   } catch (const InputError& error) {
     log::info("planning anew: {}", error.what());
     return false;

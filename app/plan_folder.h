@@ -6,6 +6,7 @@
 
 #include "app/body.h"
 #include "app/commands.h"
+#include "app/fem_system.h"
 #include "plan/search.h"
 #include "scenes/scene.h"
 
@@ -22,6 +23,12 @@ struct PlanFolder {
 void write_plan_folder(const fs::path& folder, const plan::Plan&, const scenes::Scene&,
                        const std::vector<PreparedBody>&, const Json& summary);
 
+// Measures the plan's motion, writes plan.npz, volume.svg and the manifest, and says all that there is to
+// say. `extra` goes into the summary, `extra_text` among its lines.
+Outcome keep_plan(const fs::path& folder, const scenes::Scene&, const std::vector<PreparedBody>&,
+                  const fem::World&, const FemSystem&, const plan::Plan&, const Json& extra,
+                  const std::string& extra_text);
+
 // Throws InputError when plan.npz is missing, damaged, or not limber's.
 PlanFolder read_plan_folder(const fs::path& folder);
 
@@ -29,6 +36,7 @@ PlanFolder read_plan_folder(const fs::path& folder);
 std::vector<PreparedBody> read_bodies_of(const PlanFolder&, const fs::path& folder);
 
 scenes::Scene read_scene(const PlanOptions&);
+plan::Settings settings_of(const scenes::Scene&, const PlanOptions&);
 Outcome plan(const PlanOptions&, const scenes::Scene&);
 bool plan_is_up_to_date(const PlanOptions&, const scenes::Scene&);
 

@@ -1,8 +1,11 @@
 #include "app/scene_world.h"
 
+#include <numbers>
+
 #include "core/error.h"
 #include "core/hash.h"
 #include "core/log.h"
+#include "core/mesh_files.h"
 #include "core/progress.h"
 #include "scenes/library.h"
 #include "scenes/models.h"
@@ -138,9 +141,37 @@ void set_parts(const scenes::BodySpec& body, const PreparedBody& prepared, fem::
 
 }  // namespace
 
-MovingGoal moving_goal_of(const scenes::Scene& scene) {
-  return {scene.goal.moves_with, scene.goal.lost_below_m};
+GoalRules goal_rules_of(const scenes::Scene& scene) {
+  const scenes::Goal& goal = scene.goal;
+  GoalRules rules;
+  rules.body = goal.moves_with, rules.lost_below_m = goal.lost_below_m;
+  if (goal.shape)
+    rules.turn_tolerance_deg = goal.shape->turn_tolerance_deg,
+    rules.shape_tolerance_m = goal.shape->tolerance_m;
+  rules.above = goal.above, rules.below = goal.below, rules.clear_of = goal.clear_of;
+  return rules;
 }
+
+namespace {
+
+Points goal_shape(const scenes::Scene& scene, const Points& rest) {
+  const scenes::Goal::Shape& shape = *scene.goal.shape;
+  if (!shape.cage.empty()) {
+    const fs::path file = scene.folder / shape.cage;
+    const TetMesh cage = read_msh(file);
+    if (cage.positions.rows() != rest.rows())
+      throw InputError(
+          fmt::format("{}: goal.shape.cage has {} nodes, the robot's cage {}; deform the cage.msh of its "
+                      "folder in bodies/",
+                      file.string(), cage.positions.rows(), rest.rows()));
+    return cage.positions;
+  }
+  const Eigen::Matrix3d turn =
+      Eigen::AngleAxisd(shape.angle_deg * std::numbers::pi / 180, shape.axis).toRotationMatrix();
+  return rest * (turn * shape.stretch.asDiagonal()).transpose();
+}
+
+}  // namespace
 
 fem::World build_world(const scenes::Scene& scene, const std::vector<PreparedBody>& prepared) {
   fem::WorldSpec spec;
@@ -168,6 +199,8 @@ fem::World build_world(const scenes::Scene& scene, const std::vector<PreparedBod
   spec.walls = scene.walls;
   spec.gravity_m_s2 = scene.gravity_m_s2;
   spec.rest_speed_m_s = scene.rest_speed_m_s;
+  if (scene.goal.shape)
+    spec.goal_shape_m = goal_shape(scene, prepared[std::size_t(scene.robot)].cage.positions);
   spec.max_dt_s = scene.max_dt_s.value_or(0);
   try {
     return fem::build_world(spec);

@@ -20,7 +20,7 @@ std::vector<PreparedBody> prepare_bodies(const scenes::Scene&, const std::vector
 // Throws InputError when a body is missing or damaged.
 std::vector<PreparedBody> read_bodies(const scenes::Scene&, const fs::path& work_folder);
 
-MovingGoal moving_goal_of(const scenes::Scene&);
+GoalRules goal_rules_of(const scenes::Scene&);
 
 fem::World build_world(const scenes::Scene&, const std::vector<PreparedBody>&);
 

@@ -66,7 +66,7 @@ void check_body(const std::string& name, const PreparedBody& body, Table& table)
 MotionFigures check_plan(const PlanFolder& planned, const fem::World& world, Table& table) {
   const plan::Plan& plan = planned.plan;
   const plan::Trajectory& path = plan.trajectory;
-  const FemSystem system(world, moving_goal_of(planned.scene));
+  const FemSystem system(world, goal_rules_of(planned.scene));
   table.row("the plan is of this world", plan.system_hash == system.hash(), hex(system.hash()));
 
   const plan::Trajectory replay = plan::simulate(system, path.controls, path.frames_per_second);

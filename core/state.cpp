@@ -20,6 +20,7 @@ float largest_force(const Control& control) {
     case Manipulation::control_point:
       return control.force_n.norm();
     case Manipulation::interpolation:
+    case Manipulation::hold:
       return control.max_force_n;
   }
   return 0;

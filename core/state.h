@@ -25,6 +25,7 @@ enum class Manipulation : std::int32_t {
   control_point = 2,  // the same force density, only on the nodes within radius_m of `node`
   interpolation = 3,  // every node towards its place in the goal shape: the rest shape with its centre of
                       // mass at target_m
+  hold = 4            // ours: the centre of mass to target_m, every node slowed; any turn and shape will do
 };
 
 // One manipulation held for `steps` time steps. A force F in newtons is a force on the whole robot: node i
@@ -35,8 +36,8 @@ struct Control {
   Vec3f force_n = Vec3f::Zero();   // body, control_point
   std::int32_t node = -1;          // control_point: a node of the robot, counted from the robot's first
   float radius_m = 0;              // control_point: distance from that node's place in the rest shape
-  Vec3f target_m = Vec3f::Zero();  // interpolation: centre of mass of the goal shape
-  float max_force_n = 0;           // interpolation: no node gets more than its mass share of this
+  Vec3f target_m = Vec3f::Zero();  // interpolation, hold: centre of mass of the goal shape
+  float max_force_n = 0;           // interpolation, hold: no node gets more than its mass share of this
   std::int32_t steps = 0;
 
   bool operator==(const Control&) const = default;

@@ -118,6 +118,24 @@ int Batch::advance(int most_steps) {
 
 int Batch::steps_left(int lane) const { return impl_->lanes.at(std::size_t(lane)).steps_left; }
 
+Batch::Motion Batch::motion(int lane, int index) const {
+  const Body& body = impl_->world.bodies.at(std::size_t(index));
+  Motion sum{Vec3::Zero(), Vec3::Zero()};
+  for (int n = 0; n < body.node_count(); ++n) {
+    const auto [place, velocity] = impl_->stepper.node(lane, body.first_node + n);
+    sum.center_m += body.node_mass_kg[std::size_t(n)] * place;
+    sum.velocity_m_s += body.node_mass_kg[std::size_t(n)] * velocity;
+  }
+  return {sum.center_m / body.mass_kg, sum.velocity_m_s / body.mass_kg};
+}
+
+void Batch::stop(int lane) {
+  auto& mine = impl_->lanes.at(std::size_t(lane));
+  if (mine.steps_left == 0) return;
+  mine.control.steps -= std::exchange(mine.steps_left, 0);
+  impl_->finish(lane);
+}
+
 const Outcome& Batch::outcome(int lane) const {
   LIMBER_CHECK(steps_left(lane) == 0, lane, steps_left(lane));
   return impl_->lanes[lane].outcome;

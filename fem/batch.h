@@ -38,6 +38,13 @@ class Batch {
   // taken, 0 when no lane has any left.
   int advance(int most_steps = 1 << 30);
   int steps_left(int lane) const;
+  // Of one body as it is now, in a lane that was loaded: centre of mass and its velocity.
+  struct Motion {
+    Vec3 center_m, velocity_m_s;
+  };
+  Motion motion(int lane, int body) const;
+  // The lane takes no further steps: as if its control had had only those that it took.
+  void stop(int lane);
   // Once steps_left is 0. A diverged lane holds no state to go on from: store() gives the one it was loaded
   // with.
   const Outcome& outcome(int lane) const;

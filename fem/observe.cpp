@@ -1,5 +1,7 @@
 #include "fem/observe.h"
 
+#include <Eigen/SVD>
+
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <map>
@@ -44,6 +46,25 @@ Vec3 center_of_mass_m(const World& world, const State& state, int index) {
   const Points positions = body_positions(world, state, index);
   Vec3 sum = Vec3::Zero();
   for (int n = 0; n < body.node_count(); ++n) sum += body.node_mass_kg[n] * positions.row(n).transpose();
+  return sum / body.mass_kg;
+}
+
+double inner_radius_m(const World& world, int index) {
+  const Body& body = world.bodies.at(std::size_t(index));
+  const auto corner = [&](int node) -> Vec3 { return body.cage.positions.row(node); };
+  Vec3 center = Vec3::Zero();
+  for (int n = 0; n < body.node_count(); ++n) center += body.node_mass_kg[n] * corner(n) / body.mass_kg;
+  double radius = std::numeric_limits<double>::infinity();
+  for (const auto& t : body.surface.rowwise())
+    radius = std::min(radius, detail::distance_to_triangle(center, corner(t[0]), corner(t[1]), corner(t[2])));
+  return radius;
+}
+
+Vec3 center_velocity_m_s(const World& world, const State& state, int index) {
+  const Body& body = world.bodies.at(std::size_t(index));
+  Vec3 sum = Vec3::Zero();
+  for (int n = 0; n < body.node_count() && body.moving; ++n)
+    sum += body.node_mass_kg[n] * velocity(state, body.first_node + n);
   return sum / body.mass_kg;
 }
 
@@ -109,6 +130,34 @@ std::vector<double> volume_changes(const World& world, const State& state, int i
   for (int t = 0; t < rest.tets.rows(); ++t)
     changes.push_back(volume_of(now, t) / volume_of(rest.positions, t) - 1);
   return changes;
+}
+
+namespace {
+
+// The robot's nodes as seen from its centre of mass, (N × 3).
+Points robot_from_center(const World& world, const State& state) {
+  Points places = body_positions(world, state, world.robot);
+  places.rowwise() -= center_of_mass_m(world, state, world.robot).transpose();
+  return places;
+}
+
+}  // namespace
+
+double turn_from_goal_shape_deg(const World& world, const State& state) {
+  const Points now = robot_from_center(world, state);
+  const Body& robot = world.bodies[std::size_t(world.robot)];
+  Eigen::Matrix3d sum = Eigen::Matrix3d::Zero();
+  for (int n = 0; n < robot.node_count(); ++n)
+    sum += robot.node_mass_kg[std::size_t(n)] * now.row(n).transpose() * world.goal_shape_m.row(n);
+  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(sum, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  Eigen::Matrix3d u = svd.matrixU();
+  if ((u * svd.matrixV().transpose()).determinant() < 0) u.col(2) *= -1;  // a rotation, not a mirror
+  const Eigen::AngleAxisd turn(Eigen::Matrix3d(u * svd.matrixV().transpose()));
+  return std::abs(turn.angle()) * 180 / std::numbers::pi;
+}
+
+double distance_from_goal_shape_m(const World& world, const State& state) {
+  return (robot_from_center(world, state) - world.goal_shape_m).rowwise().norm().maxCoeff();
 }
 
 int inverted_tets(const World& world, const State& state) {

@@ -12,7 +12,10 @@ double time_s(const World&, const State&);
 double volume_m3(const World&, const State&, int body);  // sum of signed tet volumes
 // Largest |V − V0|/V0 of all moving bodies.
 double largest_volume_change(const World&, const State&);
+// Radius of the largest ball round the centre of mass that the rest shape holds.
+double inner_radius_m(const World&, int body);
 Vec3 center_of_mass_m(const World&, const State&, int body);
+Vec3 center_velocity_m_s(const World&, const State&, int body);  // of the centre of mass
 double mean_speed_m_s(const World&, const State&,
                       int body);  // mass-weighted mean of |v|; 0 for a static body
 
@@ -30,6 +33,11 @@ struct Strains {
 };
 Strains strains(const World&, const State&, int body);
 std::vector<double> volume_changes(const World&, const State&, int body);  // (T) V/V0 − 1 of each tet
+
+// Of the robot against World::goal_shape_m, their centres of mass laid on one another: the angle of the
+// rotation that fits best (Kabsch 1976, weighed by mass), and the largest distance of a node from its place.
+double turn_from_goal_shape_deg(const World&, const State&);
+double distance_from_goal_shape_m(const World&, const State&);
 
 int inverted_tets(const World&, const State&);  // of all moving bodies: volume ≤ 0
 

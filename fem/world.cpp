@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <numbers>
 #include <set>
 
 #include "core/error.h"
@@ -282,15 +283,14 @@ void append_nodes(const Body& body, detail::Tables<double>& tables) {
   }
 }
 
-Vec3 rest_center(const Body& body) {
+Vec3 center_of(const Body& body, const Points& positions) {
   Vec3 sum = Vec3::Zero();
-  for (int n = 0; n < body.node_count(); ++n)
-    sum += body.node_mass_kg[n] * body.cage.positions.row(n).transpose();
+  for (int n = 0; n < body.node_count(); ++n) sum += body.node_mass_kg[n] * positions.row(n).transpose();
   return sum / body.mass_kg;
 }
 
 detail::RigidTable make_rigid(const Body& body) {
-  const Vec3 center = rest_center(body);
+  const Vec3 center = center_of(body, body.cage.positions);
   detail::RigidTable table{body.node_mass_kg, {}, {}};
   Eigen::Matrix3d spread = Eigen::Matrix3d::Zero();
   for (int n = 0; n < body.node_count(); ++n) {
@@ -358,7 +358,7 @@ detail::Tables<float> single_precision(const detail::Tables<double>& t) {
       t.elements, out.elements);
   const auto copy = [](const std::vector<double>& v) { return std::vector<float>(v.begin(), v.end()); };
   out.node_mass = copy(t.node_mass), out.inverse_mass = copy(t.inverse_mass);
-  out.rest_positions = copy(t.rest_positions), out.rest_from_center = copy(t.rest_from_center);
+  out.rest_positions = copy(t.rest_positions), out.goal_from_center = copy(t.goal_from_center);
   out.pair_friction = copy(t.pair_friction), out.skin = copy(t.skin);
   return out;
 }
@@ -397,8 +397,29 @@ void append_tets(const Body& body, Topology& topology) {
   }
 }
 
-// The body's contact points: surface vertices, then middles of surface edges, each ascending.
-void append_points(const Body& body, Topology& topology) {
+// Surface edges that stick out, by at least 3° at rest: of what is flat or hollow no edge is met first.
+std::set<std::pair<int, int>> ridges_of(const Body& body) {
+  const double least_cosine = std::cos(3 * std::numbers::pi / 180);
+  std::map<std::pair<int, int>, std::vector<int>> faces;
+  for (int f = 0; f < body.surface.rows(); ++f)
+    for (int i = 0; i < 3; ++i)
+      faces[std::minmax(body.surface(f, i), body.surface(f, (i + 1) % 3))].push_back(f);
+  const auto corner = [&](int f, int i) -> Vec3 { return body.cage.positions.row(body.surface(f, i)); };
+  const auto normal = [&](int f) {
+    return Vec3((corner(f, 1) - corner(f, 0)).cross(corner(f, 2) - corner(f, 0)).normalized());
+  };
+  const auto center = [&](int f) { return Vec3((corner(f, 0) + corner(f, 1) + corner(f, 2)) / 3); };
+  std::set<std::pair<int, int>> ridges;
+  for (const auto& [edge, beside] : faces)
+    if (beside.size() != 2 || (normal(beside[0]).dot(normal(beside[1])) <= least_cosine &&
+                               normal(beside[0]).dot(center(beside[1]) - corner(beside[0], 0)) < 0))
+      ridges.insert(edge);
+  return ridges;
+}
+
+// The body's contact points: surface vertices, then middles of surface edges, flat ones and then ridges, each
+// ascending. Returns the first ridge.
+int append_points(const Body& body, Topology& topology) {
   std::map<std::pair<int, int>, std::set<int>> around;  // body's own numbers; a vertex is the pair of itself
   for (int v : body.surface_nodes) around[{v, v}];
   std::map<std::pair<int, int>, std::set<int>> edges;
@@ -413,18 +434,25 @@ void append_points(const Body& body, Topology& topology) {
           found->second.insert(q.begin(), q.end());
       }
   }
-  for (const auto* list : {&around, &edges})
-    for (const auto& [pair, nodes] : *list) {
-      const auto [a, b] = pair;
-      const int begin = int(topology.neighbors.size());
-      for (int n : nodes)
-        if (a != b || n != a) topology.neighbors.push_back(body.first_node + n);
-      const float share = a == b ? 1.f : 0.5f;
-      topology.points.push_back({{body.first_node + a, body.first_node + b},
-                                 {share, 1 - share},
-                                 begin,
-                                 int(topology.neighbors.size())});
-    }
+  const auto append = [&](const std::pair<int, int>& pair, const std::set<int>& nodes) {
+    const auto [a, b] = pair;
+    const int begin = int(topology.neighbors.size());
+    for (int n : nodes)
+      if (a != b || n != a) topology.neighbors.push_back(body.first_node + n);
+    const float share = a == b ? 1.f : 0.5f;
+    topology.points.push_back({{body.first_node + a, body.first_node + b},
+                               {share, 1 - share},
+                               begin,
+                               int(topology.neighbors.size())});
+  };
+  const auto ridges = ridges_of(body);
+  for (const auto& [vertex, nodes] : around) append(vertex, nodes);
+  for (const auto& [edge, nodes] : edges)
+    if (!ridges.contains(edge)) append(edge, nodes);
+  const int first_ridge = int(topology.points.size());
+  for (const auto& [edge, nodes] : edges)
+    if (ridges.contains(edge)) append(edge, nodes);
+  return first_ridge;
 }
 
 void append_topology(const Body& body, int index, Topology& topology) {
@@ -435,7 +463,7 @@ void append_topology(const Body& body, int index, Topology& topology) {
   for (int n : body.surface_nodes) range.surface_nodes.push_back(body.first_node + n);
   append_tets(body, topology);
   range.first_point = int(topology.points.size());
-  append_points(body, topology);
+  range.first_ridge = append_points(body, topology);
   range.last_point = int(topology.points.size());
   if (body.self_contact) range.self = detail::self_contact(topology, index);
 }
@@ -482,6 +510,19 @@ void check(const WorldSpec& spec) {
   if (!(spec.max_dt_s >= 0 && std::isfinite(spec.max_dt_s)))
     throw InputError(
         fmt::format("max_dt_s is {}; it must be 0 (automatic) or a positive time", spec.max_dt_s));
+}
+
+// As seen from its centre of mass.
+Points goal_shape(const Body& robot, const Points& given) {
+  if (given.rows() != 0 && given.rows() != robot.node_count())
+    throw InputError(
+        fmt::format("body {}: the goal shape has {} nodes, the robot {}; give the same cage, deformed",
+                    robot.name, given.rows(), robot.node_count()));
+  if (!given.allFinite())
+    throw InputError(fmt::format("body {}: the goal shape has a node that is not finite", robot.name));
+  Points shape = given.rows() ? given : robot.cage.positions;
+  shape.rowwise() -= center_of(robot, shape).transpose();
+  return shape;
 }
 
 void choose_step(double max_dt_s, World& world) {
@@ -540,9 +581,9 @@ World build_world(const WorldSpec& spec) {
     if (moving) world.moving_nodes = world.nodes;
   }
   const Body& robot = world.bodies[world.robot];
-  const Vec3 center = rest_center(robot);
+  world.goal_shape_m = goal_shape(robot, spec.goal_shape_m);
   for (int n = 0; n < robot.node_count(); ++n)
-    for (int c = 0; c < 3; ++c) tables.rest_from_center.push_back(robot.cage.positions(n, c) - center[c]);
+    for (int c = 0; c < 3; ++c) tables.goal_from_center.push_back(world.goal_shape_m(n, c));
   for (const Body& a : world.bodies) {
     for (const Body& b : world.bodies)
       tables.pair_friction.push_back(std::sqrt(a.material.friction * b.material.friction));

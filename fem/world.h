@@ -52,6 +52,7 @@ struct WorldSpec {
   bool walls = true;                 // the bounds are rigid walls
   Vec3 gravity_m_s2 = Vec3::Zero();  // on every node that is not fixed
   double max_dt_s = 0;               // 0: automatic; a scene may only lower the step
+  Points goal_shape_m;  // (N × 3) to which interpolation draws the robot, wherever; empty: its rest shape
   // A soft body all of whose nodes are slower, and would gain less than this in a second, comes to a stand;
   // one that stands goes on standing until a node would gain as much in a tenth of a second. 0: only where
   // nothing would move.
@@ -92,8 +93,9 @@ struct World {
   double dt_s;  // time step, exactly a float32
   double
       contact_dt_s;  // step from which contact stiffness follows: the automatic one, also when dt_s is lower
-  int moving_nodes;  // nodes of State
-  int nodes;         // with those of static bodies
+  Points goal_shape_m;              // (N × 3) from its centre of mass: to what interpolation draws the robot
+  int moving_nodes;                 // nodes of State
+  int nodes;                        // with those of static bodies
   detail::Tables<float> tables;     // what the float32 steppers read
   detail::Tables<double> tables64;  // the same for the double reference
   detail::Topology topology;

@@ -4,13 +4,14 @@
 #include <cmath>
 
 #include "core/random.h"
+#include "plan/steering.h"
 
 namespace limber::plan {
 
 namespace {
 
-// Float rounding of a vector of exactly the largest force could exceed it.
-constexpr double just_below_one = 1 - 1e-6;
+// What stands in the way makes it take longer than in the open.
+constexpr double shortest_stretch = 0.7, stretches = 1.0;
 
 Manipulation choose(const ManipulationWeights& w, bool towards_goal, double u) {
   const double pick = u * (w.body + w.control_point + (towards_goal ? w.interpolation : 0));
@@ -35,7 +36,28 @@ Draw draw(const Settings& s, const System& system, std::int64_t iteration) {
   d.force_n = s.max_force_n * rng.uniform(s.min_force_share, s.max_force_share);
   d.robot_node = rng.below(system.robot_nodes());
   d.steps = steps_of(rng.uniform(s.min_duration_s, s.max_duration_s), system.dt_s());
+  d.guided = rng.uniform() < s.laws.guidance && !d.towards_goal;
+  d.rank = rng.uniform(), d.ahead = rng.uniform(), d.stretch = rng.uniform();
+  d.aside = rng.direction();
   return d;
+}
+
+Control steered_control(const Draw& d, const Settings& s, const System& system, const Departure& from,
+                        const Vec3& target, const Vec3& target_velocity) {
+  const double force = d.force_n * just_below_one, acceleration = force / system.robot_mass_kg();
+  Control control;
+  control.manipulation = d.manipulation == Manipulation::interpolation ? Manipulation::body : d.manipulation;
+  if (control.manipulation == Manipulation::control_point) {
+    control.node = d.robot_node;
+    control.radius_m = float(s.control_point_radius_m);
+  }
+  control.steps = d.steps;
+  const Vec3 way = target - from.center, velocity = from.velocity - target_velocity;
+  if (acceleration <= 0 || way.squaredNorm() == 0) return control;
+  control.force_n = (force * best_direction(way, velocity, acceleration)).cast<float>();
+  const double lasts = time_to_go(way, velocity, acceleration) * (shortest_stretch + stretches * d.stretch);
+  control.steps = steps_of(std::clamp(lasts, s.min_duration_s, s.max_duration_s), system.dt_s());
+  return control;
 }
 
 Control control_of(const Draw& d, const Settings& s, const Vec3& center, const Vec3& goal_shift) {
@@ -43,6 +65,7 @@ Control control_of(const Draw& d, const Settings& s, const Vec3& center, const V
   control.manipulation = d.manipulation;
   control.steps = d.steps;
   if (d.manipulation == Manipulation::interpolation) {
+    if (s.laws.hold) control.manipulation = Manipulation::hold;
     control.target_m = (s.goal.center_of_mass_m + goal_shift).cast<float>();
     control.max_force_n = float(d.force_n * just_below_one);
     return control;
@@ -60,7 +83,7 @@ Control control_of(const Draw& d, const Settings& s, const Vec3& center, const V
 
 Control settle_control(const Settings& s, int steps) {
   Control control;
-  control.manipulation = Manipulation::interpolation;
+  control.manipulation = s.laws.hold ? Manipulation::hold : Manipulation::interpolation;
   control.target_m = s.goal.center_of_mass_m.cast<float>();
   control.max_force_n = float(s.max_force_n * s.settle.max_force_share * just_below_one);
   control.steps = steps;

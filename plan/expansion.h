@@ -5,6 +5,9 @@
 
 namespace limber::plan {
 
+// Float rounding of a vector of exactly the largest force could exceed it; of this share of it, not.
+constexpr double just_below_one = 1 - 1e-6;
+
 // A pure function of (seed, iteration): whoever draws expansion 17, and when, draws the same.
 struct Draw {
   Vec3 point = Vec3::Zero();  // x of Algorithm 1, metres: random, or the goal
@@ -13,8 +16,25 @@ struct Draw {
   double force_n = 0;  // magnitude on the whole robot
   int robot_node = 0;  // of a control point
   int steps = 1;
+  // For the laws of the preset `fast`, each in [0, 1).
+  bool guided = false;
+  double rank = 0;            // of the node among the most promising
+  double ahead = 0;           // how far ahead it aims
+  double stretch = 0;         // how much longer than it should take it pushes
+  Vec3 aside = Vec3::Zero();  // unit; where it aims besides
 };
 Draw draw(const Settings&, const System&, std::int64_t iteration);
+
+// Where an expansion begins: a node's robot, and the goal as it is there.
+struct Departure {
+  Vec3 center = Vec3::Zero(), velocity = Vec3::Zero();
+  Vec3 goal_shift = Vec3::Zero(), goal_velocity = Vec3::Zero();
+};
+
+// Pushes towards `target` (which moves at `target_velocity`) reckoning with the velocity; the way there takes
+// as long as the control lasts, save for the settings' limits and the draw's stretch.
+Control steered_control(const Draw&, const Settings&, const System&, const Departure&, const Vec3& target,
+                        const Vec3& target_velocity);
 
 // The control of an expansion from a node whose robot has its centre of mass at `center`: body and control
 // point push along point − center, interpolation draws to the goal. largest_force() never exceeds

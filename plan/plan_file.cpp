@@ -8,7 +8,8 @@ namespace limber::plan {
 
 namespace {
 
-constexpr const char* format_name = "limber plan 1";
+constexpr const char* format_name = "limber plan 2";
+constexpr const char* earlier_format_name = "limber plan 1";  // the tree as a list of states like any other
 
 // A list of states is three arrays: NAME_step (n), NAME_positions and NAME_velocities (n × 3N).
 template <class StateList>
@@ -26,6 +27,17 @@ void put_states(Npz& file, const std::string& name, const StateList& states) {
   file.arrays[name + "_step"] = NpyArray::of<std::int64_t>(steps, {n});
   file.arrays[name + "_positions"] = NpyArray::of<float>(positions, {n, width});
   file.arrays[name + "_velocities"] = NpyArray::of<float>(velocities, {n, width});
+}
+
+// What the states of a tree share is written once: tree_step (n), tree_piece (n × 2 × K), the pieces of each
+// state's positions and velocities, and tree_pieces (P × 96) themselves.
+void put_shared_states(Npz& file, const States& states) {
+  const std::vector<float> pieces = states.pieces();
+  file.arrays["tree_step"] = NpyArray::of<std::int64_t>(states.steps(), {states.size()});
+  file.arrays["tree_piece"] =
+      NpyArray::of<std::int32_t>(states.piece_of(), {states.size(), 2, std::int64_t(states.pieces_a_half())});
+  const std::int64_t length = States::piece_length;
+  file.arrays["tree_pieces"] = NpyArray::of<float>(pieces, {std::int64_t(pieces.size()) / length, length});
 }
 
 void put_controls(Npz& file, const std::string& name, const std::vector<Control>& controls) {
@@ -116,7 +128,7 @@ class Reader {
                max_force = array<float>(name + "_max_force_n", n, 1);
     std::vector<Control> controls(manipulation.size());
     for (std::size_t i = 0; i < controls.size(); ++i) {
-      require(manipulation[i] >= 0 && manipulation[i] <= std::int32_t(Manipulation::interpolation),
+      require(manipulation[i] >= 0 && manipulation[i] <= std::int32_t(Manipulation::hold),
               fmt::format("{}_manipulation[{}] is {}, which is none", name, i, manipulation[i]));
       require(steps[i] >= 0, fmt::format("{}_steps[{}] is {}", name, i, steps[i]));
       controls[i] = {Manipulation(manipulation[i]),
@@ -130,10 +142,37 @@ class Reader {
     return controls;
   }
 
-  Tree tree() const {
-    Tree t;
+  States shared_states() const {
+    const std::int64_t width = width_of("end_positions"), length = States::piece_length;
+    const std::int64_t a_half = (width + length - 1) / length;
+    const auto steps = array<std::int64_t>("tree_step", -1, 1);
+    const NpyArray& index = file_.array("tree_piece");
+    require(index.shape == std::vector<std::int64_t>{std::int64_t(steps.size()), 2, a_half},
+            "tree_piece has another shape than the rest of the file");
+    const auto piece_of = index.as<std::int32_t>(path_.string() + ": tree_piece");
+    const auto pieces = array<float>("tree_pieces", -1, length);
+    const std::int64_t count = std::int64_t(pieces.size()) / length, used = width - (a_half - 1) * length;
+    for (std::size_t i = 0; i < piece_of.size(); ++i) {
+      const std::int64_t piece = piece_of[i];
+      require(piece >= 0 && piece < count, fmt::format("tree_piece names piece {} of {}", piece, count));
+      const bool last = std::int64_t(i) % a_half == a_half - 1;
+      for (std::int64_t k = last ? used : length; k < length; ++k)
+        require(pieces[std::size_t(piece * length + k)] == 0, "tree_pieces is not filled up with zeros");
+    }
+    return States::of_pieces(std::size_t(width), steps, piece_of, pieces);
+  }
+
+  States unshared_states(std::span<const std::int32_t> parents) const {
     const std::vector<State> all = states("tree", width_of("tree_positions"));
-    const std::int64_t n = std::int64_t(all.size());
+    require(all.size() == parents.size(), "tree_parent has another shape than the rest of the file");
+    States shared;
+    for (std::size_t i = 0; i < all.size(); ++i) shared.push_back(all[i], parents[i]);
+    return shared;
+  }
+
+  Tree tree(bool shared) const {
+    Tree t;
+    const std::int64_t n = std::int64_t(array<std::int64_t>("tree_step", -1, 1).size());
     require(n > 0, "the tree is empty");
     const auto parents = array<std::int32_t>("tree_parent", n, 1);
     const auto iterations = array<std::int64_t>("tree_iteration", n, 1);
@@ -146,8 +185,8 @@ class Reader {
       const std::int32_t parent = parents[std::size_t(i)];
       require(i == 0 ? parent == -1 : parent >= 0 && parent < i,
               fmt::format("node {} has parent {}", i, parent));
-      t.states.push_back(all[std::size_t(i)], parent);
     }
+    t.states = shared ? shared_states() : unshared_states(parents);
     return t;
   }
 
@@ -188,7 +227,7 @@ Json json_of(const Statistics& s) {
 
 void write_plan(const fs::path& path, const Plan& plan, const Json& given) {
   Npz file;
-  put_states(file, "tree", plan.tree.states);
+  put_shared_states(file, plan.tree.states);
   put_controls(file, "tree", plan.tree.controls);
   const std::int64_t nodes = plan.tree.size();
   std::vector<float> centers;
@@ -229,10 +268,11 @@ PlanFile read_plan(const fs::path& path) {
   const Reader reader(path);
   const Json meta = reader.meta();
   try {
-    reader.require(meta.at("format") == format_name, "it is not of this version's format");
+    const bool shared = meta.at("format") == format_name;
+    reader.require(shared || meta.at("format") == earlier_format_name, "it is not of this version's format");
     PlanFile file;
     Plan& plan = file.plan;
-    plan.tree = reader.tree();
+    plan.tree = reader.tree(shared);
     plan.settings = settings_from_json(meta.at("settings"), path.string());
     plan.statistics = statistics_from_json(meta.at("statistics"));
     meta.at("goal_node").get_to(plan.goal_node);

@@ -1,15 +1,20 @@
 #include "plan/search.h"
 
+#include <atomic>
 #include <chrono>
 #include <condition_variable>
+#include <deque>
 #include <exception>
+#include <limits>
 #include <mutex>
 #include <thread>
+#include <utility>
 
 #include "core/error.h"
 #include "core/hash.h"
 #include "core/progress.h"
 #include "core/threads.h"
+#include "plan/chooser.h"
 
 namespace limber::plan {
 
@@ -17,6 +22,9 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 double seconds_since(Clock::time_point t) { return std::chrono::duration<double>(Clock::now() - t).count(); }
+
+constexpr int steps_between_looks = 64;  // where no law looks; only so that an end is soon noticed
+constexpr double leads_away = 3;         // robot radii of free way that a guided rollout may lose
 
 // What became of a rollout.
 struct Outcome {
@@ -40,38 +48,53 @@ Outcome outcome_of(const System& system, Rollout& rollout) {
 }
 
 // One iteration of Algorithm 1, on its way: computed from the node that is nearest as far as is known.
-struct Expansion {
-  std::int64_t iteration;
+struct Expansion : Rollout {
+  std::int64_t iteration = 0;
   Draw draw;
-  Vec3f point;
-  int near;
-  float near_distance2;  // squared
-  Control control;
+  Aim aimed;  // where the next rollout starts; one that runs may have been aimed before
+  State start;
   enum { waiting, running, finished } status = waiting;
   bool overtaken = false;  // while it ran, a nearer node was added
   Outcome outcome;
+  // What was seen of it on its way.
+  double least_to_go = 0;
+  Vec3 seen_center = Vec3::Zero();
+  int looks_at_rest = 0;
 };
 
-// Threads take expansions from one queue and commit them in its order. When a commit adds a node that is
-// nearer to the point of a later expansion than the node that one started from, the later one is aimed anew.
-// So whatever is committed started where the sequential algorithm would have started it.
+std::optional<Guidance> guidance_of(const System& system, const Settings& settings) {
+  if (settings.laws.guidance == 0) return std::nullopt;
+  return Guidance(system.workspace(), settings.goal.center_of_mass_m, settings.laws.soft_price);
+}
+
+// Threads take expansions from one queue and commit them in its order. With a lag, an expansion is drawn when
+// those that it knows are committed, and never changes. Without, expansions are drawn ahead on speculation:
+// when a commit adds a node that is nearer to the point of a later expansion than the node that one started
+// from, the later one is aimed anew. So whatever is committed started where the sequential algorithm would
+// have started it.
 class Search {
  public:
-  Search(const System& system, const Settings& settings, Plan& plan)
-      : system_(system), settings_(settings), plan_(plan), progress_("plan", settings.max_iterations) {
+  Search(const System& system, const Settings& settings, Plan& plan, const Watch& watch)
+      : system_(system),
+        settings_(settings),
+        laws_(settings.laws),
+        plan_(plan),
+        watch_(watch),
+        progress_("plan", settings.max_iterations),
+        guidance_(guidance_of(system, settings)),
+        chooser_(system, settings, guidance_ ? &*guidance_ : nullptr) {
     const int lanes = std::max(1, system.lanes()), threads = std::max(1, thread_count());
     // With single lanes a thread that waits to be committed needs a second expansion; a batch holds enough.
     const int automatic = threads == 1 ? lanes : threads * std::max(lanes, 2);
     window_ = settings.in_flight > 0 ? settings.in_flight : automatic;
+    if (laws_.lag > 0) window_ = laws_.lag + 1;
     threads_ = std::min(threads, window_);
     share_ = std::min(lanes, (window_ + threads_ - 1) / threads_);
-    next_iteration_ = plan.statistics.iterations;
-    for (int node = 0; node < plan.tree.size(); ++node)
-      add_shift(plan.tree.centers[node], system.goal_shift(plan.tree.states[std::size_t(node)]));
+    look_every_ = laws_.look_s > 0 ? steps_of(laws_.look_s, system.dt_s()) : 0;
+    restore();
   }
 
   void run() {
-    const double cpu_before = cpu_seconds();
     if (plan_.solved()) end(Ending::goal);
     {
       // Threads of our own: they wait for one another, which tasks of a pool must not, and ThreadSanitizer
@@ -81,35 +104,50 @@ class Search {
       work();
     }
     if (failure_) std::rethrow_exception(failure_);
-    plan_.statistics.cpu_s += cpu_seconds() - cpu_before;
-    plan_.statistics.wall_s += seconds_since(started_);
+    plan_.statistics = statistics_now();
   }
 
  private:
+  // What one thread has in its lanes.
+  class Lanes final : public Supply {
+   public:
+    explicit Lanes(Search& search) : search_(search) {}
+    int at_once() const override { return search_.share_; }
+    Rollout* next() override {
+      const std::lock_guard lock(search_.mutex_);
+      if (taken_ == search_.share_) return nullptr;
+      Expansion* e = search_.take();
+      taken_ += e != nullptr;
+      took_any_ = took_any_ || e;
+      return e;
+    }
+    bool goes_on(const Rollout& rollout, const Look& look) override {
+      // No lane but this thread's touches the rollout.
+      return search_.goes_on(const_cast<Expansion&>(static_cast<const Expansion&>(rollout)), look);
+    }
+    void done(Rollout& rollout) override {
+      Outcome outcome = outcome_of(search_.system_, rollout);
+      const std::lock_guard lock(search_.mutex_);
+      --taken_;
+      search_.give_back(static_cast<Expansion&>(rollout), std::move(outcome));
+    }
+    bool took_any() { return std::exchange(took_any_, false); }
+
+   private:
+    Search& search_;
+    int taken_ = 0;
+    bool took_any_ = false;
+  };
+
   void work() try {
     const std::unique_ptr<Propagator> propagator = system_.make_propagator();
-    std::vector<Expansion*> mine;
-    std::vector<Rollout> rollouts;
-    std::vector<State> starts;
-    std::vector<Outcome> outcomes;
-    std::unique_lock lock(mutex_);
-    while (true) {
-      commit_finished();
-      look_at_limits();
-      if (ended_) break;
-      draw_ahead();
-      take(mine, rollouts, starts);
-      if (mine.empty()) {
-        changed_.wait(lock);
-        continue;
-      }
-      lock.unlock();
-      propagator->propagate(rollouts);
-      outcomes.clear();
-      for (Rollout& rollout : rollouts) outcomes.push_back(outcome_of(system_, rollout));
-      lock.lock();
-      give_back(mine, outcomes);
-      changed_.notify_all();
+    Lanes lanes(*this);
+    while (!ended_) {
+      propagator->run(lanes, look_every_ > 0 ? look_every_ : steps_between_looks);
+      std::unique_lock lock(mutex_);
+      if (ended_ || lanes.took_any()) continue;
+      // Nothing to take: others are at work on what must be committed first.
+      changed_.wait(lock, [this] { return ended_ || any_waiting(); });
     }
     changed_.notify_all();
   } catch (...) {
@@ -119,58 +157,82 @@ class Search {
     changed_.notify_all();
   }
 
-  void draw_ahead() {
-    while (int(queue_.size()) < window_ && next_iteration_ < settings_.max_iterations) {
-      Expansion e;
-      e.iteration = next_iteration_++;
-      e.draw = draw(settings_, system_, e.iteration);
-      e.point = e.draw.point.cast<float>();
-      aim(e, nearest(e.draw.towards_goal ? centers_from_goal_ : plan_.tree.centers, e.point));
-      queue_.push_back(std::move(e));
-    }
+  // With the mutex, as all below save goes_on().
+  bool any_waiting() const {
+    return std::any_of(queue_.begin(), queue_.end(),
+                       [](const Expansion& e) { return e.status == Expansion::waiting; });
   }
 
-  void aim(Expansion& e, int node) const {
-    e.near = node;
-    e.near_distance2 = distance2(e, node);
-    e.control = control_of(e.draw, settings_, plan_.tree.centers[node].cast<double>(),
-                           goal_shifts_[std::size_t(node)]);
-  }
-
-  // A goal that moves is where it is at that node's time.
-  float distance2(const Expansion& e, int node) const {
-    return squared_distance(e.draw.towards_goal ? centers_from_goal_[node] : plan_.tree.centers[node],
-                            e.point);
-  }
-
-  void add_shift(const Vec3f& center, const Vec3& goal_shift) {
-    goal_shifts_.push_back(goal_shift);
-    centers_from_goal_.push_back(center - goal_shift.cast<float>());
-  }
-
-  void take(std::vector<Expansion*>& mine, std::vector<Rollout>& rollouts, std::vector<State>& starts) {
-    mine.clear();
+  Expansion* take() {
+    look_at_limits();
+    if (ended_) return nullptr;
     for (Expansion& e : queue_) {
-      if (int(mine.size()) == share_) break;
-      if (e.status == Expansion::waiting) mine.push_back(&e);
+      if (e.status != Expansion::waiting) continue;
+      e.status = Expansion::running;
+      e.start = plan_.tree.states[std::size_t(e.aimed.node)];
+      e.from = &e.start;
+      e.control = e.aimed.control;
+      e.looks_at_rest = 0;
+      e.seen_center = plan_.tree.centers[e.aimed.node].cast<double>();
+      e.least_to_go = std::numeric_limits<double>::infinity();
+      return &e;
     }
-    rollouts.resize(mine.size()), starts.resize(mine.size());
-    for (std::size_t i = 0; i < mine.size(); ++i) {
-      mine[i]->status = Expansion::running;
-      starts[i] = plan_.tree.states[std::size_t(mine[i]->near)];
-      rollouts[i].from = &starts[i];
-      rollouts[i].control = mine[i]->control;
+    return nullptr;
+  }
+
+  void give_back(Expansion& e, Outcome outcome) {
+    ++plan_.statistics.rollouts;
+    e.outcome = std::move(outcome);
+    e.status = Expansion::finished;
+    if (e.overtaken) compute_again(e);
+    commit_finished();
+    look_at_limits();
+    changed_.notify_all();
+  }
+
+  // A function of the rollout and of what was seen of it, save when nobody wants the result any more.
+  bool goes_on(Expansion& e, const Look& look) const {
+    if (ended_) return false;
+    if (look_every_ == 0) return true;
+    const Vec3 place = look.center - look.goal_shift;
+    if (laws_.stop_in_goal && holds(settings_.goal, place)) return false;
+    if (!laws_.end_hopeless) return true;
+    // It should move (slow in one look alone, it turns round) and, where it is guided, come nearer.
+    const double moved = (look.center - e.seen_center).norm();
+    e.seen_center = look.center;
+    e.looks_at_rest = moved < settings_.settle.mean_speed_m_s * laws_.look_s ? e.looks_at_rest + 1 : 0;
+    if (e.looks_at_rest == 2) return false;
+    if (!e.draw.guided) return true;
+    const double to_go = guidance_->to_go(place);
+    e.least_to_go = std::min(e.least_to_go, to_go);
+    return to_go <= e.least_to_go + leads_away * guidance_->workspace().robot_radius_m;
+  }
+
+  // Expansions are drawn in order, each when all that it may know is committed, and no more.
+  void draw_ahead() {
+    while (next_iteration_ < settings_.max_iterations &&
+           (laws_.lag > 0 ? next_iteration_ <= committed_ + laws_.lag : int(queue_.size()) < window_)) {
+      const std::int64_t iteration = next_iteration_++;
+      if (iteration < plan_.statistics.iterations) continue;  // of the earlier plan
+      Expansion& e = queue_.emplace_back();
+      e.iteration = iteration;
+      e.draw = draw(settings_, system_, iteration);
+      e.aimed = chooser_.choose(e.draw);
     }
   }
 
-  void give_back(const std::vector<Expansion*>& mine, std::vector<Outcome>& outcomes) {
-    plan_.statistics.rollouts += std::int64_t(mine.size());
-    for (std::size_t i = 0; i < mine.size(); ++i) {
-      Expansion& e = *mine[i];
-      e.outcome = std::move(outcomes[i]);
-      e.status = Expansion::finished;
-      if (e.overtaken) compute_again(e);
+  // Goes through the earlier plan's commits again, so that each expansion that was on its way is drawn as it
+  // was.
+  void restore() {
+    int node = 0;
+    for (chooser_.add(plan_.tree, node++);; ++committed_) {
+      if (laws_.lag > 0) draw_ahead();
+      if (committed_ == plan_.statistics.iterations) break;
+      if (node < plan_.tree.size() && plan_.tree.iterations[std::size_t(node)] == committed_)
+        chooser_.add(plan_.tree, node++);
     }
+    next_iteration_ = std::max(next_iteration_, committed_);
+    draw_ahead();
   }
 
   void compute_again(Expansion& e) {
@@ -181,32 +243,44 @@ class Search {
 
   void commit_finished() {
     while (!ended_ && !queue_.empty() && queue_.front().status == Expansion::finished) {
-      Expansion e = std::move(queue_.front());
+      const Expansion e = std::move(queue_.front());
       queue_.pop_front();
       commit(e);
+      if (!ended_) draw_ahead();
     }
   }
 
-  void commit(Expansion& e) {
+  void commit(const Expansion& e) {
     Statistics& statistics = plan_.statistics;
+    ++committed_;
     ++statistics.iterations;
     statistics.rollout_steps += e.control.steps;
     statistics.diverged += e.outcome.kind == Outcome::diverged;
     statistics.rejected += e.outcome.kind == Outcome::rejected;
     if (e.outcome.kind == Outcome::node) {
-      const int node = plan_.tree.add(std::move(e.outcome.state), e.near, e.control, e.iteration,
+      const int node = plan_.tree.add(e.outcome.state, e.aimed.node, e.control, e.iteration,
                                       e.outcome.center.cast<float>());
-      add_shift(plan_.tree.centers[node], e.outcome.goal_shift);
+      chooser_.add(plan_.tree, node);
       consider_for_goal(node, e.outcome.center - e.outcome.goal_shift);
-      aim_overtaken(node);
+      if (laws_.lag == 0) aim_overtaken(node);
     }
-    progress_.update(statistics.iterations, fmt::format("{} nodes, {:.3g} m from the goal", plan_.tree.size(),
-                                                        plan_.best_distance_m));
+    progress_.update(statistics.iterations, fmt::format("{} nodes, {:.3g} m from the goal, {:.0f} a second",
+                                                        plan_.tree.size(), plan_.best_distance_m,
+                                                        double(statistics.iterations - iterations_before_) /
+                                                            seconds_since(started_)));
+    if (watch_) watch_({statistics_now(), plan_.tree.size(), plan_.best_distance_m});
+  }
+
+  Statistics statistics_now() const {
+    Statistics now = plan_.statistics;
+    now.cpu_s += cpu_seconds() - cpu_before_;
+    now.wall_s += seconds_since(started_);
+    return now;
   }
 
   void consider_for_goal(int node, const Vec3& center) {  // as seen from the goal's start
     const double distance = (center - settings_.goal.center_of_mass_m).norm();
-    const bool solves = distance <= settings_.goal.radius_m &&
+    const bool solves = holds(settings_.goal, center) &&
                         comes_to_rest(system_, settings_, plan_.tree.states[std::size_t(node)]);
     if (!solves && distance >= plan_.best_distance_m) return;
     plan_.best_distance_m = distance;
@@ -218,8 +292,8 @@ class Search {
 
   void aim_overtaken(int node) {
     for (Expansion& e : queue_) {
-      if (!(distance2(e, node) < e.near_distance2)) continue;  // the first of equals stays
-      aim(e, node);
+      if (!(chooser_.cost(e.draw, node) < e.aimed.cost)) continue;  // the first of equals stays
+      e.aimed = chooser_.aim(e.draw, node);
       if (e.status == Expansion::running) e.overtaken = true;
       if (e.status == Expansion::finished) compute_again(e);
     }
@@ -239,19 +313,25 @@ class Search {
 
   const System& system_;
   const Settings& settings_;
+  const Laws& laws_;
   Plan& plan_;
+  const Watch& watch_;
   Progress progress_;
-  int window_, threads_, share_;  // expansions in flight, threads, expansions a thread takes at once
+  int window_, threads_, share_;  // expansions in flight, threads, expansions a thread has in its lanes
+  int look_every_;                // steps; 0: laws do not look
   const Clock::time_point started_ = Clock::now();
+  const double cpu_before_ = cpu_seconds();
+  const std::int64_t iterations_before_ = plan_.statistics.iterations;
 
+  const std::optional<Guidance> guidance_;  // as the search begins; prices are learnt in the chooser's copy
+
+  std::atomic<bool> ended_ = false;
   std::mutex mutex_;  // guards all below, and plan_ (states already in the tree are read without it)
   std::condition_variable changed_;
-  Centers centers_from_goal_;      // of the tree's nodes, less the goal's shift there
-  std::vector<Vec3> goal_shifts_;  // of the tree's nodes
+  Chooser chooser_;
   std::deque<Expansion>
       queue_;  // in order of iteration; a deque, so that pointers to the taken ones stay good
-  std::int64_t next_iteration_ = 0;
-  bool ended_ = false;
+  std::int64_t next_iteration_ = 0, committed_ = 0;
   std::exception_ptr failure_;  // the first
 };
 
@@ -263,8 +343,7 @@ Plan begin(const System& system, const Settings& settings) {
   LIMBER_CHECK(center.allFinite(), center.x(), center.y(), center.z());
   plan.tree.add(start, -1, Control{}, -1, center.cast<float>());
   plan.best_distance_m = (center - settings.goal.center_of_mass_m).norm();
-  if (plan.best_distance_m <= settings.goal.radius_m && comes_to_rest(system, settings, start))
-    plan.goal_node = 0;
+  if (holds(settings.goal, center) && comes_to_rest(system, settings, start)) plan.goal_node = 0;
   return plan;
 }
 
@@ -281,12 +360,12 @@ void require_same_search(const System& system, const Settings& settings, const P
 
 }  // namespace
 
-Plan plan(const System& system, const Settings& settings, std::optional<Plan> earlier) {
+Plan plan(const System& system, const Settings& settings, std::optional<Plan> earlier, const Watch& watch) {
   validate(settings, system);
   if (earlier) require_same_search(system, settings, *earlier);
   Plan plan = earlier ? std::move(*earlier) : begin(system, settings);
   plan.settings = settings;
-  Search(system, plan.settings, plan).run();
+  Search(system, plan.settings, plan, watch).run();
   plan.trajectory = trajectory_to(system, settings, plan.tree, plan.best_node, plan.solved());
   return plan;
 }
@@ -301,8 +380,10 @@ std::string explain(const Plan& plan) {
     return fmt::format("reached the goal after {} iterations: {}", statistics.iterations, where);
   std::string text =
       plan.best_distance_m <= s.goal.radius_m
-          ? fmt::format("the robot got into the goal, but did not come to rest there within {:g} s: ",
-                        s.settle.max_duration_s) +
+          ? fmt::format(
+                "the robot got into the goal, but did not come to rest there within {:g} s, or not as the "
+                "goal asks (turn, shape, above, below or clear of a body): ",
+                s.settle.max_duration_s) +
                 where + ". "
           : "no node reached the goal; the nearest is " + where + ". ";
   switch (plan.ending) {

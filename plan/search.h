@@ -2,6 +2,7 @@
 // ahead of itself on several threads and lanes without changing its result. Method: docs/planning.md.
 #pragma once
 
+#include <functional>
 #include <optional>
 #include <string>
 
@@ -39,12 +40,21 @@ struct Plan {
   bool solved() const { return goal_node >= 0; }
 };
 
+// Where a search stands after an iteration; times include those of an earlier plan that it goes on from.
+struct Moment {
+  Statistics statistics;
+  int nodes = 0;
+  double best_distance_m = 0;
+};
+// Called after every iteration, in their order, by one thread at a time.
+using Watch = std::function<void(const Moment&)>;
+
 // Searches until a node lies in the goal and comes to rest there, or a limit ends it; SIGINT and SIGTERM
 // (core/progress.h) end it too, and what was found is kept. Tree and trajectory depend on system and settings
 // alone; in_flight and threads are free. With `earlier` (the plan of a search that was cut short, of the same
 // system and settings save for limits) goes on from there, to the bytes that one uninterrupted search gives.
 // Throws InputError when settings are out of range or `earlier` is not of this system and these settings.
-Plan plan(const System&, const Settings&, std::optional<Plan> earlier = std::nullopt);
+Plan plan(const System&, const Settings&, std::optional<Plan> earlier = std::nullopt, const Watch& = {});
 
 // A sentence or two for the user: reached or not, how near, which limit ended it, what to try.
 std::string explain(const Plan&);

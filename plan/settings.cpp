@@ -17,6 +17,19 @@ void require_within(double value, double lower, double upper, const char* name) 
     throw InputError(fmt::format("planner: {} is {}; it must be in [{}, {}]", name, value, lower, upper));
 }
 
+void validate_laws(const Laws& l) {
+  require_within(l.lag, 0, 65535, "lag");
+  require_within(l.time_weight, 0, 1, "time_weight");
+  require_within(l.guidance, 0, 1, "guidance");
+  require(std::isfinite(l.soft_price) && l.soft_price >= 0, "soft_price", l.soft_price, "at least 0");
+  require(std::isfinite(l.look_s) && l.look_s >= 0, "look_s", l.look_s, "at least 0");
+  if ((l.stop_in_goal || l.end_hopeless) && l.look_s == 0)
+    throw InputError(
+        "planner: stop_in_goal and end_hopeless need rollouts that are looked at; set look_s above 0");
+  if ((l.guidance > 0) && l.lag == 0)
+    throw InputError("planner: guidance needs a lag of at least 1; set lag, or guidance to 0");
+}
+
 bool is_weight(double w) { return std::isfinite(w) && w >= 0; }
 
 void validate_weights(const Settings& s) {
@@ -36,12 +49,20 @@ void validate_weights(const Settings& s) {
 
 }  // namespace
 
+bool holds(const Goal& goal, const Vec3& center) {
+  return goal.box_m ? (center.array() >= goal.box_m->lower.array()).all() &&
+                          (center.array() <= goal.box_m->upper.array()).all()
+                    : (center - goal.center_of_mass_m).norm() <= goal.radius_m;
+}
+
 void validate(const Settings& s, const System& system) {
   require(s.max_iterations >= 0, "max_iterations", double(s.max_iterations), "at least 0");
   if (!s.goal.center_of_mass_m.allFinite())
     throw InputError("planner: the goal's center_of_mass_m is not finite");
   require(std::isfinite(s.goal.radius_m) && s.goal.radius_m > 0, "the goal's radius_m", s.goal.radius_m,
           "above 0");
+  if (s.goal.box_m && !holds(s.goal, s.goal.center_of_mass_m))
+    throw InputError("planner: the goal's center_of_mass_m is not in its box_m");
   require_within(s.goal_bias, 0, 1, "goal_bias");
   validate_weights(s);
   require(std::isfinite(s.max_force_n) && s.max_force_n >= 0, "max_force_n", s.max_force_n, "at least 0");
@@ -53,6 +74,7 @@ void validate(const Settings& s, const System& system) {
   require_within(s.settle.max_duration_s, 0, 1e8 * system.dt_s(), "settle max_duration_s");
   require(s.settle.mean_speed_m_s > 0, "settle mean_speed_m_s", s.settle.mean_speed_m_s, "above 0");
   require_within(s.settle.max_force_share, 0, 1, "settle max_force_share");
+  validate_laws(s.laws);
   require(s.frames_per_second > 0 && s.frames_per_second <= 10000, "frames_per_second", s.frames_per_second,
           "in (0, 10000]");
   require_within(s.in_flight, 0, 65536, "in_flight");
@@ -65,6 +87,9 @@ Json json_of(const Settings& s) {
   json["seed"] = s.seed;
   json["max_iterations"] = s.max_iterations;
   json["goal"] = {{"center_of_mass_m", {goal.x(), goal.y(), goal.z()}}, {"radius_m", s.goal.radius_m}};
+  if (const auto& box = s.goal.box_m)
+    json["goal"]["box_m"] = {{box->lower.x(), box->lower.y(), box->lower.z()},
+                             {box->upper.x(), box->upper.y(), box->upper.z()}};
   json["goal_bias"] = s.goal_bias;
   json["weights"] = {{"body", s.weights.body},
                      {"control_point", s.weights.control_point},
@@ -78,6 +103,18 @@ Json json_of(const Settings& s) {
   json["settle"] = {{"max_duration_s", s.settle.max_duration_s},
                     {"mean_speed_m_s", s.settle.mean_speed_m_s},
                     {"max_force_share", s.settle.max_force_share}};
+  const Laws& l = s.laws;
+  json["laws"] = {{"lag", l.lag},
+                  {"metric", l.metric == Metric::distance ? "distance" : "time_to_go"},
+                  {"time_weight", l.time_weight},
+                  {"guidance", l.guidance},
+                  {"soft_price", l.soft_price},
+                  {"learn_prices", l.learn_prices},
+                  {"steer", l.steer},
+                  {"look_s", l.look_s},
+                  {"stop_in_goal", l.stop_in_goal},
+                  {"hold", l.hold},
+                  {"end_hopeless", l.end_hopeless}};
   json["frames_per_second"] = s.frames_per_second;
   json["in_flight"] = s.in_flight;
   json["time_limit_s"] = std::isfinite(s.time_limit_s) ? Json(s.time_limit_s) : Json();
@@ -91,6 +128,13 @@ Settings settings_from_json(const Json& json, const std::string& what) try {
   for (int axis = 0; axis < 3; ++axis)
     json.at("goal").at("center_of_mass_m").at(std::size_t(axis)).get_to(s.goal.center_of_mass_m[axis]);
   json.at("goal").at("radius_m").get_to(s.goal.radius_m);
+  if (const Json& goal = json.at("goal"); goal.contains("box_m")) {
+    Box& box = s.goal.box_m.emplace();
+    for (int axis = 0; axis < 3; ++axis) {
+      goal.at("box_m").at(0).at(std::size_t(axis)).get_to(box.lower[axis]);
+      goal.at("box_m").at(1).at(std::size_t(axis)).get_to(box.upper[axis]);
+    }
+  }
   json.at("goal_bias").get_to(s.goal_bias);
   json.at("weights").at("body").get_to(s.weights.body);
   json.at("weights").at("control_point").get_to(s.weights.control_point);
@@ -104,6 +148,18 @@ Settings settings_from_json(const Json& json, const std::string& what) try {
   json.at("settle").at("max_duration_s").get_to(s.settle.max_duration_s);
   json.at("settle").at("mean_speed_m_s").get_to(s.settle.mean_speed_m_s);
   json.at("settle").at("max_force_share").get_to(s.settle.max_force_share);
+  const Json& laws = json.at("laws");
+  laws.at("lag").get_to(s.laws.lag);
+  s.laws.metric = laws.at("metric") == "distance" ? Metric::distance : Metric::time_to_go;
+  laws.at("time_weight").get_to(s.laws.time_weight);
+  laws.at("guidance").get_to(s.laws.guidance);
+  laws.at("soft_price").get_to(s.laws.soft_price);
+  laws.at("learn_prices").get_to(s.laws.learn_prices);
+  laws.at("steer").get_to(s.laws.steer);
+  laws.at("look_s").get_to(s.laws.look_s);
+  laws.at("stop_in_goal").get_to(s.laws.stop_in_goal);
+  laws.at("hold").get_to(s.laws.hold);
+  laws.at("end_hopeless").get_to(s.laws.end_hopeless);
   json.at("frames_per_second").get_to(s.frames_per_second);
   json.at("in_flight").get_to(s.in_flight);
   if (const Json& limit = json.at("time_limit_s"); !limit.is_null()) limit.get_to(s.time_limit_s);
@@ -116,7 +172,7 @@ std::string first_difference(const Settings& a, const Settings& b) {
   const Json in_a = json_of(a), in_b = json_of(b);
   for (const char* key :
        {"seed", "goal", "goal_bias", "weights", "max_force_n", "min_force_share", "max_force_share",
-        "min_duration_s", "max_duration_s", "control_point_radius_m", "settle"})
+        "min_duration_s", "max_duration_s", "control_point_radius_m", "settle", "laws"})
     if (in_a.at(key) != in_b.at(key)) return key;
   return "";
 }

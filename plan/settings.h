@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <limits>
+#include <optional>
 
 #include "core/json.h"
 #include "plan/system.h"
@@ -19,15 +20,37 @@ struct ManipulationWeights {
 };
 
 struct Goal {
-  Vec3 center_of_mass_m = Vec3::Zero();
-  double radius_m = 0;  // > 0: a node whose centre of mass is within it solves the query
+  Vec3 center_of_mass_m = Vec3::Zero();  // what is aimed at
+  double radius_m = 0;                   // > 0: a node whose centre of mass is within it solves the query
+  // Instead: whose centre of mass is in this box. radius_m is then that of a ball that holds the box.
+  std::optional<Box> box_m = std::nullopt;
 };
+// `center`: the robot's, less the goal's shift. What else the system asks for is not looked at.
+bool holds(const Goal&, const Vec3& center);
 
 // At the end of a path that reached the goal, interpolation holds the robot there until it rests.
 struct Settle {
   double max_duration_s = 3;     // 0: none
   double mean_speed_m_s = 0.02;  // slower is at rest
   double max_force_share = 1;    // of max_force_n, in [0, 1]
+};
+
+// What the preset `fast` does beyond Algorithm 1; each can be switched alone. Method: docs/planning.md.
+enum class Metric { distance, time_to_go };
+struct Laws {
+  // An expansion knows the nodes of all expansions but the `lag` before it, so that those can be computed
+  // side by side for certain; 0: of all.
+  int lag = 0;
+  Metric metric = Metric::distance;
+  double time_weight = 0;     // of a node's own time in the metric time_to_go, in [0, 1]
+  double guidance = 0;        // share of expansions led by the cost-to-go of a grid; needs a lag, in [0, 1]
+  double soft_price = 0;      // a metre in a passage so tight that nothing is left costs so many more
+  bool learn_prices = false;  // where pushing does not help, going on gets dearer
+  bool steer = false;         // pushes reckon with the robot's velocity, and last as long as the way takes
+  double look_s = 0;          // rollouts are looked at so often, 0: never; needed by the following
+  bool stop_in_goal = false;
+  bool hold = false;          // towards the goal the robot is held, not interpolated: it may arrive turned
+  bool end_hopeless = false;  // a rollout that gets nowhere, or leads away, ends there
 };
 
 struct Settings {
@@ -43,6 +66,7 @@ struct Settings {
   double max_duration_s = 1;
   double control_point_radius_m = 0.25;  // > 0, in the rest shape
   Settle settle;
+  Laws laws;
   double frames_per_second = 30;  // of the trajectory's stored states, in (0, 10000]
   // None of these changes the tree, save for how far it gets.
   int in_flight = 0;  // expansions computed ahead; 0: chosen from the threads and the lanes

@@ -4,6 +4,7 @@
 #include <array>
 #include <cstdint>
 #include <deque>
+#include <span>
 #include <vector>
 
 #include "core/state.h"
@@ -20,14 +21,25 @@ class States {
   std::size_t bytes() const;                            // that are held
   std::size_t bytes_unshared() const;                   // that would be held if nothing were shared
 
+  // As they are held, for a file: pieces of 32 nodes' positions or velocities, the last of a state's filled
+  // up with zeros.
+  static constexpr std::size_t piece_length = 96;
+  std::size_t pieces_a_half() const { return (numbers_ + piece_length - 1) / piece_length; }
+  std::span<const std::int64_t> steps() const { return steps_; }
+  std::span<const std::int32_t> piece_of() const {
+    return piece_of_;
+  }                                   // [state][positions, velocities][piece]
+  std::vector<float> pieces() const;  // one after the other: a copy
+  // From these again; every index is that of a piece.
+  static States of_pieces(std::size_t numbers, std::span<const std::int64_t> steps,
+                          std::span<const std::int32_t> piece_of, std::span<const float> pieces);
+
  private:
-  // Pieces of 32 nodes' positions or velocities, the last filled up with zeros.
-  using Piece = std::array<float, 96>;
-  std::size_t pieces_a_half() const { return (numbers_ + Piece{}.size() - 1) / Piece{}.size(); }
+  using Piece = std::array<float, piece_length>;
 
   std::size_t numbers_ = 0;
   std::vector<std::int64_t> steps_;
-  std::vector<std::uint32_t> piece_of_;  // [state][positions, velocities][piece] in pieces_
+  std::vector<std::int32_t> piece_of_;  // index in pieces_
   std::deque<Piece> pieces_;
 };
 

@@ -1,8 +1,10 @@
 // What a planner may ask of dynamics. It deals in numbers and never names a mesh.
 #pragma once
 
+#include <cstdint>
 #include <memory>
 #include <span>
+#include <vector>
 
 #include "core/mesh.h"
 #include "core/state.h"
@@ -17,6 +19,26 @@ struct Rollout {
   bool ok = false;  // out; false: the dynamics diverged, and `to` means nothing
 };
 
+// What a rollout shows on its way.
+struct Look {
+  int steps = 0;  // since it began
+  Vec3 center = Vec3::Zero(),
+       velocity = Vec3::Zero();    // of the robot: centre of mass, metres, metres a second
+  Vec3 goal_shift = Vec3::Zero();  // as System::goal_shift
+};
+
+// Hands rollouts to whoever has a lane free.
+class Supply {
+ public:
+  virtual ~Supply() = default;
+  virtual int at_once() const = 0;  // so many it may give before one is done
+  virtual Rollout* next() = 0;      // nullptr: none now; it stays good until done()
+  // Asked every look_every steps of a rollout that has not diverged; false ends it there, and its
+  // control.steps are those it took. Must be a function of the rollout and what was seen of it.
+  virtual bool goes_on(const Rollout&, const Look&) { return true; }
+  virtual void done(Rollout&) = 0;
+};
+
 // Scratch memory of one thread; its System must outlive it.
 class Propagator {
  public:
@@ -25,6 +47,26 @@ class Propagator {
   // alone, not on its neighbours in the span, and 40 steps followed by 60 of the same control give the bits
   // of 100.
   virtual void propagate(std::span<Rollout>) = 0;
+  // The same for all that the supply gives, until it has none and all are done; a lane is filled again as
+  // soon as its rollout ends. look_every > 0.
+  virtual void run(Supply&, int look_every) = 0;
+};
+
+// A coarse picture of what stands where at the start, for guidance.
+struct Workspace {
+  enum Cell : std::uint8_t { open, soft, rigid };
+  Box box;
+  double cell_m = 0;
+  Eigen::Vector3i cells = Eigen::Vector3i::Zero();
+  std::vector<Cell> what;     // [(z · ny + y) · nx + x]; the robot itself leaves no trace
+  bool walls = true;          // the box is closed
+  double robot_radius_m = 0;  // of the largest ball round the robot's centre of mass that it holds
+};
+
+// What a path is judged by beside its time and its forces.
+struct Measures {
+  double strain_energy_j = 0;  // elastic energy of all bodies
+  double volume_change = 0;    // the largest |V − V₀|/V₀ of a body that moves
 };
 
 // All members may be called from several threads at once.
@@ -32,15 +74,22 @@ class System {
  public:
   virtual ~System() = default;
   virtual State start() const = 0;
-  virtual Vec3 robot_center(const State&) const = 0;            // centre of mass, metres
+  virtual Vec3 robot_center(const State&) const = 0;    // centre of mass, metres
+  virtual Vec3 robot_velocity(const State&) const = 0;  // of the centre of mass, metres a second
+  virtual double robot_mass_kg() const = 0;
   virtual double mean_speed(const State&) const = 0;            // of the robot's nodes, metres a second
   virtual int robot_nodes() const = 0;                          // Control::node is below it
   virtual Box sample_bounds() const = 0;                        // where random points are drawn, metres
   virtual double dt_s() const = 0;                              // length of a step
   virtual std::uint64_t hash() const = 0;                       // of all that a rollout's result depends on
   virtual bool acceptable(const State&) const { return true; }  // false: no node is made of this state
+  // What else than the place of the robot's centre of mass makes it reach the goal: its turn, its shape, …
+  virtual bool goal_holds(const State&) const { return true; }
   // How far the goal has moved since the start: it may hang on a body that moves by itself. Metres.
   virtual Vec3 goal_shift(const State&) const { return Vec3::Zero(); }
+  virtual Measures measures(const State&) const { return {}; }
+  virtual Vec3 goal_velocity(const State&) const { return Vec3::Zero(); }  // metres a second
+  virtual Workspace workspace() const = 0;
   virtual int lanes() const { return 1; }  // rollouts a Propagator likes at once
   virtual std::unique_ptr<Propagator> make_propagator() const = 0;
 };

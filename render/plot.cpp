@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "core/error.h"
+#include "render/detail/lettering.h"
 
 namespace limber::render {
 
@@ -67,7 +68,25 @@ std::vector<double> round_ticks(double low, double high, int count) {
   return ticks;
 }
 
-std::string plot_svg(const std::vector<Curve>& curves, const PlotLook& look) {
+namespace {
+
+// Where things lie in a plot, in pixels.
+struct Layout {
+  std::vector<double> x_ticks, y_ticks;
+  double left, right, top, bottom;
+  double x_step() const { return x_ticks[1] - x_ticks[0]; }
+  double y_step() const { return y_ticks[1] - y_ticks[0]; }
+  double px(double v) const {
+    return left + (v - x_ticks.front()) / (x_ticks.back() - x_ticks.front()) * (right - left);
+  }
+  double py(double v) const {
+    return bottom - (v - y_ticks.front()) / (y_ticks.back() - y_ticks.front()) * (bottom - top);
+  }
+  bool is_zero(double y_tick) const { return std::abs(y_tick) < 1e-9 * y_step(); }
+  bool shows(double limit) const { return y_ticks.front() <= limit && limit <= y_ticks.back(); }
+};
+
+Layout layout_of(const std::vector<Curve>& curves, const PlotLook& look) {
   Range x, y;
   for (const Curve& curve : curves) {
     LIMBER_CHECK(curve.x.size() == curve.y.size(), curve.name, curve.x.size(), curve.y.size());
@@ -80,16 +99,35 @@ std::string plot_svg(const std::vector<Curve>& curves, const PlotLook& look) {
   const Range data = y;
   for (const double limit : look.limits)
     if (limit > data.low - near && limit < data.high + near) y.include(limit);
+  return {round_ticks(x.low, x.high, 8), round_ticks(y.low, y.high, 6),    74,
+          look.width_px - 24.0,          look.title.empty() ? 24.0 : 50.0, look.height_px - 92.0};
+}
 
-  const std::vector<double> x_ticks = round_ticks(x.low, x.high, 8), y_ticks = round_ticks(y.low, y.high, 6);
-  const double left = 74, right = look.width_px - 24.0, top = look.title.empty() ? 24 : 50,
-               bottom = look.height_px - 92.0;
-  const auto px = [&](double v) {
-    return left + (v - x_ticks.front()) / (x_ticks.back() - x_ticks.front()) * (right - left);
-  };
-  const auto py = [&](double v) {
-    return bottom - (v - y_ticks.front()) / (y_ticks.back() - y_ticks.front()) * (bottom - top);
-  };
+// Soft-edged, over what is there.
+void draw_line(Image8& image, double x1, double y1, double x2, double y2, double width_px,
+               const Vec3& color) {
+  const double reach = 0.5 * width_px + 1, dx = x2 - x1, dy = y2 - y1, length2 = dx * dx + dy * dy;
+  const auto first = [](double v) { return std::max(0, int(std::floor(v))); };
+  const int right = std::min(image.width - 1, int(std::max(x1, x2) + reach)),
+            bottom = std::min(image.height - 1, int(std::max(y1, y2) + reach));
+  for (int y = first(std::min(y1, y2) - reach); y <= bottom; ++y)
+    for (int x = first(std::min(x1, x2) - reach); x <= right; ++x) {
+      const double u = x + 0.5 - x1, v = y + 0.5 - y1;
+      const double t = length2 > 0 ? std::clamp((u * dx + v * dy) / length2, 0.0, 1.0) : 0;
+      const double distance = std::hypot(u - t * dx, v - t * dy);
+      const double share = std::clamp(0.5 * width_px + 0.5 - distance, 0.0, 1.0);
+      std::uint8_t* pixel = &image.rgb[3 * (std::size_t(y) * std::size_t(image.width) + std::size_t(x))];
+      for (int c = 0; c < 3; ++c)
+        pixel[c] =
+            std::uint8_t(std::lround(pixel[c] + share * (255 * std::clamp(color[c], 0.0, 1.0) - pixel[c])));
+    }
+}
+
+}  // namespace
+
+std::string plot_svg(const std::vector<Curve>& curves, const PlotLook& look) {
+  const Layout at = layout_of(curves, look);
+  const double left = at.left, right = at.right, top = at.top, bottom = at.bottom;
 
   std::string svg = fmt::format(
       "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n"
@@ -108,15 +146,13 @@ std::string plot_svg(const std::vector<Curve>& curves, const PlotLook& look) {
   };
 
   if (!look.title.empty()) text(left, 30, "start", " font-size=\"17\" font-weight=\"bold\"", look.title);
-  const double x_step = x_ticks[1] - x_ticks[0], y_step = y_ticks[1] - y_ticks[0];
-  for (const double tick : y_ticks) {
-    line(left, py(tick), right, py(tick),
-         std::abs(tick) < 1e-9 * y_step ? "stroke=\"#999\"" : "stroke=\"#e4e6e8\"");
-    text(left - 8, py(tick) + 4.5, "end", "", tick_label(tick, y_step));
+  for (const double tick : at.y_ticks) {
+    line(left, at.py(tick), right, at.py(tick), at.is_zero(tick) ? "stroke=\"#999\"" : "stroke=\"#e4e6e8\"");
+    text(left - 8, at.py(tick) + 4.5, "end", "", tick_label(tick, at.y_step()));
   }
-  for (const double tick : x_ticks) {
-    line(px(tick), bottom, px(tick), bottom + 5, "stroke=\"#999\"");
-    text(px(tick), bottom + 20, "middle", "", tick_label(tick, x_step));
+  for (const double tick : at.x_ticks) {
+    line(at.px(tick), bottom, at.px(tick), bottom + 5, "stroke=\"#999\"");
+    text(at.px(tick), bottom + 20, "middle", "", tick_label(tick, at.x_step()));
   }
   line(left, bottom, right, bottom, "stroke=\"#999\"");
   line(left, top, left, bottom, "stroke=\"#999\"");
@@ -124,15 +160,16 @@ std::string plot_svg(const std::vector<Curve>& curves, const PlotLook& look) {
   text(0, 0, "middle", fmt::format(" transform=\"translate(20 {:.1f}) rotate(-90)\"", 0.5 * (top + bottom)),
        look.y_label);
   for (const double limit : look.limits)
-    if (y_ticks.front() <= limit && limit <= y_ticks.back())
-      line(left, py(limit), right, py(limit), "stroke=\"#b55\" stroke-dasharray=\"6 5\"");
+    if (at.shows(limit))
+      line(left, at.py(limit), right, at.py(limit), "stroke=\"#b55\" stroke-dasharray=\"6 5\"");
 
   for (const Curve& curve : curves) {
     std::string path;
     bool pen_down = false;
     for (std::size_t i = 0; i < curve.x.size(); ++i) {
       const bool known = std::isfinite(curve.x[i]) && std::isfinite(curve.y[i]);
-      if (known) path += fmt::format("{}{:.2f} {:.2f}", pen_down ? "L" : "M", px(curve.x[i]), py(curve.y[i]));
+      if (known)
+        path += fmt::format("{}{:.2f} {:.2f}", pen_down ? "L" : "M", at.px(curve.x[i]), at.py(curve.y[i]));
       pen_down = known;
     }
     if (!path.empty())
@@ -152,6 +189,54 @@ std::string plot_svg(const std::vector<Curve>& curves, const PlotLook& look) {
     at_x += width;
   }
   return svg + "</svg>\n";
+}
+
+Image8 plot_image(const std::vector<Curve>& curves, const PlotLook& look) {
+  const Layout at = layout_of(curves, look);
+  const Vec3 ink = Vec3::Constant(0.2), axis = Vec3::Constant(0.6), grid = Vec3::Constant(0.9),
+             red(0.7, 0.33, 0.33);
+  constexpr double letter = 8;  // height and width of a capital
+  Image8 image = filled(look.width_px, look.height_px, Vec3::Ones());
+  const auto text = [&](double x, double y, double share_left, const std::string& words, double size) {
+    std::string ascii;
+    for (std::size_t i = 0; i < words.size(); ++i) {  // the alphabet has no other letters; a minus is one
+      if (words.compare(i, 3, "−") == 0)
+        ascii += '-', i += 2;
+      else
+        ascii += words[i];
+    }
+    detail::draw_text(image, ascii, x - share_left * size * double(ascii.size()), y, size, ink);
+  };
+  text(at.left, 22, 0, look.title, 1.4 * letter);
+  for (const double tick : at.y_ticks) {
+    draw_line(image, at.left, at.py(tick), at.right, at.py(tick), 1, at.is_zero(tick) ? axis : grid);
+    text(at.left - 8, at.py(tick) + 4, 1, tick_label(tick, at.y_step()), letter);
+  }
+  for (const double tick : at.x_ticks) {
+    draw_line(image, at.px(tick), at.bottom, at.px(tick), at.bottom + 5, 1, axis);
+    text(at.px(tick), at.bottom + 20, 0.5, tick_label(tick, at.x_step()), letter);
+  }
+  draw_line(image, at.left, at.bottom, at.right, at.bottom, 1, axis);
+  draw_line(image, at.left, at.top, at.left, at.bottom, 1, axis);
+  text(0.5 * (at.left + at.right), at.bottom + 42, 0.5, look.x_label, letter);
+  text(4, at.top - 13, 0, look.y_label, letter);
+  for (const double limit : look.limits)
+    for (double x = at.left; at.shows(limit) && x < at.right; x += 11)
+      draw_line(image, x, at.py(limit), std::min(x + 6, at.right), at.py(limit), 1, red);
+  double at_x = at.left, at_y = look.height_px - 28.0;
+  for (const Curve& curve : curves) {
+    for (std::size_t i = 1; i < curve.x.size(); ++i) {
+      const double y1 = curve.y[i - 1], y2 = curve.y[i];
+      if (std::isfinite(y1) && std::isfinite(y2))
+        draw_line(image, at.px(curve.x[i - 1]), at.py(y1), at.px(curve.x[i]), at.py(y2), 2, curve.color_srgb);
+    }
+    const double width = 44 + letter * double(curve.name.size());
+    if (at_x + width > at.right && at_x > at.left) at_x = at.left, at_y += 18;
+    draw_line(image, at_x, at_y - 4, at_x + 20, at_y - 4, 4, curve.color_srgb);
+    text(at_x + 27, at_y, 0, curve.name, letter);
+    at_x += width;
+  }
+  return image;
 }
 
 }  // namespace limber::render

@@ -1,10 +1,11 @@
-// Line plots as SVG text: the paper's volume change over time, a line a body.
+// Line plots as SVG text or pixels: the paper's volume change over time, a line a body.
 #pragma once
 
 #include <string>
 #include <vector>
 
 #include "core/types.h"
+#include "render/image.h"
 
 namespace limber::render {
 
@@ -21,6 +22,9 @@ struct PlotLook {
 };
 // A whole SVG document; valid XML, no external fonts or styles. Same input, same bytes.
 std::string plot_svg(const std::vector<Curve>&, const PlotLook&);
+
+// The same as pixels, in the letters of annotate.h, the y axis' words above it.
+Image8 plot_image(const std::vector<Curve>&, const PlotLook&);
 
 // Round numbers (1, 2 or 5 times a power of ten apart), about `count` of them, that cover low … high from
 // outside.

@@ -12,7 +12,7 @@ namespace limber::scenes {
 
 SurfaceMesh make_heart() {
   const std::array parts = {
-      Ellipsoid{{0.02, 0.02, -0.05}, {0.40, 0.38, 0.42}, 0, 25, 0.1},    // ventricles, the tip to the left
+      Ellipsoid{{0.02, 0.02, -0.05}, {0.40, 0.44, 0.42}, 0, 25, 0.1},    // ventricles, the tip to the left
       Ellipsoid{{0.12, 0.26, -0.22}, {0.26, 0.26, 0.22}, 0, 25, 0.12},   // the tip
       Ellipsoid{{-0.16, 0.14, 0.24}, {0.26, 0.28, 0.20}, 0, 0, 0.1},     // left atrium
       Ellipsoid{{-0.02, -0.26, 0.14}, {0.26, 0.24, 0.26}, 0, 0, 0.1},    // right atrium
@@ -28,6 +28,8 @@ SurfaceMesh make_lung(double side) {  // 1: the left one
       Ellipsoid{{-0.05, side * 0.02, -0.18}, {0.36, 0.22, 0.32}, 0, 0, 0.05},
       Ellipsoid{{0.10, side * 0.04, -0.28}, {0.28, 0.18, 0.20}, 0, 0, 0.12},
       Ellipsoid{{-0.06, side * 0.01, 0.18}, {0.27, 0.19, 0.32}, 0, 0, 0.15},
+      Ellipsoid{
+          {0.17, -side * 0.10, -0.05}, {0.19, 0.15, 0.28}, 0, 0, 0.1},  // the front edge, before the heart
   };
   return join(parts, Sides::one, {{-0.7, -0.5, -0.75}, {0.7, 0.5, 0.75}}, 0.025);
 }

@@ -442,17 +442,36 @@ void read_bodies(const Node& root, Scene& scene) {
     complain(child(root, "bodies"), "there is no robot; give the body that is to move role = \"robot\"");
 }
 
-// The body that takes the goal along; settling in a goal that moves has no meaning.
-int read_moving_goal(const Node& node, const Scene& scene, double settle_time_s) {
+// A body other than the robot, by its name.
+int other_body(const Node& node, const Scene& scene, const std::string& key) {
   std::vector<std::string> names;
   for (const BodySpec& body : scene.bodies) names.push_back(body.name);
   const auto at = std::find(names.begin(), names.end(), as_text(node));
   if (at == names.end() || at - names.begin() == scene.robot)
-    complain(node, fmt::format("goal.moves_with is \"{}\"; it must be a body other than the robot: {}",
-                               as_text(node), fmt::join(names, ", ")));
+    complain(node, fmt::format("{} is \"{}\"; it must be a body other than the robot: {}", key, as_text(node),
+                               fmt::join(names, ", ")));
+  return int(at - names.begin());
+}
+
+Goal::Shape read_goal_shape(const Node& table) {
+  Goal::Shape shape{direction(table, "axis", "goal.shape.axis"),
+                    number(table, "angle_deg"),
+                    vector(table, "stretch"),
+                    text(table, "cage"),
+                    maybe_number(table, "turn_tolerance_deg"),
+                    maybe_number(table, "tolerance_m")};
+  if (!shape.turn_tolerance_deg && !shape.tolerance_m)
+    complain(table,
+             "goal.shape asks for nothing without a tolerance; write for example turn_tolerance_deg = 10");
+  return shape;
+}
+
+// The body that takes the goal along; settling in a goal that moves has no meaning.
+int read_moving_goal(const Node& node, const Scene& scene, double settle_time_s) {
+  const int body = other_body(node, scene, "goal.moves_with");
   if (settle_time_s > 0)
     complain(node, "the robot cannot come to rest in a goal that moves; write planner.settle_time_s = 0");
-  return int(at - names.begin());
+  return body;
 }
 
 Goal read_goal(const Node& root, const Scene& scene) {
@@ -460,7 +479,23 @@ Goal read_goal(const Node& root, const Scene& scene) {
   const Box& bounds = scene.bounds_m;
   Goal goal;
   goal.center_of_mass_m = vector(table, "center_of_mass_m");
-  goal.radius_m = number(table, "radius_m");
+  const std::optional<double> radius = maybe_number(table, "radius_m");
+  if (radius.has_value() == (table.find("box_m") != nullptr))
+    complain(table, "the goal needs either radius_m or box_m; write for example radius_m = 0.5");
+  if (radius) goal.radius_m = *radius;
+  if (table.find("box_m")) {
+    goal.box_m = box(table, "box_m");
+    const Vec3 reach =
+        (goal.box_m->upper - goal.center_of_mass_m).cwiseMax(goal.center_of_mass_m - goal.box_m->lower);
+    goal.radius_m = reach.norm();
+    if ((goal.center_of_mass_m.array() < goal.box_m->lower.array()).any() ||
+        (goal.center_of_mass_m.array() > goal.box_m->upper.array()).any())
+      complain(child(table, "box_m"), "goal.center_of_mass_m is not in goal.box_m; move one of them");
+  }
+  for (const auto& [key, index] :
+       {std::pair("above", &goal.above), {"below", &goal.below}, {"clear_of", &goal.clear_of}})
+    if (const Node* body = table.find(key)) *index = other_body(*body, scene, fmt::format("goal.{}", key));
+  if (const Node* shape = table.find("shape")) goal.shape = read_goal_shape(*shape);
   goal.lost_below_m = maybe_number(table, "lost_below_m");
   if (const Node* body = table.find("moves_with"))
     goal.moves_with = read_moving_goal(*body, scene, number(child(root, "planner"), "settle_time_s"));
@@ -500,6 +535,24 @@ PlannerSpec read_planner(const Node& table) {
   planner.settle_time_s = number(table, "settle_time_s");
   planner.settle_speed_m_s = number(table, "settle_speed_m_s");
   planner.settle_force_share = number(table, "settle_force_share");
+  planner.lag = integer(table, "lag");
+  planner.metric = text(table, "metric");
+  planner.time_weight = number(table, "time_weight");
+  planner.guidance = number(table, "guidance");
+  planner.soft_price = number(table, "soft_price");
+  planner.look_s = number(table, "look_s");
+  planner.learn_prices = flag(table, "learn_prices");
+  planner.steer = flag(table, "steer");
+  planner.stop_in_goal = flag(table, "stop_in_goal");
+  planner.hold = flag(table, "hold");
+  planner.end_hopeless = flag(table, "end_hopeless");
+  if (planner.guidance > 0 && planner.lag == 0)
+    complain(child(table, "guidance"),
+             "guidance needs planner.lag of at least 1; write lag = 31, or guidance = 0");
+  if (planner.look_s == 0 && (planner.stop_in_goal || planner.end_hopeless))
+    complain(child(table, planner.stop_in_goal ? "stop_in_goal" : "end_hopeless"),
+             "stop_in_goal and end_hopeless need pushes that are looked at; write planner.look_s = 0.1");
+  planner.shortcut_rounds = integer(table, "shortcut_rounds");
   return planner;
 }
 

@@ -115,8 +115,19 @@ struct Goal {
   Vec3 center_of_mass_m = Vec3::Zero();
   int moves_with = -1;  // index of the body whose centre of mass takes the goal along; −1: none
   std::optional<double>
-      lost_below_m;  // the goal is lost once the lowest node of that body is below this height
-  double radius_m = 0;
+      lost_below_m;     // the goal is lost once the lowest node of that body is below this height
+  double radius_m = 0;  // of a ball that holds box_m, when that is given
+  std::optional<Box> box_m;
+  // What the robot must be besides: turned so, in this shape, higher or lower than a body, not touching one.
+  struct Shape {
+    Vec3 axis = Vec3::UnitZ();
+    double angle_deg = 0;
+    Vec3 stretch = Vec3::Ones();  // of the rest shape along x, y, z, before the turn
+    std::string cage;             // or a .msh file with the robot's cage as it shall be; empty: none
+    std::optional<double> turn_tolerance_deg, tolerance_m;
+  };
+  std::optional<Shape> shape;
+  int above = -1, below = -1, clear_of = -1;  // indices of bodies; −1: none
 };
 
 struct PlannerSpec {
@@ -133,6 +144,13 @@ struct PlannerSpec {
   double settle_time_s = 0;       // the robot gets at most so long to come to rest at the goal,
   double settle_speed_m_s = 0;    // which it does when its mean speed is below this
   double settle_force_share = 0;  // of max_force_n: the largest force of the settle
+  // What the preset `fast` adds; plan/settings.h and docs/planning.md say what they do.
+  int lag = 0;
+  std::string metric;  // "distance" or "time_to_go"
+  double time_weight = 0, guidance = 0, soft_price = 0, look_s = 0;
+  bool learn_prices = false, steer = false, stop_in_goal = false, hold = false, end_hopeless = false;
+
+  int shortcut_rounds = 0;  // of sixteen changes to the path that was found
 };
 
 struct Keyframe {

@@ -10,7 +10,11 @@ namespace limber::fem::detail {
 namespace {
 
 // Share of a distance that movement may use up, and of the reach, by which less; the rest is for rounding.
-constexpr float kept = 0.9f, rounding = 0.02f;
+// And what is farther than this share of the reach is apart, however it is computed.
+constexpr float kept = 0.9f, rounding = 0.02f, certain = 0.004f;
+
+// The sides of a box that a node is beyond are bits; a place that is not finite, of a rollout that blows up:
+constexpr unsigned char lost = 64;
 
 template <class Real>
 Real dot(const Real a[3], const Real b[3]) {
@@ -114,18 +118,6 @@ bool meets(const Real* p, const Real* q, const Real lower[3], const Real upper[3
   return meet;
 }
 
-// The box of a body.
-template <class Real>
-struct Span {
-  Real lower[3], upper[3];
-  Span(const LaneView<Real>& view, int body) {
-    for (int c = 0; c < 3; ++c) {
-      lower[c] = view.lower[(3 * body + c) * view.stride];
-      upper[c] = view.upper[(3 * body + c) * view.stride];
-    }
-  }
-};
-
 }  // namespace
 
 // A tet where it is now.
@@ -166,7 +158,8 @@ Contacts<Real>::Contacts(const World& world, const Kernels<Real>& kernels, int l
     if (body.kind == BodyKind::rigid) bearings_.resize(world.bodies.size());
   lists_.resize(std::size_t(lanes) * pairs_.size());
   packed_.resize(std::size_t(world.nodes));
-  listed_.assign(std::size_t(world.nodes), false);
+  sides_.resize(std::size_t(world.nodes));
+  listed_.assign(std::size_t(world.nodes), 0);
   touch_of_node_.assign(std::size_t(world.nodes), -1);
 }
 
@@ -227,7 +220,9 @@ const std::vector<Touch<Real>>& Contacts<Real>::find(int lane, const LaneView<Re
   const Real travel = view.travel[a * view.stride] + view.travel[b * view.stride];
   refresh(view, a, b, reach, travel, list);
   for (int node : list.nodes) fetch(view, node, packed_[node].at);
-  find_touches(view, b, travel, list.points[0]);
+  const Span<Real> box_a(view, a), box_b(view, b);
+  find_points(box_b, reach, travel, list.points[0]);
+  find_edges(box_b, reach, travel, a == b, list.edges[0]);
   if (a == b) {
     for (Touch<Real>& touch : touches_) {
       touch_of_node_[topology_.points[touch.point].node[0]] = -1;
@@ -235,10 +230,9 @@ const std::vector<Touch<Real>>& Contacts<Real>::find(int lane, const LaneView<Re
     }
     return touches_;
   }
-  find_passing_edges(view, b, reach, travel, list.edges[0]);
   const std::size_t second = touches_.size();
-  find_touches(view, a, travel, list.points[1]);
-  find_passing_edges(view, a, reach, travel, list.edges[1]);
+  find_points(box_a, reach, travel, list.points[1]);
+  find_edges(box_a, reach, travel, false, list.edges[1]);
   measure_depths(view, a, b, 0, second);
   measure_depths(view, b, a, second, touches_.size());
   return touches_;
@@ -254,43 +248,81 @@ void Contacts<Real>::refresh(const LaneView<Real>& view, int a, int b, Real reac
   list.nodes.clear();
   build_direction(view, a, b, reach, list, 0);
   if (a != b) build_direction(view, b, a, reach, list, 1);
-  for (int node : list.nodes) listed_[node] = false;
+  for (int node : list.nodes) listed_[node] = 0;
 }
 
-// Tet by tet, the points and edges that slabs find in its box; then by point, which keeps the tets of each
+// Tet by tet, the points and ridges that slabs find in its box; then by point, which keeps the tets of each
 // ascending.
 template <class Real>
 void Contacts<Real>::build_direction(const LaneView<Real>& view, int from, int into, Real reach, List& list,
                                      int direction) {
-  const Topology::Body &body = topology_.bodies[from], &other = topology_.bodies[into];
-  const int points = body.last_point - body.first_point;
-  for (int n = body.first_node; n < body.last_node; ++n) fetch(view, n, packed_[n].at);
-  first_point_ = body.first_point;
-  slabs_[0].edges = false, slabs_[1].edges = true;
-  near_tet_.resize(std::size_t(points));
-  const bool any_points = sort_near(view, from, into, reach, slabs_[0]),
-             any_edges = from != into && sort_near(view, from, into, reach, slabs_[1]);
-  if (from == into) slabs_[1].point.clear(), slabs_[1].found.clear();
+  const Topology::Body& other = topology_.bodies[into];
+  const Span<Real> box(view, into);
+  fetch_and_mark(view, from, box.lower, box.upper, reach);
+  Slabs &points = slabs_[0], &edges = slabs_[1];
+  const bool any_points = sort_near(from, false, reach, points),
+             any_edges = sort_near(from, true, reach, edges);
   if (any_points || any_edges) {
-    for (int n = other.first_node; n < other.last_node; ++n) fetch(view, n, packed_[n].at);
-    for (int t = other.first_tet; t < other.last_tet; ++t) collect_near(t, reach);
+    Real lower[3], upper[3];
+    for (int c = 0; c < 3; ++c) {
+      lower[c] = std::min(points.lower[c], edges.lower[c]);
+      upper[c] = std::max(points.upper[c], edges.upper[c]);
+    }
+    fetch_and_mark(view, into, lower, upper, reach);
+    near_tets_.clear();
+    for (int t = other.first_tet; t < other.last_tet; ++t) {
+      const int* n = topology_.tets[t].node;
+      const int all = sides_[n[0]] & sides_[n[1]] & sides_[n[2]] & sides_[n[3]];
+      if (all == 0) near_tets_.push_back({{n[0], n[1], n[2], n[3]}, -1, -1, t, -1});
+    }
+    planes_.resize((near_tets_.size() + block_size - 1) / block_size);
+    kernels_.find_planes(near_tets_.data(), int(near_tets_.size()), packed_[0].at, reach, planes_.data());
+    for (std::size_t k = 0; k < near_tets_.size(); ++k)
+      collect_near(near_tets_[k], planes_[k / block_size], int(k % block_size), reach);
   }
-  if (from == into)
-    std::erase_if(slabs_[0].found,
-                  [&](const Found& f) { return !may_touch(from, first_point_ + f.point, f.tet); });
-  list_found(slabs_[0], points, reach, list, list.points[direction]);
-  list_found(slabs_[1], points, reach, list, list.edges[direction]);
+  edges.distance.resize(edges.found.size());
+  kernels_.edge_distances(edges.found.data(), nullptr, int(edges.found.size()), packed_[0].at,
+                          edges.distance.data());
+  for (Slabs& slabs : slabs_)
+    if (from == into)
+      for (std::size_t i = 0; i < slabs.found.size(); ++i)
+        if (!may_touch(slabs.found[i], from)) slabs.distance[i] = 2 * reach;
+  list_found(points, from, reach, list, list.points[direction]);
+  list_found(edges, from, reach, list, list.edges[direction]);
 }
 
-// Whether point and tet of one body are no neighbours: no node of the tet shares a tet with a node of the
-// point.
+// Copies the body's nodes to packed_, and finds the sides of a box, moved out by `reach`, that they are
+// beyond.
 template <class Real>
-bool Contacts<Real>::may_touch(int index, int point, int tet) const {
+void Contacts<Real>::fetch_and_mark(const LaneView<Real>& view, int index, const Real lower[3],
+                                    const Real upper[3], Real reach) {
+  const Topology::Body& body = topology_.bodies[index];
+  for (int n = body.first_node; n < body.last_node; ++n) {
+    Real* at = packed_[n].at;
+    fetch(view, n, at);
+    int sides = std::isfinite(at[0] + at[1] + at[2]) ? 0 : lost;
+    for (int c = 0; c < 3; ++c)
+      sides |= int(at[c] < lower[c] - reach) << c | int(at[c] > upper[c] + reach) << (3 + c);
+    sides_[n] = (unsigned char)sides;
+  }
+}
+
+// Whether the box of two nodes is apart from the box they were marked by, or lost.
+template <class Real>
+bool Contacts<Real>::apart(int node, int other) const {
+  return ((sides_[node] & sides_[other]) | ((sides_[node] | sides_[other]) & lost)) != 0;
+}
+
+// Whether a tet and an edge, or vertex, of one body are no neighbours: no node of one shares a tet with a
+// node of the other.
+template <class Real>
+bool Contacts<Real>::may_touch(const TetAndEdge& one, int index) const {
   const Topology::Body& body = topology_.bodies[index];
   const Lists& near = body.self.near_tets;
-  for (const int node : topology_.points[point].node) {
+  for (const int node : {one.from, one.to}) {
     const int k = node - body.first_node;
-    if (std::binary_search(near.items.begin() + near.begin[k], near.items.begin() + near.begin[k + 1], tet))
+    if (std::binary_search(near.items.begin() + near.begin[k], near.items.begin() + near.begin[k + 1],
+                           one.tet))
       return false;
   }
   return true;
@@ -344,63 +376,49 @@ void Contacts<Real>::leave_nearest_face(const LaneView<Real>& view, int index, T
   }
 }
 
-template <class Real>
-void Contacts<Real>::fall_asleep(Record& record, const Near& near) {
-  record.asleep_until = near.candidates[record.begin].asleep_until;
-  for (int k = record.begin + 1; k < record.end; ++k)
-    record.asleep_until = std::min(record.asleep_until, near.candidates[k].asleep_until);
-}
-
 // Counting sort by point.
 template <class Real>
-void Contacts<Real>::list_found(Slabs& slabs, int points, Real reach, List& list, Near& near) {
-  near.records.clear();
-  near.candidates.resize(slabs.found.size());
-  counts_.assign(std::size_t(points + 1), 0);
-  for (const Found& f : slabs.found) ++counts_[f.point + 1];
-  for (int k = 0; k < points; ++k) {
-    counts_[k + 1] += counts_[k];
-    if (counts_[k] < counts_[k + 1])
-      near.records.push_back({first_point_ + k, counts_[k], counts_[k + 1], 0});
+void Contacts<Real>::list_found(const Slabs& slabs, int from, Real reach, List& list, Near& near) {
+  const Topology::Body& body = topology_.bodies[from];
+  counts_.assign(std::size_t(body.last_point - body.first_point + 1), 0);
+  for (std::size_t i = 0; i < slabs.found.size(); ++i)
+    counts_[slabs.found[i].point - body.first_point + 1] += slabs.distance[i] <= reach;
+  for (std::size_t k = 1; k < counts_.size(); ++k) counts_[k] += counts_[k - 1];
+  near.candidates.resize(std::size_t(counts_.back()));
+  near.asleep_until.resize(near.candidates.size() + block_size);
+  for (std::size_t i = 0; i < slabs.found.size(); ++i) {
+    const TetAndEdge& found = slabs.found[i];
+    if (!(slabs.distance[i] <= reach)) continue;
+    const int k = counts_[found.point - body.first_point]++;
+    near.candidates[k] = found;
+    near.asleep_until[k] = list.travel_at_build + kept * slabs.distance[i] - rounding * reach;
+    for (const int n :
+         {found.from, found.to, found.corner[0], found.corner[1], found.corner[2], found.corner[3]})
+      if (listed_[n] == 0) listed_[n] = 1, list.nodes.push_back(n);
   }
-  for (const Found& f : slabs.found)
-    near.candidates[counts_[f.point]++] = {f.tet, f.face,
-                                           list.travel_at_build + kept * f.distance - rounding * reach};
-  for (Record& record : near.records) fall_asleep(record, near);
-
-  const auto name = [&](const int* node, int count) {
-    for (int i = 0; i < count; ++i)
-      if (!listed_[node[i]]) listed_[node[i]] = true, list.nodes.push_back(node[i]);
-  };
-  for (const Record& r : near.records) name(topology_.points[r.point].node, 2);
-  for (const Candidate& k : near.candidates) name(topology_.tets[k.tet].node, 4);
 }
 
-// Puts the points, or edges, of a body that are near the other's box into slabs; false when there are none.
+// Puts the points, or ridges, of a body that are near the box its nodes were marked by into slabs; false
+// when there are none.
 template <class Real>
-bool Contacts<Real>::sort_near(const LaneView<Real>& view, int from, int into, Real reach, Slabs& slabs) {
+bool Contacts<Real>::sort_near(int from, bool edges, Real reach, Slabs& slabs) {
   const Topology::Body& body = topology_.bodies[from];
-  const int points = body.last_point - body.first_point;
-  Real lower[3], upper[3];
-  for (int c = 0; c < 3; ++c) {
-    lower[c] = view.lower[(3 * into + c) * view.stride] - reach;
-    upper[c] = view.upper[(3 * into + c) * view.stride] + reach;
+  for (int c = 0; c < 3; ++c)
     slabs.lower[c] = std::numeric_limits<Real>::max(), slabs.upper[c] = -slabs.lower[c];
-  }
-  slabs.found.clear();
+  slabs.found.clear(), slabs.distance.clear();
   near_.clear(), slabs.point.clear();
   for (auto* at : {slabs.from, slabs.to})
     for (int c = 0; c < 3; ++c) at[c].clear();
-  for (int k = slabs.edges ? int(body.surface_nodes.size()) : 0; k < points; ++k) {
-    const Topology::Point& point = topology_.points[first_point_ + k];
-    Real p[3], q[3];
-    const Real share[2] = {Real(point.share[0]), Real(point.share[1])};
-    place_of(first_point_ + k, share, p);
-    std::copy_n(p, 3, q);
-    if (slabs.edges)
-      std::copy_n(packed_[point.node[0]].at, 3, p), std::copy_n(packed_[point.node[1]].at, 3, q);
-    if (!meets(p, q, lower, upper)) continue;
+  for (int k = edges ? body.first_ridge : body.first_point; k < (edges ? body.last_point : body.first_ridge);
+       ++k) {
+    const Topology::Point& point = topology_.points[k];
+    if (apart(point.node[0], point.node[1])) continue;
     near_.push_back(k);
+    const Real share[2] = {Real(point.share[0]), Real(point.share[1])};
+    Real middle[3];
+    place_of(k, share, middle);
+    const Real *p = edges ? packed_[point.node[0]].at : middle,
+               *q = edges ? packed_[point.node[1]].at : middle;
     for (int c = 0; c < 3; ++c) {
       slabs.from[c].push_back(p[c]), slabs.to[c].push_back(q[c]);
       slabs.lower[c] = std::min(slabs.lower[c], std::min(p[c], q[c]));
@@ -446,131 +464,122 @@ bool Contacts<Real>::sort_near(const LaneView<Real>& view, int from, int into, R
 // What is in the tet now was within `reach` of it at build, so it was in its box and not wholly on the outer
 // side of one of its planes, all moved out by `reach`.
 template <class Real>
-void Contacts<Real>::collect_near(int t, Real reach) {
-  const int* node = topology_.tets[t].node;
-  const Real* const place[4] = {packed_[node[0]].at, packed_[node[1]].at, packed_[node[2]].at,
-                                packed_[node[3]].at};
-  TetPlanes<Real> planes;
-  for (int c = 0; c < 3; ++c) {
-    planes.lower[c] =
-        std::min(std::min(place[0][c], place[1][c]), std::min(place[2][c], place[3][c])) - reach;
-    planes.upper[c] =
-        std::max(std::max(place[0][c], place[1][c]), std::max(place[2][c], place[3][c])) + reach;
-  }
-  int first[2] = {0, 0}, last[2] = {0, 0};
-  for (int s = 0; s < 2; ++s) {
-    const Slabs& slabs = slabs_[s];
-    bool meet = !slabs.point.empty();
-    for (int c = 0; c < 3; ++c)
-      meet &= planes.lower[c] <= slabs.upper[c] && planes.upper[c] >= slabs.lower[c];
-    if (!meet) continue;
-    first[s] = slabs.begin[slabs.of(planes.lower[slabs.axis] - slabs.half)];
-    last[s] = slabs.begin[slabs.of(planes.upper[slabs.axis] + slabs.half) + 1];
-  }
-  if (first[0] == last[0] && first[1] == last[1]) return;
-  face_normals(place, planes.normal);
-  Real volume6 = 0;
-  for (int c = 0; c < 3; ++c) volume6 += planes.normal[1][c] * (place[1][c] - place[0][c]);
-  for (int i = 0; i < 4; ++i) {
-    const Real length2 = dot(planes.normal[i], planes.normal[i]);
-    // A flat tet has no planes to speak of: its box alone decides. An inverted one may have turned back by
-    // then.
-    const bool flat = volume6 * volume6 <= Real(1e-4) * length2 * reach * reach;
-    const Real scale = flat ? Real(0) : (volume6 < 0 ? Real(1) : Real(-1)) / std::sqrt(length2);
-    for (Real& n : planes.normal[i]) n *= scale;
-    planes.offset[i] = dot(planes.normal[i], place[(i + 1) % 4]);
-  }
+void Contacts<Real>::collect_near(const TetAndEdge& tet, const TetPlanes<Real>& planes, int column,
+                                  Real reach) {
   for (int s = 0; s < 2; ++s) {
     Slabs& slabs = slabs_[s];
-    const int begin = first[s], count = last[s] - begin;
-    if (count == 0) continue;
+    bool meet = !slabs.point.empty();
+    for (int c = 0; c < 3; ++c)
+      meet &= planes.lower[c][column] <= slabs.upper[c] && planes.upper[c][column] >= slabs.lower[c];
+    if (!meet) continue;
+    const int begin = slabs.begin[slabs.of(planes.lower[slabs.axis][column] - slabs.half)];
+    const int count = slabs.begin[slabs.of(planes.upper[slabs.axis][column] + slabs.half) + 1] - begin;
     const Real* const from[3] = {&slabs.from[0][begin], &slabs.from[1][begin], &slabs.from[2][begin]};
     const Real* const to[3] = {&slabs.to[0][begin], &slabs.to[1][begin], &slabs.to[2][begin]};
-    const int near = (slabs.edges ? kernels_.near_segments : kernels_.near_points)(planes, from, to, count,
-                                                                                   reach, near_tet_.data());
-    for (int i = 0; i < near; ++i)
-      slabs.found.push_back(
-          {slabs.point[begin + near_tet_[i].item], t, near_tet_[i].face, near_tet_[i].distance});
-  }
-}
-
-// The first tet that contains the point, in ascending order, has it: a point on a shared face has one owner.
-// Middles count where an end is inside; an edge with neither passes through, if at all.
-template <class Real>
-void Contacts<Real>::find_touches(const LaneView<Real>& view, int into, Real travel, Near& near) {
-  const Span<Real> box(view, into);
-  for (const Record& record : near.records) {
-    if (record.asleep_until > travel) continue;
-    const Topology::Point& point = topology_.points[record.point];
-    const bool vertex = point.node[0] == point.node[1];
-    if (!vertex && touch_of_node_[point.node[0]] < 0 && touch_of_node_[point.node[1]] < 0) continue;
-    Touch<Real> touch{record.point, -1,   {Real(point.share[0]), Real(point.share[1])}, {}, 0, {0, 0, 0},
-                      false,        false};
-    Real p[3];
-    place_of(record.point, touch.share, p);
-    if (!meets(p, p, box.lower, box.upper)) continue;
-    for (int k = record.begin; k < record.end; ++k) {
-      Candidate& candidate = near.candidates[k];
-      if (candidate.asleep_until > travel) continue;
-      const Topology::Tet& tet = topology_.tets[candidate.tet];
-      const auto side = [&](int i) {
-        const int* face = tet.face[i];
-        return Real(tet.sign[i]) * det_from(p, packed_[face[0]].at, packed_[face[1]].at, packed_[face[2]].at);
-      };
-      if (side(candidate.face) < 0) continue;
-      Real sum = 0;
-      bool inside = true;
-      for (int i = 0; i < 4 && inside; ++i) {
-        touch.weight[i] = side(i);
-        sum += touch.weight[i];
-        inside = touch.weight[i] >= 0;
-        if (!inside) candidate.face = i;
-      }
-      if (!inside || !(sum > 0)) continue;
-      for (Real& w : touch.weight) w /= sum;
-      touch.tet = candidate.tet;
-      if (vertex) touch_of_node_[point.node[0]] = int(touches_.size());
-      touches_.push_back(touch);
-      break;
+    near_tet_.resize(std::size_t(count));
+    const int near = (s == 1 ? kernels_.near_segments : kernels_.near_points)(planes, column, from, to, count,
+                                                                              reach, near_tet_.data());
+    for (int i = 0; i < near; ++i) {
+      TetAndEdge& found = slabs.found.emplace_back(tet);
+      found.point = slabs.point[begin + near_tet_[i].item];
+      const int* ends = topology_.points[found.point].node;
+      found.from = ends[0], found.to = ends[1];
+      if (s == 0) slabs.distance.push_back(near_tet_[i].distance);  // of edges it is measured better
     }
   }
 }
 
-// Edges with no end inside: cut by the planes of each tet, what is left of them is inside. Those that turn
-// out to be apart sleep until they can have met.
+// Fills awake_, ascending; the kernels write multiples of block_size.
 template <class Real>
-void Contacts<Real>::find_passing_edges(const LaneView<Real>& view, int into, Real reach, Real travel,
-                                        Near& near) {
-  const Span<Real> box(view, into);
-  awake_.clear(), measured_.clear();
-  for (std::size_t r = 0; r < near.records.size(); ++r) {
-    const Record& record = near.records[r];
-    if (record.asleep_until > travel) continue;
-    const int* node = topology_.points[record.point].node;
-    if (touch_of_node_[node[0]] >= 0 || touch_of_node_[node[1]] >= 0) continue;
-    if (!meets(packed_[node[0]].at, packed_[node[1]].at, box.lower, box.upper)) continue;
-    for (int k = record.begin; k < record.end; ++k) {
-      const Candidate& candidate = near.candidates[k];
-      if (candidate.asleep_until > travel) continue;
-      const int* corner = topology_.tets[candidate.tet].node;
-      measured_.push_back({{corner[0], corner[1], corner[2], corner[3]}, node[0], node[1]});
-      awake_.push_back({int(r), k});
-    }
+int Contacts<Real>::wake(const Near& near, Real travel) {
+  const std::size_t count = near.candidates.size();
+  if (awake_.size() < count + block_size) {
+    awake_.resize(count + block_size);
+    with_end_inside_.resize(awake_.size()), distance_.resize(awake_.size());
   }
-  edge_distance_.resize(measured_.size());
-  kernels_.edge_distances(measured_.data(), int(measured_.size()), packed_[0].at, edge_distance_.data());
+  return kernels_.find_at_most(near.asleep_until.data(), int(count), travel, awake_.data());
+}
+
+// The first tet that contains a point, in ascending order, has it: what is on a shared face has one owner.
+// Middles count where an end is inside.
+template <class Real>
+void Contacts<Real>::find_points(const Span<Real>& box, Real reach, Real travel, Near& near) {
+  const int awake = wake(near, travel);
+  kernels_.middle_distances(near.candidates.data(), awake_.data(), awake, packed_[0].at, distance_.data());
+  int found = -1;
+  for (int i = 0; i < awake; ++i) {
+    const TetAndEdge& one = near.candidates[awake_[i]];
+    near.asleep_until[awake_[i]] = travel + kept * distance_[i] - rounding * reach;
+    if (distance_[i] > certain * reach || one.point == found) continue;
+    const bool vertex = one.from == one.to;
+    if (!vertex && touch_of_node_[one.from] < 0 && touch_of_node_[one.to] < 0) continue;
+    if (!find_inside(box, one)) continue;
+    found = one.point;
+    if (vertex) touch_of_node_[one.from] = int(touches_.size()) - 1;
+  }
+}
+
+// A ridge with an end inside counts where its middle is in a tet; one with neither is cut by the planes of
+// each tet, and what is left of it is inside.
+template <class Real>
+void Contacts<Real>::find_edges(const Span<Real>& box, Real reach, Real travel, bool itself, Near& near) {
+  int awake = 0, with_end_inside = 0;
+  for (int i = 0, count = wake(near, travel); i < count; ++i) {
+    const int k = awake_[i];
+    const bool inside =
+        touch_of_node_[near.candidates[k].from] >= 0 || touch_of_node_[near.candidates[k].to] >= 0;
+    with_end_inside_[with_end_inside] = awake_[awake] = k;
+    with_end_inside += inside, awake += !inside;
+  }
+  kernels_.middle_distances(near.candidates.data(), with_end_inside_.data(), with_end_inside, packed_[0].at,
+                            distance_.data());
+  int found = -1;
+  for (int i = 0; i < with_end_inside; ++i) {
+    const TetAndEdge& one = near.candidates[with_end_inside_[i]];
+    if (distance_[i] > certain * reach || one.point == found || !find_inside(box, one)) continue;
+    found = one.point;
+  }
+  if (itself) return;
+  kernels_.edge_distances(near.candidates.data(), awake_.data(), awake, packed_[0].at, distance_.data());
+  int cut = 0;
+  for (int i = 0; i < awake; ++i) {
+    const int k = awake_[i];
+    near.asleep_until[k] = travel + kept * distance_[i] - rounding * reach;
+    awake_[cut] = k;
+    cut += !(distance_[i] > certain * reach);
+  }
   stretches_.clear();
-  for (std::size_t i = 0; i < awake_.size(); ++i) {
-    const auto [r, index] = awake_[i];
-    Candidate& candidate = near.candidates[index];
-    if (edge_distance_[i] > rounding * reach)
-      candidate.asleep_until = travel + kept * edge_distance_[i] - rounding * reach;
-    else
-      cut_edge(packed_[measured_[i].from].at, packed_[measured_[i].to].at, candidate.tet);
-    if (i + 1 < awake_.size() && awake_[i + 1].first == r) continue;
-    fall_asleep(near.records[r], near);
-    if (!stretches_.empty()) touch_of_stretches(near.records[r].point), stretches_.clear();
+  for (int i = 0; i < cut; ++i) {
+    const TetAndEdge& one = near.candidates[awake_[i]];
+    const Real *p = packed_[one.from].at, *q = packed_[one.to].at;
+    cut_edge(p, q, one.tet);
+    if (i + 1 < cut && near.candidates[awake_[i + 1]].point == one.point) continue;
+    if (!stretches_.empty() && meets(p, q, box.lower, box.upper)) touch_of_stretches(one.point);
+    stretches_.clear();
   }
+}
+
+// Whether the vertex, or the middle of the edge, is in the tet: then appends the touch.
+template <class Real>
+bool Contacts<Real>::find_inside(const Span<Real>& box, const TetAndEdge& one) {
+  const Topology::Point& point = topology_.points[one.point];
+  Touch<Real> touch{one.point, one.tet, {Real(point.share[0]), Real(point.share[1])}, {}, 0, {0, 0, 0},
+                    false,     false};
+  Real p[3], sum = 0;
+  place_of(one.point, touch.share, p);
+  if (!meets(p, p, box.lower, box.upper)) return false;
+  const Topology::Tet& tet = topology_.tets[one.tet];
+  for (int i = 0; i < 4; ++i) {
+    const int* face = tet.face[i];
+    touch.weight[i] =
+        Real(tet.sign[i]) * det_from(p, packed_[face[0]].at, packed_[face[1]].at, packed_[face[2]].at);
+    if (!(touch.weight[i] >= 0)) return false;
+    sum += touch.weight[i];
+  }
+  if (!(sum > 0)) return false;
+  for (Real& w : touch.weight) w /= sum;
+  touches_.push_back(touch);
+  return true;
 }
 
 // Appends the part of the edge that is in the tet to stretches_.

@@ -35,6 +35,18 @@ struct Touch {
   bool passes;        // the point is of an edge with no end inside
 };
 
+// The box of a body.
+template <class Real>
+struct Span {
+  Real lower[3], upper[3];
+  Span(const LaneView<Real>& view, int body) {
+    for (int c = 0; c < 3; ++c) {
+      lower[c] = view.lower[(3 * body + c) * view.stride];
+      upper[c] = view.upper[(3 * body + c) * view.stride];
+    }
+  }
+};
+
 // A force that a contact or a wall gave, for those who ask.
 template <class Real>
 struct Exerted {
@@ -61,19 +73,12 @@ class Contacts {
   const std::vector<Touch<Real>>& find(int lane, const LaneView<Real>& view, int a, int b);
 
  private:
-  struct Record {
-    int point, begin, end;  // candidates [begin, end)
-    Real asleep_until;      // the soonest of them
-  };
-  struct Candidate {
-    int tet;
-    int face;           // the face that refused last time, tried first: changes cost, never results
-    Real asleep_until;  // travel of the two bodies before which nothing can be in the tet
-  };
-  // Points, or edges (named by their points), and the tets of the other body near them.
+  // Points, or ridges (named by their middles' points), and the tets of the other body near them: ascending
+  // by point, then by tet.
   struct Near {
-    std::vector<Record> records;
-    std::vector<Candidate> candidates;
+    std::vector<TetAndEdge> candidates;
+    // Travel of the two bodies before which nothing can be in the tet; filled up for the kernel.
+    std::vector<Real> asleep_until;
   };
   // Candidates of one pair in one lane, [0] a in b, [1] b in a: derived data, a superset of what can touch.
   struct List {
@@ -85,22 +90,18 @@ class Contacts {
   struct Place {
     Real at[4];
   };
-  struct Found {
-    int point;  // from first_point_
-    int tet, face;
-    Real distance;  // to the tet at least
-  };
-  // Points or edges of a body near another, in slabs along their longest axis, each in rows along the second.
+  // Points or ridges of a body near another, in slabs along their longest axis, each in rows along the
+  // second.
   struct Slabs {
     static constexpr int most = 32, rows = 8;
-    bool edges;
     int axis, count;
     Real lower[3], upper[3], inverse_width;
     Real half;  // of the edges, the largest half length along the axis
     std::vector<int> begin, point;
-    std::vector<Real> from[3], to[3];  // x, y, z of a point, or of an edge's ends; filled up for the kernel
-    std::vector<Found> found;
-    int of(Real x) const {  // never falls as x grows, so a box finds all that is in it
+    std::vector<Real> from[3], to[3];  // x, y, z of an edge's ends; filled up for the kernel
+    std::vector<TetAndEdge> found;     // ascending by tet
+    std::vector<Real> distance;        // of these, at least
+    int of(Real x) const {             // never falls as x grows, so a box finds all that is in it
       const Real slab = (x - lower[axis]) * inverse_width;
       return slab > 0 ? (slab < Real(count) ? int(slab) : count - 1) : 0;
     }
@@ -115,15 +116,18 @@ class Contacts {
 
   void place_of(int point, const Real share[2], Real out[3]) const;  // from packed_
   void refresh(const LaneView<Real>&, int a, int b, Real reach, Real travel, List&);
-  static void fall_asleep(Record&, const Near&);
-  bool may_touch(int body, int point, int tet) const;
+  bool may_touch(const TetAndEdge&, int body) const;
   void leave_nearest_face(const LaneView<Real>&, int body, Touch<Real>&) const;
   void build_direction(const LaneView<Real>&, int from, int into, Real reach, List&, int direction);
-  bool sort_near(const LaneView<Real>&, int from, int into, Real reach, Slabs&);
-  void collect_near(int tet, Real reach);
-  void list_found(Slabs&, int points, Real reach, List&, Near&);
-  void find_touches(const LaneView<Real>&, int into, Real travel, Near&);
-  void find_passing_edges(const LaneView<Real>&, int into, Real reach, Real travel, Near&);
+  void fetch_and_mark(const LaneView<Real>&, int body, const Real lower[3], const Real upper[3], Real reach);
+  bool apart(int node, int other) const;
+  bool sort_near(int from, bool edges, Real reach, Slabs&);
+  void collect_near(const TetAndEdge& tet, const TetPlanes<Real>&, int column, Real reach);
+  void list_found(const Slabs&, int from, Real reach, List&, Near&);
+  int wake(const Near&, Real travel);
+  void find_points(const Span<Real>& box, Real reach, Real travel, Near&);
+  void find_edges(const Span<Real>& box, Real reach, Real travel, bool itself, Near&);
+  bool find_inside(const Span<Real>& box, const TetAndEdge&);
   void cut_edge(const Real* p, const Real* q, int tet);
   void touch_of_stretches(int point);
   bool leave_over_ridge(const Stretch& first, const Stretch& last, const Real way[3], Touch<Real>&) const;
@@ -160,20 +164,21 @@ class Contacts {
   std::vector<Place> packed_;       // by world node; valid for the nodes of the list at hand
   std::vector<int> touch_of_node_;  // index into touches_ of a vertex, until depths are measured, else −1
   std::vector<Stretch> stretches_;  // of the edge at hand
-  // Scratch of find_passing_edges: point and candidate, their nodes, and how far they are apart.
-  std::vector<std::pair<int, int>> awake_;
-  std::vector<TetAndEdge> measured_;
-  std::vector<Real> edge_distance_;
+  // Of the candidates at hand: those awake, of these those with an end inside, and how far they are apart.
+  std::vector<int> awake_, with_end_inside_;
+  std::vector<Real> distance_;
   // Scratch of a touch: the mesh edges' other ends, and where ways to them leave the tet.
   std::vector<Real> ends_[3], share_;
   std::vector<int> exit_;
   // Scratch of a list's building.
-  int first_point_ = 0;
   std::vector<int> near_, order_, counts_;
   std::vector<Real> unsorted_;
-  Slabs slabs_[2];  // points, edges
+  Slabs slabs_[2];                     // vertices, edges
+  std::vector<TetAndEdge> near_tets_;  // their edges are not told
+  std::vector<TetPlanes<Real>> planes_;
   std::vector<NearTet<Real>> near_tet_;
-  std::vector<bool> listed_;  // by world node
+  std::vector<unsigned char> sides_;   // by world node: of the faces of a box, those it is beyond
+  std::vector<unsigned char> listed_;  // by world node
 };
 
 template <class Real>

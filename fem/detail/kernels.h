@@ -113,23 +113,25 @@ struct RigidMotion {
   RigidBody body;
 };
 
-// A tet for finding points near it.
+// Tets in columns, for finding points near them.
 template <class Real>
-struct TetPlanes {
-  Real lower[3], upper[3];       // a box
-  Real normal[4][3], offset[4];  // outward unit normals and places of the faces' planes; all 0 of a flat tet
+struct alignas(64) TetPlanes {
+  Real lower[3][block_size], upper[3][block_size];  // boxes
+  // Outward unit normals and places of the faces' planes, at most 0.2 % too short; all 0 of a flat tet.
+  Real normal[4][3][block_size], offset[4][block_size];
 };
 
 // What was found near it.
 template <class Real>
 struct NearTet {
   int item;       // of the points or segments
-  int face;       // the one it is farthest outside of
   Real distance;  // to the tet at least
 };
 
+// A tet and an edge of another body, or a vertex of it: then from = to.
 struct TetAndEdge {
-  int tet[4], from, to;  // nodes
+  int corner[4], from, to;  // nodes
+  int tet, point;           // of the world's
 };
 
 // A point in a tet, for finding how ways lead out of the tet.
@@ -177,15 +179,24 @@ struct Kernels {
   void (*move_rigid)(const RigidMotion<Real>&, Real* x, Real* v, Real* f);
   // Adds the forces of the wall on what is beyond it.
   void (*push_off)(const Wall<Real>&, const Real* x, const Real* v, Real* f);
-  // The points p, or segments from p to q, whose boxes meet the tet's and that are outside of its planes by
-  // `reach` at most. Reads multiples of block_size: all arrays must be that long. Returns how many are near.
-  int (*near_points)(const TetPlanes<Real>&, const Real* const p[3], const Real* const q[3], int count,
-                     Real reach, NearTet<Real>* found);
-  int (*near_segments)(const TetPlanes<Real>&, const Real* const p[3], const Real* const q[3], int count,
-                       Real reach, NearTet<Real>* found);
-  // How far each edge is outside of its tet, at least; 0 of a tet that is flat or inverted. `places` has four
-  // numbers a node.
-  void (*edge_distances)(const TetAndEdge*, int count, const Real* places, Real* distance);
+  // The planes of tets[k].corner, and their boxes moved out by `reach`.
+  void (*find_planes)(const TetAndEdge* tets, int count, const Real* places, Real reach, TetPlanes<Real>*);
+  // The points p, or segments from p to q, whose boxes meet the tet's and that are not outside of one of its
+  // planes by more than `reach`. Reads multiples of block_size: all arrays must be that long. Returns how
+  // many.
+  int (*near_points)(const TetPlanes<Real>&, int column, const Real* const p[3], const Real* const q[3],
+                     int count, Real reach, NearTet<Real>* found);
+  int (*near_segments)(const TetPlanes<Real>&, int column, const Real* const p[3], const Real* const q[3],
+                       int count, Real reach, NearTet<Real>* found);
+  // Which of the numbers are at most the bound, ascending. Reads and writes multiples of block_size. Returns
+  // how many.
+  int (*find_at_most)(const Real* numbers, int count, Real bound, int* index);
+  // How far all[index[k]] are apart at least, 0 of a tet that is flat or inverted; the middle of the edge, or
+  // all of it. A null index: all[k]. `places` has four numbers a node.
+  void (*middle_distances)(const TetAndEdge* all, const int* index, int count, const Real* places,
+                           Real* distance);
+  void (*edge_distances)(const TetAndEdge* all, const int* index, int count, const Real* places,
+                         Real* distance);
   // Through which face (−1: none) straight ways from the point to (x y z) leave the tet, and after which
   // share of the way. Multiples of block_size as above.
   void (*exits)(const WayOut<Real>&, const Real* x, const Real* y, const Real* z, int count, Real* share,

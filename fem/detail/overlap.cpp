@@ -24,6 +24,8 @@ Vec3 nearest_on_segment(const Vec3& p, const Vec3& a, const Vec3& b) {
   return a + t * (b - a);
 }
 
+}  // namespace
+
 double distance_to_triangle(const Vec3& p, const Vec3& a, const Vec3& b, const Vec3& c) {
   const Vec3 n = (b - a).cross(c - a);
   const bool above = n.squaredNorm() > 0 && n.dot((b - a).cross(p - a)) >= 0 &&
@@ -32,6 +34,8 @@ double distance_to_triangle(const Vec3& p, const Vec3& a, const Vec3& b, const V
   return std::min({(p - nearest_on_segment(p, a, b)).norm(), (p - nearest_on_segment(p, b, c)).norm(),
                    (p - nearest_on_segment(p, c, a)).norm()});
 }
+
+namespace {
 
 // The part of a body near a box.
 struct Near {

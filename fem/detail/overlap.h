@@ -12,6 +12,8 @@ struct Shape {
   const Triangles& surface;
 };
 
+double distance_to_triangle(const Vec3& p, const Vec3& a, const Vec3& b, const Vec3& c);
+
 struct Overlap {
   double depth_m = 0;  // 0: apart
   Vec3 place = Vec3::Zero();

@@ -101,6 +101,17 @@ void Stepper<Real>::load(int lane, const Real* positions, const Real* velocities
 }
 
 template <class Real>
+auto Stepper<Real>::node(int lane, int node) const -> Node {
+  Node result;
+  for (int c = 0; c < 3; ++c) {
+    const std::size_t k = std::size_t(state_layout_.at(node, c) + lane);
+    result.place[c] = double(state_[k]);
+    result.velocity[c] = double(state_[k + std::size_t(first_velocity_)]);
+  }
+  return result;
+}
+
+template <class Real>
 void Stepper<Real>::store(int lane, Real* positions, Real* velocities) const {
   for (int n = 0; n < world_.moving_nodes; ++n)
     for (int c = 0; c < 3; ++c) {
@@ -124,12 +135,19 @@ void Stepper<Real>::pull_towards_goal(int lane) {
   const Control& control = controls_[lane];
   const Body& robot = world_.bodies[world_.robot];
   const Real most = Real(control.max_force_n) / Real(robot.mass_kg);
+  const bool hold = control.manipulation == Manipulation::hold;
+  Real center[3] = {};
+  for (int n = 0; n < robot.node_count() && hold; ++n)
+    for (int c = 0; c < 3; ++c)
+      center[c] +=
+          tables_.node_mass[robot.first_node + n] / Real(robot.mass_kg) * x(lane, robot.first_node + n, c);
   for (int n = 0; n < robot.node_count(); ++n) {
     if (robot.fixed[n]) continue;
     const int node = robot.first_node + n;
     Real way[3], length2 = 0;
     for (int c = 0; c < 3; ++c) {
-      way[c] = tables_.rest_from_center[3 * n + c] + Real(control.target_m[c]) - x(lane, node, c);
+      const Real target = Real(control.target_m[c]);
+      way[c] = hold ? target - center[c] : tables_.goal_from_center[3 * n + c] + target - x(lane, node, c);
       length2 += way[c] * way[c];
     }
     // Far away, no faster than half the force can stop within the way left.
@@ -206,7 +224,9 @@ void Stepper<Real>::add_contact_forces() {
 template <class Real>
 void Stepper<Real>::find_pushes() {
   for (int lane = 0; lane < lanes_; ++lane)
-    if (controls_[lane].manipulation == Manipulation::interpolation) pull_towards_goal(lane);
+    if (const auto manipulation = controls_[lane].manipulation;
+        manipulation == Manipulation::interpolation || manipulation == Manipulation::hold)
+      pull_towards_goal(lane);
 }
 
 template <class Real>

@@ -33,6 +33,10 @@ class Stepper {
   void load(int lane, const Real* positions, const Real* velocities, const Control&, bool contact);
   void store(int lane, Real* positions, Real* velocities) const;
   void step();
+  struct Node {
+    Vec3 place, velocity;
+  };
+  Node node(int lane, int node) const;
   const Cost& cost() const { return cost_; }
 
  private:

@@ -60,7 +60,7 @@ struct Tables {
   std::vector<Real> inverse_mass;    // a world node; 0: never moves
   std::vector<Real> rest_positions;  // (3 × nodes)
   std::vector<Real>
-      rest_from_center;             // (3 × robot nodes) place in the rest shape seen from its centre of mass
+      goal_from_center;             // (3 × robot nodes) place in the goal shape seen from its centre of mass
   std::vector<Real> pair_friction;  // [body a × bodies + body b]
   std::vector<Real> skin;           // a body: share of its mean edge by which contact candidates may be old
 };
@@ -85,8 +85,9 @@ struct Topology {
     int across[4];   // the tet behind each face, −1 outside
   };
   std::vector<Tet> tets;
-  // Where a body may touch another: its surface vertices, then the middles of its surface edges. (Vertices
-  // alone miss an edge that cuts an edge: measured, up to 16 % of a coarse robot's size.)
+  // Where a body may touch another: its surface vertices, then the middles of its surface edges, at last of
+  // those that stick out, its ridges. (Vertices alone miss an edge that cuts an edge: measured, up to 16 % of
+  // a coarse robot's size.)
   struct Point {
     int node[2];                       // a vertex: twice the same
     float share[2];                    // of the two nodes: 1 and 0, or a half each
@@ -96,7 +97,7 @@ struct Topology {
   std::vector<int>
       neighbors;  // nodes that share a tet with all of a point's nodes, without the vertex itself, ascending
   struct Body {
-    int first_node, last_node, first_tet, last_tet, first_point, last_point;
+    int first_node, last_node, first_tet, last_tet, first_point, first_ridge, last_point;
     bool moving;
     std::vector<int> surface_nodes;  // world nodes, ascending
     SelfContact self;                // empty where the body does not touch itself

@@ -23,6 +23,13 @@ TEST(FrameList, LeavesOutAndCountsWhatLiesBeyondTheLastFrame) {
   EXPECT_THROW(parse_frames("10-12", 10), InputError);
 }
 
+TEST(FrameList, SeedsHaveTheSameFormAndNoEnd) {
+  EXPECT_EQ(parse_seeds("7,1-3,100-104:2"), (std::vector<int>{1, 2, 3, 7, 100, 102, 104}));
+  EXPECT_EQ(parse_seeds("2147483647"), (std::vector<int>{2147483647}));
+  for (const char* text : {"", "a", "3-1", "1-2000000", "2147483648"})
+    EXPECT_THROW(parse_seeds(text), InputError) << text;
+}
+
 TEST(FrameList, RefusesWhatItCannotRead) {
   for (const char* text : {"a", "1-", "-3", "5-3", "1-3:0", "1-3:x", "1,,2", "1 2", "99999999999999"})
     EXPECT_THROW(parse_frames(text, 100), InputError) << text;

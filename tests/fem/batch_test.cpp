@@ -13,6 +13,7 @@
 
 namespace limber::fem {
 namespace {
+using namespace testing;
 
 struct Case {
   State start;
@@ -32,7 +33,7 @@ std::vector<Case> pressed_cases(const World& world, int count) {
   for (int i = 0; i < count; ++i) {
     Control control;
     control.steps = 20 + rng.below(60);
-    control.manipulation = Manipulation(i % 4);
+    control.manipulation = Manipulation(i % 5);
     control.force_n = (800 * rng.direction()).cast<float>();
     control.node = rng.below(world.bodies[world.robot].node_count());
     control.radius_m = 0.5f;
@@ -175,6 +176,75 @@ TEST(Batch, ARolloutThatBlowsUpIsDivergedAndHarmsNobody) {
     } else {
       EXPECT_EQ(mixed[i].outcome.status, RunStatus::ok);
       EXPECT_EQ(mixed[i].end, calm[i].end);
+    }
+  }
+}
+
+// The centre of mass under hold, in the reach of its force, is a critically damped oscillator of 6 rad/s,
+// however the body is turned: d (1 + ω t) e^(−ω t). And what was turned stays turned and comes to rest, where
+// interpolation would have to turn it upright.
+TEST(Hold, StopsTheRobotAsItIsTurned) {
+  const World world = build_world(alone({"ball", cube(Vec3::Zero(), 1, 3), {}, {}, BodyKind::deformable}));
+  const State rest = rest_state(world);
+  const Vec3 start = center_of_mass_m(world, rest, 0);
+  State state = rest;
+  for (int n = 0; n < world.moving_nodes; ++n) {  // upside down
+    const Vec3f p = Vec3f(&state.positions[std::size_t(3 * n)]) - start.cast<float>();
+    const Vec3f turned = Vec3f(p.x(), -p.y(), -p.z()) + start.cast<float>();
+    std::copy(turned.begin(), turned.end(), &state.positions[std::size_t(3 * n)]);
+  }
+  Control hold;
+  hold.manipulation = Manipulation::hold;
+  const Vec3 way(0.01, -0.02, 0.005);
+  hold.target_m = (start + way).cast<float>();
+  hold.max_force_n = 1e6f;
+  for (const double t : {0.1, 0.3, 1.0}) {
+    hold.steps = int(std::lround(t / world.dt_s));
+    const double w = 6 * hold.steps * world.dt_s;
+    const State now = propagate(world, state, hold).end;
+    const Vec3 left = start + way - center_of_mass_m(world, now, 0);
+    EXPECT_LT((left - way * (1 + w) * std::exp(-w)).norm(), 0.01 * way.norm()) << t;
+  }
+  hold.steps = int(3 / world.dt_s);
+  const State end = propagate(world, state, hold).end;
+  EXPECT_LT(mean_speed_m_s(world, end, 0), 1e-4);
+  const auto up = [&](const State& s) {
+    return s.positions[std::size_t(3 * (world.moving_nodes - 1) + 2)] - s.positions[2];
+  };
+  EXPECT_NEAR(up(end), -up(rest), 1e-3);
+}
+
+// A lane that is stopped gives what a control of so many steps gives; and what it shows on its way is what
+// its state shows.
+TEST(Batch, ALaneCanBeWatchedAndStopped) {
+  const World world = build_world(barriers());
+  for (const int lanes : {1, 4, 16}) {
+    std::vector<Case> cases = pressed_cases(world, lanes);
+    Batch batch(world, lanes);
+    for (int lane = 0; lane < lanes; ++lane) {
+      cases[std::size_t(lane)].control.steps = 40 + lane;
+      batch.load(lane, cases[std::size_t(lane)].start, cases[std::size_t(lane)].control);
+    }
+    ASSERT_EQ(batch.advance(25), 25);
+    const int last = lanes - 1;
+    const Batch::Motion robot = batch.motion(last, 0), plate = batch.motion(last, 1);
+    batch.stop(last);
+    EXPECT_EQ(batch.steps_left(last), 0);
+    State stopped;
+    batch.store(last, stopped);
+    Control cut = cases[std::size_t(last)].control;
+    cut.steps = 25;
+    EXPECT_EQ(stopped, propagate(world, cases[std::size_t(last)].start, cut).end);
+    EXPECT_LT((robot.center_m - center_of_mass_m(world, stopped, 0)).norm(), 1e-12);
+    EXPECT_LT((robot.velocity_m_s - center_velocity_m_s(world, stopped, 0)).norm(), 1e-12);
+    EXPECT_LT((plate.center_m - center_of_mass_m(world, stopped, 1)).norm(), 1e-12);
+    // The others go on as if nothing had been.
+    while (batch.advance() > 0) {
+    }
+    for (int lane = 0; lane < last; ++lane) {
+      State end;
+      batch.store(lane, end);
+      ASSERT_EQ(end, propagate(world, cases[std::size_t(lane)].start, cases[std::size_t(lane)].control).end);
     }
   }
 }

@@ -134,6 +134,61 @@ TEST_F(PlanFileTest, AMissingOrReshapedEntryIsAnInputError) {
   }
 }
 
+// What docs/planning.md tells people with numpy: pieces[piece], cut to length, are the states.
+TEST_F(PlanFileTest, ThePiecesOfATreePutTogetherAreItsStates) {
+  const Plan p =
+      plan(Toy(40, true, true, 1.6f), toy_settings());  // 120 numbers: two pieces, the second part full
+  write_plan(file(), p, {});
+  const Npz npz = read_npz(file());
+  const auto piece = npz.array("tree_piece").as<std::int32_t>("piece");
+  const auto pieces = npz.array("tree_pieces").as<float>("pieces");
+  const std::size_t width = std::size_t(npz.array("end_positions").shape.at(1));
+  ASSERT_EQ(width, 120u);
+  for (std::size_t n = 0; n < std::size_t(p.tree.size()); ++n) {
+    const State state = p.tree.states[n];
+    for (std::size_t half = 0; half < 2; ++half)
+      for (std::size_t k = 0; k < width; ++k)
+        ASSERT_EQ(pieces[std::size_t(piece[(2 * n + half) * 2 + k / 96]) * 96 + k % 96],
+                  (half ? state.velocities : state.positions)[k]);
+  }
+}
+
+// Twenty bodies sleep while one moves: a file of many nodes is hardly larger than what moves.
+TEST_F(PlanFileTest, WhatSleepsIsWrittenOnce) {
+  Plan p;
+  State state{0, std::vector<float>(96 * 21, 1.5f), std::vector<float>(96 * 21, 0.f)};
+  p.tree.add(state, -1, {}, -1, Vec3f::Zero());
+  for (int n = 1; n < 1000; ++n) {
+    state.step = n, state.positions[5] = float(n);
+    p.tree.add(state, n - 1, {}, n - 1, Vec3f::Zero());
+  }
+  p.settings = toy_settings();
+  p.trajectory.end = state, p.trajectory.frames = {state};
+  write_plan(file(), p, {});
+  EXPECT_EQ(read_npz(file()).array("tree_pieces").shape.at(0), 42 + 999);  // the start's, and one a node
+  expect_same(read_plan(file()).plan, p);
+}
+
+TEST_F(PlanFileTest, AFileOfTheFormerFormatIsStillRead) {
+  const Plan p = plan(Toy(5, true, true, 1.6f), toy_settings());
+  write_plan(file(), p, {});
+  Npz former = read_npz(file());
+  former.arrays.erase("tree_piece"), former.arrays.erase("tree_pieces");
+  std::vector<float> positions, velocities;
+  for (std::size_t n = 0; n < std::size_t(p.tree.size()); ++n) {
+    const State state = p.tree.states[n];
+    positions.insert(positions.end(), state.positions.begin(), state.positions.end());
+    velocities.insert(velocities.end(), state.velocities.begin(), state.velocities.end());
+  }
+  former.arrays["tree_positions"] = NpyArray::of<float>(positions, {p.tree.size(), 15});
+  former.arrays["tree_velocities"] = NpyArray::of<float>(velocities, {p.tree.size(), 15});
+  Json meta = parse_json(former.text("meta.json"), "meta.json");
+  meta["format"] = "limber plan 1";
+  former.texts["meta.json"] = meta.dump();
+  write_npz(file("former.npz"), former);
+  expect_same(read_plan(file("former.npz")).plan, p);
+}
+
 TEST_F(PlanFileTest, AParentThatComesLaterIsAnInputError) {
   Plan p = plan(Toy(), toy_settings());
   const std::vector<int> path = path_to(p.tree, p.best_node);

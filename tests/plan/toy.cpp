@@ -9,6 +9,8 @@ namespace limber::plan::testing {
 
 namespace {
 
+constexpr float spring_per_s2 = 40;  // divided by the mass
+
 Vec3f at(const std::vector<float>& v, int node) { return Vec3f(v.data() + 3 * node); }
 void put(std::vector<float>& v, int node, const Vec3f& p) {
   std::copy(p.begin(), p.end(), v.begin() + 3 * node);
@@ -25,6 +27,41 @@ class ToyPropagator final : public Propagator {
       r.to = *r.from;
       r.ok = true;
       for (int i = 0; i < r.control.steps && r.ok; ++i) r.ok = toy_.step(r.control, r.to);
+    }
+  }
+
+  // All that the supply gives side by side, a piece of each in turn.
+  void run(Supply& supply, int look_every) override {
+    struct Running {
+      Rollout* rollout;
+      State now;
+      int steps = 0;
+    };
+    std::vector<Running> running;
+    while (true) {
+      while (Rollout* r = supply.next()) running.push_back({r, *r->from});
+      if (running.empty()) return;
+      for (std::size_t i = 0; i < running.size();) {
+        Running& mine = running[i];
+        Rollout& rollout = *mine.rollout;
+        const int steps = std::min(look_every, rollout.control.steps - mine.steps);
+        Rollout piece{&mine.now, rollout.control, {}, false};
+        piece.control.steps = steps;
+        propagate({&piece, 1});
+        mine.now = piece.to, mine.steps += steps;
+        rollout.ok = piece.ok;
+        const Look look{mine.steps, toy_.robot_center(mine.now), toy_.robot_velocity(mine.now),
+                        toy_.goal_shift(mine.now)};
+        const bool whole = !piece.ok || mine.steps == rollout.control.steps;
+        if (!whole && supply.goes_on(rollout, look)) {
+          ++i;
+          continue;
+        }
+        if (piece.ok) rollout.control.steps = mine.steps;
+        rollout.to = mine.now;
+        running.erase(running.begin() + std::ptrdiff_t(i));
+        supply.done(rollout);
+      }
     }
   }
 
@@ -46,6 +83,25 @@ Vec3 Toy::robot_center(const State& s) const {
   return sum / nodes;
 }
 
+Vec3 Toy::robot_velocity(const State& s) const {
+  Vec3 sum = Vec3::Zero();
+  for (int i = 0; i < nodes; ++i) sum += at(s.velocities, i).cast<double>();
+  return sum / nodes;
+}
+
+// The wall that stands at x = 5.
+Workspace Toy::workspace() const {
+  Workspace w;
+  w.box = sample_bounds(), w.cell_m = 0.25, w.cells = {40, 24, 8};
+  w.what.assign(std::size_t(w.cells.prod()), Workspace::open);
+  w.walls = false, w.robot_radius_m = 0.25;
+  for (int z = 0; z < 8; ++z)
+    for (int y = 0; y < 24 && wall; ++y)
+      for (const int x : {19, 20})
+        if (y < 8 || y >= 16) w.what[std::size_t((z * 24 + y) * 40 + x)] = Workspace::rigid;
+  return w;
+}
+
 double Toy::mean_speed(const State& s) const {
   double sum = 0;
   for (int i = 0; i < nodes; ++i) sum += double(at(s.velocities, i).norm());
@@ -65,10 +121,21 @@ std::uint64_t Toy::hash() const {
 
 bool Toy::acceptable(const State& s) const { return robot_center(s).z() <= double(unacceptable_above_z); }
 
+Measures Toy::measures(const State& s) const {
+  Measures m;
+  for (int i = 1; i < nodes; ++i) {
+    const Vec3f rest = rest_place(i) - rest_place(i - 1);
+    const Vec3f stretch = at(s.positions, i) - at(s.positions, i - 1) - rest;
+    m.strain_energy_j += 0.5 * double(spring_per_s2 * mass_kg * stretch.squaredNorm());
+    m.volume_change = std::max(m.volume_change, double(stretch.norm() / rest.norm()));
+  }
+  return m;
+}
+
 std::unique_ptr<Propagator> Toy::make_propagator() const { return std::make_unique<ToyPropagator>(*this); }
 
 bool Toy::step(const Control& c, State& s) const {
-  constexpr float h = 0.01f, spring_per_s2 = 40, pull_per_s2 = 9;  // divided by the mass
+  constexpr float h = 0.01f, pull_per_s2 = 9;  // divided by the mass
   const State before = s;
   for (int i = 0; i < nodes; ++i) {
     const Vec3f x = at(before.positions, i), v = at(before.velocities, i);

@@ -30,6 +30,8 @@ struct Toy final : System {
 
   State start() const override;
   Vec3 robot_center(const State&) const override;
+  Vec3 robot_velocity(const State&) const override;
+  double robot_mass_kg() const override { return double(mass_kg); }
   double mean_speed(const State&) const override;
   int robot_nodes() const override { return nodes; }
   Box sample_bounds() const override { return {Vec3(0, 0, 0), Vec3(10, 6, 2)}; }
@@ -37,6 +39,10 @@ struct Toy final : System {
   std::uint64_t hash() const override;
   bool acceptable(const State&) const override;
   Vec3 goal_shift(const State& s) const override { return goal_velocity_m_s * (double(s.step) * dt_s()); }
+  Measures measures(
+      const State&) const override;  // energy of the springs; largest relative change of one's length
+  Vec3 goal_velocity(const State&) const override { return goal_velocity_m_s; }
+  Workspace workspace() const override;
   int lanes() const override { return lanes_wanted; }
   std::unique_ptr<Propagator> make_propagator() const override;
 

@@ -47,6 +47,37 @@ TEST(Plot, PointsLieWhereTheAxesSay) {
   EXPECT_NE(svg.find(">−10<"), svg.npos);
 }
 
+// The same curve, as pixels: each of its points is of its colour, where the SVG has it, and the rest of the
+// page has none of it.
+TEST(Plot, PixelsLieWhereTheSvgHasTheCurve) {
+  const PlotLook look{"title", "time (s)", "volume change (%)", 900, 480, {-10, 10}};
+  const std::vector<Curve> curves{{"a", {1, 0, 0}, {0, 2, 5, 10}, {-3, 8, 1, 9}}};
+  const std::string svg = plot_svg(curves, look);
+  const Image8 image = plot_image(curves, look);
+  ASSERT_EQ(image.width, look.width_px);
+  ASSERT_EQ(image.height, look.height_px);
+  const auto is_red = [&](int x, int y) {
+    const std::uint8_t* p = &image.rgb[3 * (std::size_t(y) * 900 + std::size_t(x))];
+    return p[0] > 250 && p[1] < 10 && p[2] < 10;
+  };
+  const std::regex point("[ML]([0-9.]+) ([0-9.]+)");
+  const std::string path = svg.substr(svg.find("<path d="), svg.find("fill=\"none\"") - svg.find("<path d="));
+  int points = 0;
+  double low_x = 1e9, high_x = 0;
+  for (std::sregex_iterator m(path.begin(), path.end(), point), end; m != end; ++m, ++points) {
+    const double x = std::stod((*m)[1]), y = std::stod((*m)[2]);
+    low_x = std::min(low_x, x), high_x = std::max(high_x, x);
+    bool red = false;  // a curve is two pixels wide and ends in the middle of its last
+    for (int i = -2; i <= 2; ++i)
+      for (int j = -2; j <= 2; ++j) red = red || is_red(int(x) + i, int(y) + j);
+    EXPECT_TRUE(red) << x << " " << y;
+  }
+  EXPECT_EQ(points, 4);
+  for (int y = 0; y < 480 - 60; ++y)  // below is the legend
+    for (int x = 0; x < 900; ++x)
+      ASSERT_FALSE((x < low_x - 3 || x > high_x + 3) && is_red(x, y)) << x << " " << y;
+}
+
 TEST(Plot, NamesAreEscapedAndTagsAreBalanced) {
   const std::string svg = plot_svg({{"a<b & \"c\"\x01", {0, 0, 1}, {0, 1, 2, 3}, {1, NAN, 2, 3}}},
                                    {"t & t", "<x>", "y", 600, 300, {-10, 2.5}});

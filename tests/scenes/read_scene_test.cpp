@@ -215,7 +215,14 @@ TEST(ReadScene, ComplainsWithLineAndColumn) {
        "write planner.settle_time_s = 0"},
       {"radius_m = 0.25\n", "radius_m = 0.25\nlost_below_m = 1\n", "1\n[planner]",
        "goes with goal.moves_with only"},
-      {"radius_m = 0.25\n", "", "[goal]", "goal lacks \"radius_m\""},
+      {"radius_m = 0.25\n", "", "[goal]", "either radius_m or box_m"},
+      {"radius_m = 0.25\n", "radius_m = 0.25\nbox_m = [[8, 1, 1], [9, 2, 2]]\n", "[goal]",
+       "either radius_m or box_m"},
+      {"radius_m = 0.25\n", "box_m = [[8, 1, 1], [8.9, 2, 2]]\n", "[[8, 1", "is not in goal.box_m"},
+      {"radius_m = 0.25\n", "radius_m = 0.25\nabove = \"gat\"\n", "\"gat\"",
+       "a body other than the robot: robot, gate"},
+      {"radius_m = 0.25\n", "radius_m = 0.25\nshape = { angle_deg = 90 }\n", "{ angle_deg",
+       "without a tolerance"},
       {"[goal]\ncenter_of_mass_m = [9, 1.5, 1.5]\nradius_m = 0.25\n", "", "name", "add [goal]"},
       {"name = \"gate\"", "name = \"robot\"", "\"robot\"\nrole = \"obst", "two bodies are called \"robot\""},
       {"name = \"gate\"", "name = \"../gate\"", "\"../gate\"", "letters, digits"},
@@ -361,6 +368,10 @@ std::string another_value(const Key& key) {
       {"bodies[].model.up", "\"+y\""},
       {"bodies[].model.front", "\"-y\""},
       {"goal.moves_with", "\"gate\""},
+      {"goal.above", "\"gate\""},
+      {"goal.below", "\"gate\""},
+      {"goal.clear_of", "\"gate\""},
+      {"goal.box_m", "[[8.5, 1, 1], [9.5, 2, 2]]"},
       {"camera.keyframes[].at", "0.5"},
       {"camera.keyframes[].eye_m", "[0, -8, 1]"},
       {"camera.keyframes[].target_m", "[0, 0.5, 1]"},
@@ -418,7 +429,13 @@ TEST(Keys, EveryKeyChangesTheScene) {
     if (key.path == "bodies[].cage.tets" || key.path == "bodies[].cage.mode" ||
         key.path == "bodies[].cage.shells")
       sets = {tets_robot};
+    if (key.path == "planner.guidance") sets = {"planner.lag=3"};
+    if (key.path == "planner.stop_in_goal" || key.path == "planner.end_hopeless")
+      sets = {"planner.look_s=0.2"};
     if (key.path == "goal.moves_with") sets = {"planner.settle_time_s=0"};
+    if (key.path == "goal.box_m")
+      sets = {"goal={ center_of_mass_m = [9, 1.5, 1.5], box_m = [[8, 1, 1], [9.5, 2, 2]] }"};
+    if (key.parent() == "goal.shape") sets = {"goal.shape.tolerance_m=0.25"};
     if (key.path == "goal.lost_below_m") sets = {"planner.settle_time_s=0", "goal.moves_with=gate"};
     if (key.path == "bodies[].pose.axis") sets = {"bodies.robot.pose.angle_deg=90"};
     if (key.parent() == "bodies[].parts[]")
@@ -449,7 +466,10 @@ TEST(Keys, DefaultsAreInTheirRanges) {
         const std::string path(key.path);
         SCOPED_TRACE(path);
         if (path.starts_with("bodies[]") || path.find("[]") != path.npos) continue;  // below, in a body
-        EXPECT_NO_THROW(read_scene(good, "s", {path + "=" + std::string(toml)}));
+        const std::string preset = toml == key.fallback ? "paper" : "fast";  // keys that need one another
+        std::vector<std::string> sets = {"planner.preset=" + preset, path + "=" + std::string(toml)};
+        if (key.parent() == "goal.shape") sets.push_back("goal.shape.tolerance_m=0.25");
+        EXPECT_NO_THROW(read_scene(good, "s", sets));
       }
   EXPECT_NO_THROW(read_scene(good, "s"));
 }
@@ -518,10 +538,18 @@ std::string all_of(const Scene& s) {
   const PlannerSpec& p = s.planner;
   t += fmt::format("{} {} {} {} {}\n", s.robot, v(s.goal.center_of_mass_m), s.goal.radius_m,
                    s.goal.moves_with, s.goal.lost_below_m.value_or(-1));
+  t += fmt::format("{} {} {} {}\n", s.goal.above, s.goal.below, s.goal.clear_of,
+                   s.goal.box_m ? s.goal.box_m->lower.x() : 0);
+  if (const auto& shape = s.goal.shape)
+    t += fmt::format("{} {} {} {} {} {}\n", v(shape->axis), shape->angle_deg, v(shape->stretch), shape->cage,
+                     shape->turn_tolerance_deg.value_or(-1), shape->tolerance_m.value_or(-1));
   t += fmt::format("{} {} {} {} {} {} {} {} {} {} {} {} {} {} {} {}\n", p.preset, p.seed, p.iterations,
                    p.goal_bias, p.weight_body, p.weight_control_point, p.weight_interpolation, p.max_force_n,
                    p.min_force_share, p.max_force_share, p.min_duration_s, p.max_duration_s,
                    p.control_point_radius_m, p.settle_time_s, p.settle_speed_m_s, p.settle_force_share);
+  t += fmt::format("{} {} {} {} {} {} {} {} {} {} {}\n", p.lag, p.metric, p.time_weight, p.guidance,
+                   p.soft_price, p.look_s, p.learn_prices, p.steer, p.stop_in_goal, p.end_hopeless, p.hold);
+  t += fmt::format("{}\n", p.shortcut_rounds);
   t += fmt::format("{} {}", v(s.camera.direction), s.camera.fov_deg);
   for (const Keyframe& k : s.camera.keyframes) t += fmt::format(" {} {} {}", k.at, v(k.eye_m), v(k.target_m));
   const FilmSpec& f = s.film;

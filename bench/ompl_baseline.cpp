@@ -1,0 +1,505 @@
+// OMPL's planners with controls (Şucan, Moll, Kavraki, The Open Motion Planning Library, IEEE RAM 2012) on
+// limber's propagator, beside limber's own search: same scene, same manipulations, same forces and durations,
+// same goal. docs/planning.md, "Beside OMPL".
+//
+//   ompl_bench SCENE -o DIR [--seeds 1-30] [--time-limit S] [--only RRT,paper] [--json]
+//
+// OMPL asks for one rollout at a time, in pieces of `step_s`, after each of which the state is checked; so a
+// rollout is one lane (a Batch of one). What is drawn is what limber draws: the manipulation by its weight,
+// the magnitude, the duration. Where OMPL has a state to go to (RRT, EST, PDST) the push is towards its
+// centre of mass, as in limber; else (KPIECE1, SST) its direction is random. Goal: the centre of mass in the
+// ball, and coming to rest there, by limber's own test.
+#include <fmt/format.h>
+#include <ompl/base/ProblemDefinition.h>
+#include <ompl/base/goals/GoalSampleableRegion.h>
+#include <ompl/control/DirectedControlSampler.h>
+#include <ompl/control/PathControl.h>
+#include <ompl/control/SpaceInformation.h>
+#include <ompl/control/planners/est/EST.h>
+#include <ompl/control/planners/kpiece/KPIECE1.h>
+#include <ompl/control/planners/pdst/PDST.h>
+#include <ompl/control/planners/rrt/RRT.h>
+#include <ompl/control/planners/sst/SST.h>
+#include <ompl/util/Console.h>
+#include <CLI/CLI.hpp>
+
+#include <chrono>
+#include <cmath>
+
+#include "app/bench.h"
+#include "app/frame_list.h"
+#include "app/plan_folder.h"
+#include "app/scene_world.h"
+#include "core/error.h"
+#include "core/hash.h"
+#include "core/log.h"
+#include "core/progress.h"
+#include "core/threads.h"
+
+namespace limber::app {
+namespace {
+
+namespace ob = ompl::base;
+namespace oc = ompl::control;
+
+constexpr double step_s = 0.1;  // durations are whole multiples, as OMPL has them
+
+// One problem, and what its solving has cost so far.
+struct Problem {
+  const FemSystem& system;
+  const plan::Settings& settings;
+  std::unique_ptr<plan::Propagator> propagator;
+  int steps = plan::steps_of(step_s, system.dt_s());  // of the dynamics, a piece
+  mutable std::int64_t controls = 0;                  // drawn: limber's iterations
+  mutable bool reached = false;                       // SST would go on, to better the path
+
+  unsigned pieces(double duration_s) const {
+    return unsigned(std::max(1L, std::lround(duration_s / step_s)));
+  }
+};
+
+// limber's state as OMPL handles it. Sampled states are only a place: `state` is empty.
+class NodeSpace final : public ob::StateSpace {
+ public:
+  struct StateType : ob::State {
+    limber::State state;
+    Vec3 center = Vec3::Zero();
+    bool good = true;
+  };
+  static StateType& of(ob::State* s) { return *static_cast<StateType*>(s); }
+  static const StateType& of(const ob::State* s) { return *static_cast<const StateType*>(s); }
+
+  explicit NodeSpace(const Box& bounds) : bounds_(bounds) { setName("limber"); }
+  const Box& bounds() const { return bounds_; }
+
+  unsigned getDimension() const override { return 3; }
+  double getMaximumExtent() const override { return bounds_.size().norm(); }
+  double getMeasure() const override { return bounds_.size().prod(); }
+  void enforceBounds(ob::State* s) const override {
+    of(s).center = of(s).center.cwiseMax(bounds_.lower).cwiseMin(bounds_.upper);
+  }
+  bool satisfiesBounds(const ob::State*) const override { return true; }  // walls see to it
+  void copyState(ob::State* to, const ob::State* from) const override {
+    StateType& a = of(to);
+    const StateType& b = of(from);
+    a.state = b.state, a.center = b.center, a.good = b.good;
+  }
+  double distance(const ob::State* a, const ob::State* b) const override {
+    return (of(a).center - of(b).center).norm();
+  }
+  bool equalStates(const ob::State* a, const ob::State* b) const override {
+    return of(a).state == of(b).state && of(a).center == of(b).center;
+  }
+  void interpolate(const ob::State* a, const ob::State* b, double t, ob::State* s) const override {
+    const Vec3 center = of(a).center + t * (of(b).center - of(a).center);
+    of(s).state = limber::State(), of(s).center = center, of(s).good = true;
+  }
+  ob::State* allocState() const override { return new StateType; }
+  void freeState(ob::State* s) const override { delete &of(s); }
+  ob::StateSamplerPtr allocDefaultStateSampler() const override;
+  void registerProjections() override;
+
+ private:
+  Box bounds_;
+};
+
+class PlaceSampler final : public ob::StateSampler {
+ public:
+  using ob::StateSampler::StateSampler;
+  void sampleUniform(ob::State* s) override {
+    const Box& b = static_cast<const NodeSpace*>(space_)->bounds();
+    set(s, [&](int axis) { return rng_.uniformReal(b.lower[axis], b.upper[axis]); });
+  }
+  void sampleUniformNear(ob::State* s, const ob::State* near, double distance) override {
+    const Vec3 center = NodeSpace::of(near).center;
+    set(s, [&](int axis) { return rng_.uniformReal(center[axis] - distance, center[axis] + distance); });
+  }
+  void sampleGaussian(ob::State* s, const ob::State* mean, double deviation) override {
+    const Vec3 center = NodeSpace::of(mean).center;
+    set(s, [&](int axis) { return rng_.gaussian(center[axis], deviation); });
+  }
+
+ private:
+  template <class Coordinate>
+  void set(ob::State* s, const Coordinate& coordinate) {
+    auto& place = NodeSpace::of(s);
+    place.state = limber::State(), place.good = true;
+    for (int axis = 0; axis < 3; ++axis) place.center[axis] = coordinate(axis);
+    space_->enforceBounds(s);
+  }
+};
+
+ob::StateSamplerPtr NodeSpace::allocDefaultStateSampler() const {
+  return std::make_shared<PlaceSampler>(this);
+}
+
+class CenterProjection final : public ob::ProjectionEvaluator {
+ public:
+  CenterProjection(const ob::StateSpace* space, const Box& bounds) : ob::ProjectionEvaluator(space) {
+    constexpr double cells_an_axis = 10;
+    ob::RealVectorBounds b(3);
+    std::vector<double> cells;
+    for (int axis = 0; axis < 3; ++axis) {
+      b.setLow(unsigned(axis), bounds.lower[axis]), b.setHigh(unsigned(axis), bounds.upper[axis]);
+      cells.push_back(bounds.size()[axis] / cells_an_axis);
+    }
+    setBounds(b);
+    setCellSizes(cells);
+  }
+  unsigned getDimension() const override { return 3; }
+  void project(const ob::State* s, Eigen::Ref<Eigen::VectorXd> out) const override {
+    out = NodeSpace::of(s).center;
+  }
+};
+
+void NodeSpace::registerProjections() {
+  registerDefaultProjection(std::make_shared<CenterProjection>(this, bounds_));
+}
+
+class ControlSpace final : public oc::ControlSpace {
+ public:
+  struct ControlType : oc::Control {
+    limber::Control control;
+  };
+  static limber::Control& of(oc::Control* c) { return static_cast<ControlType*>(c)->control; }
+  static const limber::Control& of(const oc::Control* c) {
+    return static_cast<const ControlType*>(c)->control;
+  }
+
+  ControlSpace(const ob::StateSpacePtr& states, const Problem& problem)
+      : oc::ControlSpace(states), problem_(problem) {}
+  const Problem& problem() const { return problem_; }
+
+  unsigned getDimension() const override { return 3; }
+  oc::Control* allocControl() const override { return new ControlType; }
+  void freeControl(oc::Control* c) const override { delete static_cast<ControlType*>(c); }
+  void copyControl(oc::Control* to, const oc::Control* from) const override { of(to) = of(from); }
+  bool equalControls(const oc::Control* a, const oc::Control* b) const override { return of(a) == of(b); }
+  void nullControl(oc::Control* c) const override { of(c) = limber::Control(); }
+  oc::ControlSamplerPtr allocDefaultControlSampler() const override;
+
+ private:
+  const Problem& problem_;
+};
+
+// What limber draws for an expansion towards `point`, with OMPL's random numbers.
+plan::Draw draw_towards(const Problem& problem, ompl::RNG& rng, const Vec3& point) {
+  const plan::Settings& s = problem.settings;
+  plan::Draw d;
+  d.point = point;
+  d.towards_goal = (point - s.goal.center_of_mass_m).norm() < 1e-9;
+  const double interpolation = d.towards_goal ? s.weights.interpolation : 0;
+  const double pick = rng.uniform01() * (s.weights.body + s.weights.control_point + interpolation);
+  d.manipulation = pick < s.weights.body                             ? Manipulation::body
+                   : pick < s.weights.body + s.weights.control_point ? Manipulation::control_point
+                                                                     : Manipulation::interpolation;
+  d.force_n = s.max_force_n * rng.uniformReal(s.min_force_share, s.max_force_share);
+  d.robot_node = rng.uniformInt(0, problem.system.robot_nodes() - 1);
+  d.steps = problem.steps;
+  return d;
+}
+
+// For planners that have no state to go to: towards the goal as often as goal_bias says, else anywhere.
+class UndirectedSampler final : public oc::ControlSampler {
+ public:
+  using oc::ControlSampler::ControlSampler;
+  void sample(oc::Control* c) override { sample(c, nullptr); }
+  void sample(oc::Control* c, const ob::State* from) override {
+    const Problem& problem = static_cast<const ControlSpace*>(space_)->problem();
+    const plan::Settings& s = problem.settings;
+    ++problem.controls;
+    const Vec3 center = from ? NodeSpace::of(from).center : problem.system.sample_bounds().center();
+    Vec3 point = s.goal.center_of_mass_m;
+    if (rng_.uniform01() >= s.goal_bias) {
+      Vec3 direction;
+      do direction = Vec3(rng_.uniformReal(-1, 1), rng_.uniformReal(-1, 1), rng_.uniformReal(-1, 1));
+      while (direction.norm() > 1 || direction.norm() < 1e-3);
+      point = center + direction;
+    }
+    ControlSpace::of(c) = plan::control_of(draw_towards(problem, rng_, point), s, center);
+  }
+  void sampleNext(oc::Control* c, const oc::Control*) override { sample(c); }
+  void sampleNext(oc::Control* c, const oc::Control*, const ob::State* from) override { sample(c, from); }
+};
+
+oc::ControlSamplerPtr ControlSpace::allocDefaultControlSampler() const {
+  return std::make_shared<UndirectedSampler>(this);
+}
+
+class TowardsSampler final : public oc::DirectedControlSampler {
+ public:
+  TowardsSampler(const oc::SpaceInformation* si, const Problem& problem)
+      : oc::DirectedControlSampler(si), problem_(problem) {}
+  unsigned sampleTo(oc::Control* c, const ob::State* from, ob::State* to) override {
+    const plan::Settings& s = problem_.settings;
+    ++problem_.controls;
+    ControlSpace::of(c) = plan::control_of(draw_towards(problem_, rng_, NodeSpace::of(to).center), s,
+                                           NodeSpace::of(from).center);
+    const unsigned pieces = problem_.pieces(rng_.uniformReal(s.min_duration_s, s.max_duration_s));
+    return si_->propagateWhileValid(from, c, int(pieces), to);
+  }
+  unsigned sampleTo(oc::Control* c, const oc::Control*, const ob::State* from, ob::State* to) override {
+    return sampleTo(c, from, to);
+  }
+
+ private:
+  const Problem& problem_;
+  ompl::RNG rng_;
+};
+
+class SoftPropagator final : public oc::StatePropagator {
+ public:
+  SoftPropagator(const oc::SpaceInformationPtr& si, const Problem& problem)
+      : oc::StatePropagator(si), problem_(problem) {}
+  void propagate(const ob::State* from, const oc::Control* c, double, ob::State* to) const override {
+    plan::Rollout rollout;
+    const limber::State start = NodeSpace::of(from).state;  // OMPL propagates in place
+    rollout.from = &start;
+    rollout.control = ControlSpace::of(c);
+    rollout.control.steps = problem_.steps;
+    problem_.propagator->propagate({&rollout, 1});
+    auto& result = NodeSpace::of(to);
+    result.good = rollout.ok && problem_.system.acceptable(rollout.to);
+    if (!result.good) return;
+    result.center = problem_.system.robot_center(rollout.to);
+    result.state = std::move(rollout.to);
+  }
+  bool canPropagateBackward() const override { return false; }
+
+ private:
+  const Problem& problem_;
+};
+
+class BallGoal final : public ob::GoalSampleableRegion {
+ public:
+  BallGoal(const ob::SpaceInformationPtr& si, const Problem& problem)
+      : ob::GoalSampleableRegion(si), problem_(problem) {
+    setThreshold(problem.settings.goal.radius_m);
+  }
+  double distanceGoal(const ob::State* s) const override {
+    return (NodeSpace::of(s).center - problem_.settings.goal.center_of_mass_m).norm();
+  }
+  bool isSatisfied(const ob::State* s, double* distance) const override {
+    const double d = distanceGoal(s);
+    if (distance) *distance = d;
+    const bool reached =
+        d <= threshold_ && plan::comes_to_rest(problem_.system, problem_.settings, NodeSpace::of(s).state);
+    problem_.reached = problem_.reached || reached;
+    return reached;
+  }
+  bool isSatisfied(const ob::State* s) const override { return isSatisfied(s, nullptr); }
+  void sampleGoal(ob::State* s) const override {
+    NodeSpace::of(s).state = limber::State();
+    NodeSpace::of(s).center = problem_.settings.goal.center_of_mass_m;
+    NodeSpace::of(s).good = true;
+  }
+  unsigned maxSampleCount() const override { return 1u << 30; }
+
+ private:
+  const Problem& problem_;
+};
+
+struct Run {
+  bool solved = false;
+  std::int64_t iterations = 0;
+  double cpu_s = 0, wall_s = 0, motion_s = 0;
+};
+
+double wall_seconds() {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
+
+// The controls of OMPL's path, replayed by limber, must end where OMPL says.
+double replayed_motion_s(const Problem& problem, const oc::PathControl& path) {
+  std::vector<limber::Control> controls;
+  for (std::size_t i = 0; i < path.getControlCount(); ++i) {
+    controls.push_back(ControlSpace::of(path.getControl(unsigned(i))));
+    controls.back().steps = problem.steps * int(std::lround(path.getControlDuration(unsigned(i)) / step_s));
+  }
+  const plan::Trajectory replay = plan::simulate(problem.system, controls, 1);
+  const auto& end = NodeSpace::of(path.getState(unsigned(path.getStateCount() - 1)));
+  LIMBER_CHECK(hash_of(replay.end) == hash_of(end.state));
+  return double(replay.end.step) * problem.system.dt_s();
+}
+
+using MakePlanner = ob::PlannerPtr (*)(const oc::SpaceInformationPtr&);
+
+Run run_ompl(const FemSystem& system, const plan::Settings& settings, MakePlanner make, double time_limit_s) {
+  ompl::RNG::setSeed(settings.seed);  // before anything that draws
+  const Problem problem{system, settings, system.make_propagator()};
+  const auto states = std::make_shared<NodeSpace>(system.sample_bounds());
+  const auto si =
+      std::make_shared<oc::SpaceInformation>(states, std::make_shared<ControlSpace>(states, problem));
+  si->setStateValidityChecker([](const ob::State* s) { return NodeSpace::of(s).good; });
+  si->setStatePropagator(std::make_shared<SoftPropagator>(si, problem));
+  si->setPropagationStepSize(step_s);
+  si->setMinMaxControlDuration(problem.pieces(settings.min_duration_s),
+                               problem.pieces(settings.max_duration_s));
+  si->setDirectedControlSamplerAllocator(
+      [&](const oc::SpaceInformation* of) { return std::make_shared<TowardsSampler>(of, problem); });
+  si->setup();
+
+  const auto definition = std::make_shared<ob::ProblemDefinition>(si);
+  ob::State* start = si->allocState();
+  NodeSpace::of(start).state = system.start();
+  NodeSpace::of(start).center = system.robot_center(NodeSpace::of(start).state);
+  definition->addStartState(start);
+  si->freeState(start);
+  definition->setGoal(std::make_shared<BallGoal>(si, problem));
+
+  const ob::PlannerPtr planner = make(si);
+  planner->setProblemDefinition(definition);
+  planner->setup();
+  const double cpu = cpu_seconds(), wall = wall_seconds();
+  planner->solve(ob::PlannerTerminationCondition([&] {
+    return problem.controls >= settings.max_iterations || wall_seconds() - wall >= time_limit_s ||
+           stop_signal() != 0 || problem.reached;
+  }));
+  Run run{definition->hasExactSolution(), problem.controls, cpu_seconds() - cpu, wall_seconds() - wall};
+  throw_if_stopped();
+  if (run.solved)
+    run.motion_s = replayed_motion_s(problem, *definition->getSolutionPath()->as<oc::PathControl>());
+  return run;
+}
+
+Run run_limber(const FemSystem& system, const plan::Settings& settings) {
+  const plan::Plan plan = plan::plan(system, settings);
+  throw_if_stopped();
+  const plan::Statistics& search = plan.statistics;
+  return {plan.solved(), search.iterations, search.cpu_s, search.wall_s,
+          double(plan.trajectory.end.step) * system.dt_s()};
+}
+
+template <class Planner>
+ob::PlannerPtr make_planner(const oc::SpaceInformationPtr& si) {
+  return std::make_shared<Planner>(si);
+}
+template <class Planner>
+ob::PlannerPtr make_biased(const oc::SpaceInformationPtr& si) {
+  const auto planner = std::make_shared<Planner>(si);
+  planner->setGoalBias(0.1);  // of the scenes, and of preset paper
+  return planner;
+}
+
+Json report_of(const std::string& name, const std::vector<Run>& runs) {
+  std::vector<double> iterations, cpu, wall, motion;
+  for (const Run& run : runs) {
+    iterations.push_back(double(run.iterations)), cpu.push_back(run.cpu_s), wall.push_back(run.wall_s);
+    if (run.solved) motion.push_back(run.motion_s);
+  }
+  const auto spread = [](const std::vector<double>& values) {
+    if (values.empty()) return Json();
+    const Quartiles q = quartiles(values);
+    return Json{q.first, q.median, q.third};
+  };
+  return {{"planner", name},           {"solved", motion.size()},
+          {"runs", runs.size()},       {"iterations", spread(iterations)},
+          {"cpu_s", spread(cpu)},      {"wall_s", spread(wall)},
+          {"motion_s", spread(motion)}};
+}
+
+std::string text_of(const Json& q, int digits) {
+  if (q.is_null()) return "-";
+  return fmt::format("{:.{}f} {:.{}f} {:.{}f}", q[0].get<double>(), digits, q[1].get<double>(), digits,
+                     q[2].get<double>(), digits);
+}
+
+int compare(int argc, char** argv) {
+  CLI::App program{"OMPL's planners on limber's propagator, beside limber's"};
+  PlanOptions options;
+  std::string seeds = "1-30";
+  double time_limit_s = 120;
+  bool json = false;
+  std::vector<std::string> only;
+  program.add_option("SCENE", options.scene.scene)->required();
+  program.add_option("-o,--out", options.out, "folder of the prepared bodies")->required();
+  program.add_option("--seeds", seeds)->capture_default_str();
+  program.add_option("--time-limit", time_limit_s, "wall seconds of a run of OMPL")->capture_default_str();
+  program.add_option("--iterations", options.iterations, "controls drawn in a run; default: the scene's");
+  program.add_option("--set", options.scene.sets)->allow_extra_args(false);
+  program.add_option("--only", only, "planners whose name has one of these words; default: all")
+      ->delimiter(',');
+  program.add_flag("--json", json);
+  CLI11_PARSE(program, argc, argv);
+  log::set_up(0);
+  set_progress_enabled(false);
+  install_stop_signals();
+  ompl::msg::noOutputHandler();
+  set_thread_count(1);  // OMPL's planners have one
+
+  const auto plan_settings = [&](const char* preset, int seed, scenes::Scene* scene) {
+    PlanOptions with = options;
+    with.preset = preset, with.seed = seed;
+    *scene = read_scene(with);
+    return settings_of(*scene, with);
+  };
+  scenes::Scene scene;
+  plan_settings("paper", 1, &scene);
+  const std::vector<PreparedBody> bodies = prepare_bodies(scene, {}, options.out);
+  const fem::World world = build_world(scene, bodies);
+  if (goal_rules_of(scene).body >= 0)
+    throw InputError("ompl_bench: OMPL knows no goal that moves; take another scene");
+  const FemSystem system(world);
+
+  struct Row {
+    const char* name;
+    std::function<Run(int)> run;
+  };
+  const auto ours = [&](const char* preset, int in_flight) {
+    return [&, preset, in_flight](int seed) {
+      scenes::Scene own;
+      plan::Settings settings = plan_settings(preset, seed, &own);
+      settings.in_flight = in_flight;
+      return run_limber(system, settings);
+    };
+  };
+  const auto theirs = [&](MakePlanner make) {
+    return [&, make](int seed) {
+      scenes::Scene own;
+      return run_ompl(system, plan_settings("paper", seed, &own), make, time_limit_s);
+    };
+  };
+  std::vector<Row> rows{
+      {"limber fast, 16 lanes", ours("fast", 0)},   {"limber paper, 16 lanes", ours("paper", 0)},
+      {"limber paper, one lane", ours("paper", 1)}, {"OMPL RRT", theirs(make_biased<oc::RRT>)},
+      {"OMPL EST", theirs(make_biased<oc::EST>)},   {"OMPL KPIECE1", theirs(make_biased<oc::KPIECE1>)},
+      {"OMPL PDST", theirs(make_biased<oc::PDST>)}, {"OMPL SST", theirs(make_biased<oc::SST>)}};
+  std::erase_if(rows, [&](const Row& row) {
+    return !only.empty() && std::none_of(only.begin(), only.end(), [&](const std::string& word) {
+      return std::string_view(row.name).find(word) != std::string_view::npos;
+    });
+  });
+  std::vector<std::vector<Run>> runs(rows.size());
+  // Seed after seed, so that what else the machine does falls on all alike.
+  for (const int seed : parse_seeds(seeds))
+    for (std::size_t r = 0; r < rows.size(); ++r) {
+      runs[r].push_back(rows[r].run(seed));
+      log::info("seed {}: {}: {} after {} iterations, {:.2f} CPU s", seed, rows[r].name,
+                runs[r].back().solved ? "solved" : "not solved", runs[r].back().iterations,
+                runs[r].back().cpu_s);
+    }
+
+  Json report{{"scene", scene.name}, {"seeds", seeds}, {"planners", Json::array()}};
+  std::string text = fmt::format("{}, one thread\n{:24}{:>8}{:>18}{:>20}{:>18}\n", scene.name, "planner",
+                                 "solved", "iterations", "CPU s", "motion s");
+  for (std::size_t r = 0; r < rows.size(); ++r) {
+    const Json row = report_of(rows[r].name, runs[r]);
+    report["planners"].push_back(row);
+    text += fmt::format("{:24}{:>8}{:>18}{:>20}{:>18}\n", rows[r].name,
+                        fmt::format("{}/{}", row.at("solved").get<int>(), row.at("runs").get<int>()),
+                        text_of(row.at("iterations"), 0), text_of(row.at("cpu_s"), 2),
+                        text_of(row.at("motion_s"), 1));
+  }
+  fmt::print("{}", json ? report.dump(2) + "\n" : text);
+  return 0;
+}
+
+}  // namespace
+}  // namespace limber::app
+
+int main(int argc, char** argv) try {
+  return limber::app::compare(argc, argv);
+} catch (const std::exception& error) {
+  limber::log::warn("{}", error.what());
+  return 1;
+}

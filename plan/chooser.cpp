@@ -1,0 +1,153 @@
+#include "plan/chooser.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/error.h"
+#include "plan/steering.h"
+
+namespace limber::plan {
+
+namespace {
+
+constexpr double child_price = 0.25;                     // of the time it takes to cross the robot's radius
+constexpr double nearest_ahead = 1, farthest_ahead = 5;  // of the robot's radius
+constexpr double aside_share = 0.25;                     // of the way ahead
+constexpr double stuck_share = 0.3;                      // of the way it would have gone in the open
+constexpr double raise_by = 4;                           // price of a metre where a push got stuck
+constexpr int raises_a_renewal = 4;
+
+}  // namespace
+
+Chooser::Chooser(const System& system, const Settings& settings, const Guidance* guidance)
+    : system_(system), settings_(settings) {
+  if (guidance) guidance_ = *guidance;
+}
+
+double Chooser::strongest() const {
+  return std::max(1e-9, settings_.max_force_n * settings_.max_force_share / system_.robot_mass_kg());
+}
+
+void Chooser::add(const Tree& tree, int node) {
+  LIMBER_CHECK(node == centers_.size(), node, centers_.size());
+  const State state = tree.states[std::size_t(node)];
+  const Vec3 shift = system_.goal_shift(state);
+  departures_.push_back({tree.centers[node].cast<double>(), system_.robot_velocity(state), shift,
+                         system_.goal_velocity(state)});
+  centers_.push_back(tree.centers[node]);
+  centers_from_goal_.push_back(tree.centers[node] - shift.cast<float>());
+  times_s_.push_back(double(state.step) * system_.dt_s());
+  children_.push_back(0);
+  if (!guidance_) return;
+  const int parent = tree.parents[std::size_t(node)];
+  if (parent >= 0) {
+    ranking_.erase(std::lower_bound(ranking_.begin(), ranking_.end(), std::pair(promise(parent), parent)));
+    ++children_[std::size_t(parent)];
+    rank(parent);
+  }
+  rank(node);
+  if (parent >= 0 && settings_.laws.learn_prices) learn(tree, node);
+}
+
+void Chooser::rank(int node) {
+  const std::pair entry(promise(node), node);
+  ranking_.insert(std::lower_bound(ranking_.begin(), ranking_.end(), entry), entry);
+}
+
+void Chooser::rank_all() {
+  ranking_.clear();
+  for (int node = 0; node < centers_.size(); ++node) ranking_.emplace_back(promise(node), node);
+  std::sort(ranking_.begin(), ranking_.end());
+}
+
+double Chooser::promise(int node) const {
+  const Departure& at = departures_[std::size_t(node)];
+  const Vec3 place = at.center - at.goal_shift, velocity = at.velocity - at.goal_velocity;
+  const double radius = guidance_->workspace().robot_radius_m, a = strongest();
+  const Vec3 way = guidance_->ahead(place, 2 * radius) - place;
+  const Vec3 direction = way.norm() > 0 ? Vec3(way.normalized()) : Vec3::Zero();
+  const double along = velocity.dot(direction), across = (velocity - along * direction).norm();
+  return least_time_to_go(guidance_->to_go(place), along, a) + across / a +
+         settings_.laws.time_weight * times_s_[std::size_t(node)] +
+         child_price * std::sqrt(2 * radius / a) * children_[std::size_t(node)];
+}
+
+// Where a strong push from parent to node got less far than it should have, going on that way gets dearer.
+void Chooser::learn(const Tree& tree, int node) {
+  const Control& control = tree.controls[std::size_t(node)];
+  if (control.manipulation != Manipulation::body) return;
+  const Departure& from = departures_[std::size_t(tree.parents[std::size_t(node)])];
+  const Departure& to = departures_[std::size_t(node)];
+  const double t = control.steps * system_.dt_s(), radius = guidance_->workspace().robot_radius_m;
+  const Vec3 push = control.force_n.cast<double>() / system_.robot_mass_kg();
+  const Vec3 open_way = (from.velocity - from.goal_velocity) * t + 0.5 * push * t * t;
+  const Vec3 way = (to.center - to.goal_shift) - (from.center - from.goal_shift);
+  if (push.norm() == 0 || open_way.norm() < 0.5 * radius || way.norm() > stuck_share * open_way.norm())
+    return;
+  guidance_->raise(to.center - to.goal_shift + radius * push.normalized(), raise_by);
+  if (++raised_ < raises_a_renewal) return;
+  raised_ = 0;
+  guidance_->renew();
+  rank_all();
+}
+
+double Chooser::cost(const Draw& d, int node) const {
+  if (settings_.laws.metric == Metric::distance)
+    return double(
+        squared_distance(d.towards_goal ? centers_from_goal_[node] : centers_[node], d.point.cast<float>()));
+  const Departure& at = departures_[std::size_t(node)];
+  const Vec3 way = d.point + (d.towards_goal ? at.goal_shift : Vec3::Zero()) - at.center;
+  const Vec3 velocity = at.velocity - (d.towards_goal ? at.goal_velocity : Vec3::Zero());
+  return time_to_go(way, velocity, strongest()) + settings_.laws.time_weight * times_s_[std::size_t(node)];
+}
+
+int Chooser::nearest_in_time(const Draw& d) const {
+  int best = 0;
+  double least = cost(d, 0);
+  for (int node = 1; node < centers_.size(); ++node) {
+    const Departure& at = departures_[std::size_t(node)];
+    const Vec3 way = d.point + (d.towards_goal ? at.goal_shift : Vec3::Zero()) - at.center;
+    const Vec3 velocity = at.velocity - (d.towards_goal ? at.goal_velocity : Vec3::Zero());
+    if (least_time_to_go(way.norm(), velocity.norm(), strongest()) >= least) continue;
+    if (const double c = cost(d, node); c < least) best = node, least = c;
+  }
+  return best;
+}
+
+Aim Chooser::choose(const Draw& d) const {
+  if (d.guided) {
+    // Evenly in the logarithm of the rank: as often among the best two as among the next two to four, and so
+    // on.
+    const double n = double(ranking_.size());
+    const auto rank = std::min(ranking_.size() - 1, std::size_t(std::pow(n + 1, d.rank)) - 1);
+    const int node = ranking_[rank].second;
+    return {node, 0, control(d, node)};
+  }
+  return aim(d, settings_.laws.metric == Metric::distance
+                    ? nearest(d.towards_goal ? centers_from_goal_ : centers_, d.point.cast<float>())
+                    : nearest_in_time(d));
+}
+
+Aim Chooser::aim(const Draw& d, int node) const { return {node, cost(d, node), control(d, node)}; }
+
+Control Chooser::control(const Draw& d, int node) const {
+  const Departure& at = departures_[std::size_t(node)];
+  if (d.guided) {
+    const double radius = guidance_->workspace().robot_radius_m;
+    const double way = radius * (nearest_ahead + (farthest_ahead - nearest_ahead) * d.ahead);
+    const Vec3 target = guidance_->ahead(at.center - at.goal_shift, way) + at.goal_shift;
+    if (settings_.weights.interpolation > 0 && target == settings_.goal.center_of_mass_m + at.goal_shift) {
+      Draw arriving = d;
+      arriving.manipulation = Manipulation::interpolation;
+      return control_of(arriving, settings_, at.center, at.goal_shift);
+    }
+    return steered_control(d, settings_, system_, at, target + aside_share * way * d.aside, at.goal_velocity);
+  }
+  if (!settings_.laws.steer || d.manipulation == Manipulation::interpolation)
+    return control_of(d, settings_, at.center, at.goal_shift);
+  return d.towards_goal
+             ? steered_control(d, settings_, system_, at, d.point + at.goal_shift, at.goal_velocity)
+             : steered_control(d, settings_, system_, at, d.point, Vec3::Zero());
+}
+
+}  // namespace limber::plan

@@ -1,0 +1,49 @@
+// From which node an expansion starts, and with which control. A function of the draw and of the nodes that
+// it was told of, in their order.
+#pragma once
+
+#include <optional>
+
+#include "plan/expansion.h"
+#include "plan/guidance.h"
+#include "plan/tree.h"
+
+namespace limber::plan {
+
+struct Aim {
+  int node = 0;
+  double cost = 0;  // of the node for this draw, by the metric; 0 where guidance chose
+  Control control;
+};
+
+class Chooser {
+ public:
+  // All must outlive it; guidance as the search begins, nullptr where the laws want none.
+  Chooser(const System&, const Settings&, const Guidance*);
+
+  void add(const Tree&, int node);  // nodes in order
+  Aim choose(const Draw&) const;    // there is a node
+  Aim aim(const Draw&, int node) const;
+  double cost(const Draw&, int node) const;
+
+ private:
+  int nearest_in_time(const Draw&) const;
+  Control control(const Draw&, int node) const;
+  double promise(int node) const;  // seconds to the goal; less is better
+  void rank(int node);
+  void rank_all();
+  void learn(const Tree&, int node);
+  double strongest() const;  // metres a second squared
+
+  const System& system_;
+  const Settings& settings_;
+  std::optional<Guidance> guidance_;
+  Centers centers_, centers_from_goal_;
+  std::vector<Departure> departures_;
+  std::vector<double> times_s_;                  // of the nodes
+  std::vector<int> children_;                    // of a node
+  std::vector<std::pair<double, int>> ranking_;  // (promise, node), ascending
+  int raised_ = 0;                               // prices since the cost-to-go was last renewed
+};
+
+}  // namespace limber::plan

@@ -1,0 +1,231 @@
+#include "plan/course.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/error.h"
+#include "core/threads.h"
+#include "plan/expansion.h"
+
+namespace limber::plan {
+
+namespace {
+
+constexpr double settle_check_s = 0.05;  // rest is looked for this often
+
+constexpr std::pair<const char*, CostKind> cost_kinds[] = {{"duration", CostKind::duration},
+                                                           {"effort", CostKind::effort},
+                                                           {"strain", CostKind::strain},
+                                                           {"volume", CostKind::volume}};
+
+// One course on its way: says which piece of a control comes next, and takes its end. Pieces are cut where a
+// frame is due or rest is looked for; the cuts do not change the states.
+class Runner {
+ public:
+  Runner(const System& system, const Settings& settings, const CourseOptions& options, Course& course)
+      : system_(system),
+        settings_(settings),
+        options_(options),
+        course_(course),
+        state_(course.from),
+        first_step_(system.start().step),
+        steps_per_frame_(1 / (settings.frames_per_second * system.dt_s())),
+        settle_limit_(int(std::lround(settings.settle.max_duration_s / system.dt_s()))) {
+    course_.states.clear(), course_.costs_of_states.clear(), course_.frames.clear();
+    course_.settle_steps = 0;
+    while (step_of_next_frame() < state_.step) ++next_frame_;
+    take_due_frames();
+    begin_control();
+  }
+
+  bool ended() const { return phase_ == Phase::ended; }
+  double cost() const { return cost_in(course_.costs, options_.cost); }
+  bool rests_in_goal() const { return ended() && course_.result == Course::rests_in_goal; }
+
+  void next(Rollout& rollout) const {
+    rollout.from = &state_;
+    rollout.control = control_;
+    rollout.control.steps = int(std::min<std::int64_t>(steps_left_, step_of_next_frame() - state_.step));
+  }
+
+  void take(Rollout& rollout) {
+    if (!rollout.ok) return end(Course::diverged);
+    const int steps = rollout.control.steps;
+    LIMBER_CHECK(rollout.to.step == state_.step + steps, rollout.to.step, state_.step, steps);
+    std::swap(state_, rollout.to);
+    steps_left_ -= steps;
+    (phase_ == Phase::settle ? course_.settle_steps : control_.steps) += steps;
+    course_.costs.duration_s = double(state_.step - first_step_) * system_.dt_s();
+    course_.costs.effort_n_s += double(largest_force(control_)) * steps * system_.dt_s();
+    const bool frame = state_.step == step_of_next_frame();
+    take_due_frames();
+    if (cost() > options_.most || state_.step > course_.last_step) return end(Course::too_costly);
+    if (options_.ask_acceptable && (frame || steps_left_ == 0) && !system_.acceptable(state_))
+      return end(Course::not_acceptable);
+    if (phase_ == Phase::reach && !in_goal()) return;
+    if (steps_left_ == 0 || phase_ == Phase::reach) end_of_piece();
+  }
+
+  void end(Course::Result result) {
+    course_.result = result;
+    course_.end = state_;
+    phase_ = Phase::ended;
+  }
+
+ private:
+  enum class Phase { controls, reach, settle, ended };
+
+  void end_of_piece() {
+    if (phase_ == Phase::settle) return settle_on();
+    course_.states.push_back(state_);
+    course_.costs_of_states.push_back(course_.costs);
+    if (phase_ == Phase::reach) {
+      course_.controls.push_back(control_);
+      return begin_settle();
+    }
+    begin_control();
+  }
+
+  void begin_control() {
+    const std::size_t done = course_.states.size();
+    if (done == course_.controls.size()) return begin_reach();
+    control_ = course_.controls[done];
+    steps_left_ = std::exchange(control_.steps, 0);
+    if (steps_left_ == 0) end_of_piece();
+  }
+
+  void begin_reach() {
+    if (in_goal() || course_.reach_force_n == 0) return begin_settle();
+    LIMBER_CHECK(course_.last_step < std::numeric_limits<std::int64_t>::max(), course_.last_step);
+    phase_ = Phase::reach;
+    control_ = settle_control(settings_, 0);
+    control_.target_m = (settings_.goal.center_of_mass_m + system_.goal_shift(state_)).cast<float>();
+    control_.max_force_n = float(course_.reach_force_n);
+    steps_left_ = std::numeric_limits<std::int64_t>::max() - state_.step;
+  }
+
+  void begin_settle() {
+    if (options_.settle == CourseOptions::never || (options_.settle == CourseOptions::in_goal && !in_goal()))
+      return end(Course::ends_elsewhere);
+    phase_ = Phase::settle;
+    control_ = settle_control(settings_, 0);
+    settle_on();
+  }
+
+  void settle_on() {
+    const bool rests = system_.mean_speed(state_) < settings_.settle.mean_speed_m_s,
+               holds = system_.goal_holds(state_);
+    if ((rests && holds) || course_.settle_steps >= settle_limit_)
+      return end((rests || settle_limit_ == 0) && holds && in_goal() ? Course::rests_in_goal
+                                                                     : Course::ends_elsewhere);
+    steps_left_ = std::min(steps_of(settle_check_s, system_.dt_s()), settle_limit_ - course_.settle_steps);
+  }
+
+  void take_due_frames() {
+    if (step_of_next_frame() > state_.step) return;
+    for (; step_of_next_frame() <= state_.step; ++next_frame_)  // several where a step lasts longer
+      if (options_.keep_frames) course_.frames.push_back(state_);
+    if (!options_.measure) return;
+    const Measures now = system_.measures(state_);
+    Costs& costs = course_.costs;
+    costs.strain_energy_j = std::max(costs.strain_energy_j, now.strain_energy_j);
+    costs.volume_change = std::max(costs.volume_change, now.volume_change);
+  }
+
+  bool in_goal() const {
+    return holds(settings_.goal, system_.robot_center(state_) - system_.goal_shift(state_));
+  }
+
+  std::int64_t step_of_next_frame() const {
+    return first_step_ + std::llround(double(next_frame_) * steps_per_frame_);
+  }
+
+  const System& system_;
+  const Settings& settings_;
+  const CourseOptions& options_;
+  Course& course_;
+  State state_;
+  std::int64_t first_step_;
+  double steps_per_frame_;
+  int settle_limit_;
+  std::int64_t next_frame_ = 0;
+  Phase phase_ = Phase::controls;
+  Control control_;              // its steps are those taken
+  std::int64_t steps_left_ = 0;  // of it, until something is to be decided
+};
+
+// In lanes: all take a piece, and then the next.
+void run_batch(const System& system, const Settings& settings, std::span<Course> courses,
+               const CourseOptions& options) {
+  const std::unique_ptr<Propagator> propagator = system.make_propagator();
+  std::vector<Runner> runners;
+  runners.reserve(courses.size());
+  for (Course& course : courses) runners.emplace_back(system, settings, options, course);
+  std::vector<Runner*> going;
+  std::vector<Rollout> rollouts;
+  double cheapest = std::numeric_limits<double>::infinity();  // in the race so far
+  while (true) {
+    for (const Runner& runner : runners)
+      if (options.race && runner.rests_in_goal()) cheapest = std::min(cheapest, runner.cost());
+    going.clear();
+    for (Runner& runner : runners) {
+      if (!runner.ended() && runner.cost() > cheapest) runner.end(Course::too_costly);
+      if (!runner.ended()) going.push_back(&runner);
+    }
+    if (going.empty()) return;
+    rollouts.resize(going.size());
+    for (std::size_t i = 0; i < going.size(); ++i) going[i]->next(rollouts[i]);
+    propagator->propagate(rollouts);
+    for (std::size_t i = 0; i < going.size(); ++i) going[i]->take(rollouts[i]);
+  }
+}
+
+}  // namespace
+
+double cost_in(const Costs& costs, CostKind kind) {
+  switch (kind) {
+    case CostKind::duration:
+      return costs.duration_s;
+    case CostKind::effort:
+      return costs.effort_n_s;
+    case CostKind::strain:
+      return costs.strain_energy_j;
+    case CostKind::volume:
+      return costs.volume_change;
+  }
+  return 0;
+}
+
+const char* name_of(CostKind kind) {
+  return std::find_if(std::begin(cost_kinds), std::end(cost_kinds),
+                      [&](const auto& k) { return k.second == kind; })
+      ->first;
+}
+
+CostKind cost_kind_from(const std::string& name) {
+  for (const auto& [known, kind] : cost_kinds)
+    if (name == known) return kind;
+  throw InputError(
+      fmt::format("there is no cost \"{}\"; there are duration, effort, strain and volume", name));
+}
+
+Json json_of(const Costs& costs) {
+  return {{"duration_s", costs.duration_s},
+          {"effort_n_s", costs.effort_n_s},
+          {"strain_energy_j", costs.strain_energy_j},
+          {"volume_change", costs.volume_change}};
+}
+
+void run(const System& system, const Settings& settings, std::span<Course> courses,
+         const CourseOptions& options) {
+  const std::size_t lanes = std::size_t(std::max(1, system.lanes()));
+  const std::size_t batches = (courses.size() + lanes - 1) / lanes;
+  const auto run_one = [&](int b) {
+    const std::size_t first = std::size_t(b) * lanes;
+    run_batch(system, settings, courses.subspan(first, std::min(lanes, courses.size() - first)), options);
+  };
+  if (batches == 1) return run_one(0);
+  parallel_for(int(batches), run_one);
+}
+
+}  // namespace limber::plan

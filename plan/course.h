@@ -1,0 +1,60 @@
+// Controls run one after the other, several courses side by side, as far as the robot's rest in the goal.
+// Method: docs/planning.md.
+#pragma once
+
+#include <limits>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "plan/settings.h"
+
+namespace limber::plan {
+
+// What a motion costs, its settle included.
+struct Costs {
+  double duration_s = 0;       // since the system's start
+  double effort_n_s = 0;       // ∫|f|dt; of an interpolation the most that it may exert
+  double strain_energy_j = 0;  // the largest on the way, as is
+  double volume_change = 0;    // this; of System::measures at every frame time
+};
+enum class CostKind { duration, effort, strain, volume };
+double cost_in(const Costs&, CostKind);
+const char* name_of(CostKind);
+CostKind cost_kind_from(const std::string& name);  // throws InputError naming those that there are
+Json json_of(const Costs&);
+
+struct Course {
+  State from;
+  std::vector<Control> controls;  // in; out: those that were run, with the one that reaches for the goal
+  Costs costs;                    // in: of what led to `from`; out: of all
+  std::int64_t last_step = std::numeric_limits<std::int64_t>::max();  // who lasts longer ends as too_costly
+  // Where the controls end outside the goal, interpolation of at most this force goes on until the robot is
+  // in it; it wants a last_step. 0: it does not.
+  double reach_force_n = 0;
+
+  enum Result { rests_in_goal, ends_elsewhere, not_acceptable, diverged, too_costly } result = diverged;
+  std::vector<State> states;           // out: after each of `controls`, as far as they were run
+  std::vector<Costs> costs_of_states;  // out: of all that led to each of `states`
+  int settle_steps = 0;                // out: of the settle that follows them
+  std::vector<State> frames;           // out: at the frame times from `from` on, as Trajectory::frames
+  State end;                           // out: the last state
+};
+
+struct CourseOptions {
+  enum Settle { never, in_goal, anywhere } settle = in_goal;  // where the controls may end for it to begin
+  bool keep_frames = false;
+  // At frame times, and at the ends of controls.
+  bool ask_acceptable = true;
+  bool measure = false;  // fills strain_energy_j and volume_change
+  // A course ends as too_costly once it costs more than this, or than one that rests in the goal.
+  CostKind cost = CostKind::duration;
+  double most = std::numeric_limits<double>::infinity();
+  bool race = false;
+};
+
+// Fills what is out. A course depends on itself and the options alone, save that `race` ends losers sooner or
+// later: the cheapest of them, and the first of equals, is the same for any number of lanes and threads.
+void run(const System&, const Settings&, std::span<Course>, const CourseOptions&);
+
+}  // namespace limber::plan

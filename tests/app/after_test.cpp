@@ -1,0 +1,85 @@
+// What is done with a plan once it is found.
+#include "tests/app/program.h"
+
+namespace limber::app {
+namespace {
+
+TEST_F(Program, AShortenedPathIsAPlanLikeAnyOther) {
+  const Json plain = limber_program({"plan", scene(), "-o", out(), "--json"}).json();
+  EXPECT_FALSE(plain.contains("shortcut"));
+  const Json two = limber_program({"plan", scene(), "-o", out(), "--shortcut", "2", "--json"}).json();
+  const Json& report = two.at("shortcut");
+  EXPECT_EQ(report.at("rounds"), 2);
+  EXPECT_EQ(report.at("before").at("duration_s"), plain.at("motion_s"));
+  EXPECT_EQ(report.at("after").at("duration_s"), two.at("motion_s"));
+  EXPECT_LT(two.at("motion_s").get<double>(), plain.at("motion_s").get<double>());
+  EXPECT_EQ(limber_program({"verify", out()}).code, exit_done);
+
+  // Two rounds and then two are four.
+  const Json resumed =
+      limber_program({"plan", scene(), "-o", out(), "--resume", "--shortcut", "4", "--json"}).json();
+  EXPECT_EQ(resumed.at("shortcut").at("rounds"), 4);
+  const Json four = limber_program({"plan", scene(), "-o", out("four"), "--shortcut", "4", "--json"}).json();
+  EXPECT_EQ(resumed.at("trajectory_hash"), four.at("trajectory_hash"));
+
+  const Json effort =
+      limber_program({"plan", scene(), "-o", out(), "--shortcut", "2", "--cost", "effort", "--json"}).json();
+  EXPECT_LT(effort.at("shortcut").at("after").at("effort_n_s").get<double>(),
+            effort.at("shortcut").at("before").at("effort_n_s").get<double>());
+}
+
+TEST_F(Program, ImprovingKeepsTheBestPathWithinItsIterations) {
+  const Json plain = limber_program({"plan", scene(), "-o", out(), "--seed", "3", "--json"}).json();
+  const Result improved = limber_program(
+      {"plan", scene(), "-o", out("more"), "--seed", "3", "--improve", "--iterations", "400", "--json"});
+  ASSERT_EQ(improved.code, exit_done) << improved.err;
+  const Json report = improved.json().at("improve");
+  EXPECT_EQ(report.at("iterations"), 400);
+  ASSERT_GT(report.at("improvements").size(), 0u);
+  EXPECT_EQ(report.at("first").at("duration_s"), plain.at("motion_s"));
+  EXPECT_EQ(report.at("improvements").back().at("costs").at("duration_s"), improved.json().at("motion_s"));
+  EXPECT_LT(improved.json().at("motion_s").get<double>(), plain.at("motion_s").get<double>());
+  EXPECT_EQ(limber_program({"verify", out("more")}).code, exit_done);
+}
+
+TEST_F(Program, APlanThatIsNotPerturbedIsItself) {
+  ASSERT_EQ(limber_program({"plan", scene(), "-o", out()}).code, exit_done);
+  const Json exact = limber_program({"robust", out(), "-n", "5", "--materials", "0", "--forces", "0",
+                                     "--turn", "0", "--json"})
+                         .json();
+  EXPECT_EQ(exact.at("reached"), 5);
+  EXPECT_EQ(exact.at("end_farthest_m"), 0);
+  for (const Json& replay : exact.at("replays"))
+    for (const char* key : {"distance_m", "speed_m_s", "duration_s", "end_center_m", "deepest_penetration_m"})
+      EXPECT_EQ(replay.at(key), exact.at("replays")[0].at(key)) << key;
+
+  std::vector<Json> reports;
+  for (const char* threads : {"1", "2"})
+    reports.push_back(limber_program({"robust", out(), "-n", "6", "--threads", threads, "--json"}).json());
+  EXPECT_EQ(reports[0], reports[1]);
+  EXPECT_GT(reports[0].at("end_farthest_m"), 0);
+  EXPECT_NE(reports[0], limber_program({"robust", out(), "-n", "6", "--seed", "2", "--json"}).json());
+}
+
+TEST_F(Program, APlanIsCarriedToFinerCages) {
+  const Json coarse = limber_program({"plan", scene(), "-o", out(), "--json"}).json();
+  const Json same =
+      limber_program({"refine", out(), "-o", out("same"), "--tets-factor", "1", "--json"}).json();
+  EXPECT_EQ(same.at("refine").at("how"), "replayed");
+  EXPECT_EQ(same.at("trajectory_hash"), coarse.at("trajectory_hash"));
+
+  const Result fine = limber_program({"refine", out(), "-o", out("fine"), "--tets-factor", "3", "--json"});
+  ASSERT_EQ(fine.code, exit_done) << fine.err;
+  const Json report = fine.json().at("refine");
+  EXPECT_GT(report.at("tets").get<double>(), 2 * report.at("coarse_tets").get<double>());
+  EXPECT_EQ(limber_program({"verify", out("fine")}).code, exit_done);
+  EXPECT_EQ(limber_program({"render", out("fine"), "--frames", "0"}).code, exit_done);
+
+  EXPECT_EQ(limber_program({"refine", out(), "-o", out()}).code, exit_bad_input);
+  limber_program({"plan", scene(), "-o", out("few"), "--iterations", "1"});
+  EXPECT_EQ(limber_program({"refine", out("few"), "-o", out("fine")}).code, exit_bad_input);
+  EXPECT_EQ(limber_program({"robust", out("few")}).code, exit_bad_input);
+}
+
+}  // namespace
+}  // namespace limber::app

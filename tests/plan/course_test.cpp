@@ -1,0 +1,141 @@
+#include "plan/course.h"
+
+#include <gtest/gtest.h>
+
+#include "core/error.h"
+#include "core/threads.h"
+#include "plan/search.h"
+#include "tests/plan/toy.h"
+
+namespace limber::plan {
+namespace {
+
+using testing::Toy;
+using testing::toy_settings;
+
+// Pushes of many lengths and directions; the toy's seed 7 decides which.
+std::vector<Course> some_courses(const System& system, const Settings& settings, int count) {
+  std::vector<Course> courses;
+  for (int i = 0; i < count; ++i) {
+    Course& c = courses.emplace_back();
+    c.from = system.start();
+    for (int k = 0; k <= i % 4; ++k)
+      c.controls.push_back(control_of(draw(settings, system, 10 * i + k), settings, Vec3(1, 1.5, 1)));
+    c.reach_force_n = i % 2 == 0 ? settings.max_force_n : 0;
+    c.last_step = 1500;
+  }
+  return courses;
+}
+
+void expect_same(const Course& a, const Course& b) {
+  EXPECT_EQ(a.result, b.result);
+  EXPECT_EQ(a.controls, b.controls);
+  EXPECT_TRUE(a.states == b.states);
+  EXPECT_TRUE(a.frames == b.frames);
+  EXPECT_EQ(limber::hash_of(a.end), limber::hash_of(b.end));
+  EXPECT_EQ(a.settle_steps, b.settle_steps);
+  EXPECT_EQ(json_of(a.costs), json_of(b.costs));
+}
+
+TEST(Course, DoesNotDependOnItsNeighboursLanesOrThreads) {
+  Toy toy(5, true, true, 1.1f);
+  const Settings s = toy_settings();
+  const CourseOptions options{.settle = CourseOptions::anywhere, .keep_frames = true, .measure = true};
+  std::vector<Course> alone = some_courses(toy, s, 12);
+  for (Course& c : alone) run(toy, s, {&c, 1}, options);
+  int results[5] = {};
+  for (const Course& c : alone) ++results[c.result];
+  ASSERT_GT(results[Course::rests_in_goal], 0);
+  ASSERT_GT(results[Course::diverged] + results[Course::not_acceptable], 0);
+  for (const int threads : {1, 2})
+    for (const int lanes : {1, 5, 16}) {
+      set_thread_count(threads);
+      toy.lanes_wanted = lanes;
+      std::vector<Course> together = some_courses(toy, s, 12);
+      run(toy, s, together, options);
+      for (std::size_t i = 0; i < alone.size(); ++i) expect_same(together[i], alone[i]);
+    }
+  set_thread_count(0);
+}
+
+// What a course says it ran is what gives its end, step by step.
+TEST(Course, ItsControlsAreWhatWasRun) {
+  const Toy toy(5, true, false, 99);
+  const Settings s = toy_settings();
+  std::vector<Course> courses = some_courses(toy, s, 12);
+  run(toy, s, courses, {.settle = CourseOptions::anywhere, .keep_frames = true});
+  int compared = 0;
+  for (const Course& c : courses) {
+    if (c.result == Course::too_costly) continue;  // its last control was cut
+    ++compared;
+    std::vector<Control> controls = c.controls;
+    ASSERT_EQ(c.states.size(), controls.size());
+    controls.push_back(settle_control(s, c.settle_steps));
+    const Trajectory replay = simulate(toy, controls, s.frames_per_second);
+    EXPECT_EQ(limber::hash_of(replay.end), limber::hash_of(c.end));
+    EXPECT_TRUE(replay.frames == c.frames);
+    EXPECT_NEAR(c.costs.duration_s, double(c.end.step) * 0.01, 1e-12);
+    double effort = 0;
+    for (const Control& control : controls) effort += double(largest_force(control)) * control.steps * 0.01;
+    EXPECT_NEAR(c.costs.effort_n_s, effort, 1e-9 * effort);
+  }
+  EXPECT_GT(compared, 6);
+}
+
+TEST(Course, MeasuresAreTheLargestOfItsFrames) {
+  const Toy toy(5, true, false, 99);
+  const Settings s = toy_settings();
+  std::vector<Course> courses = some_courses(toy, s, 6);
+  run(toy, s, courses, {.keep_frames = true, .measure = true});
+  for (const Course& c : courses) {
+    double energy = 0, change = 0;
+    for (const State& frame : c.frames) {
+      energy = std::max(energy, toy.measures(frame).strain_energy_j);
+      change = std::max(change, toy.measures(frame).volume_change);
+    }
+    EXPECT_GT(energy, 0);
+    EXPECT_EQ(c.costs.strain_energy_j, energy);
+    EXPECT_EQ(c.costs.volume_change, change);
+  }
+}
+
+// The cheapest wins a race for any lanes, and nothing dearer than the bound comes through.
+TEST(Course, ARaceEndsLosersOnly) {
+  Toy toy(1, false, false, 99);
+  const Settings s = toy_settings();
+  std::vector<Course> free = some_courses(toy, s, 12);
+  run(toy, s, free, {});
+  const auto winner = [&](const std::vector<Course>& courses) {
+    int best = -1;
+    for (int i = 0; i < int(courses.size()); ++i) {
+      const Course& c = courses[std::size_t(i)];
+      if (c.result != Course::rests_in_goal) continue;
+      if (best < 0 || c.costs.duration_s < courses[std::size_t(best)].costs.duration_s) best = i;
+    }
+    return best;
+  };
+  ASSERT_GE(winner(free), 0);
+  const double shortest = free[std::size_t(winner(free))].costs.duration_s;
+  for (const int lanes : {1, 16}) {
+    toy.lanes_wanted = lanes;
+    std::vector<Course> raced = some_courses(toy, s, 12);
+    run(toy, s, raced, {.race = true});
+    EXPECT_EQ(winner(raced), winner(free));
+    std::vector<Course> bounded = some_courses(toy, s, 12);
+    run(toy, s, bounded, {.most = 0.999 * shortest});
+    EXPECT_EQ(winner(bounded), -1);
+    for (const Course& c : bounded) EXPECT_LT(c.costs.duration_s, shortest + 0.05);
+  }
+}
+
+TEST(Course, CostsHaveNames) {
+  const Costs costs{1, 2, 3, 4};
+  EXPECT_EQ(cost_in(costs, cost_kind_from("duration")), 1);
+  EXPECT_EQ(cost_in(costs, cost_kind_from("effort")), 2);
+  EXPECT_EQ(cost_in(costs, cost_kind_from("strain")), 3);
+  EXPECT_EQ(cost_in(costs, cost_kind_from("volume")), 4);
+  EXPECT_THROW(cost_kind_from("time"), InputError);
+}
+
+}  // namespace
+}  // namespace limber::plan

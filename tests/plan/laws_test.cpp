@@ -1,0 +1,175 @@
+// What the preset `fast` adds to Algorithm 1: with a lag, guidance, steering and looks the tree is still a
+// function of system and settings alone.
+#include <gtest/gtest.h>
+
+#include "core/threads.h"
+#include "plan/chooser.h"
+#include "plan/search.h"
+#include "tests/plan/toy.h"
+
+namespace limber::plan {
+namespace {
+
+using testing::Toy;
+using testing::toy_settings;
+
+Settings fast_settings() {
+  Settings s = toy_settings();
+  s.min_force_share = 0.8, s.max_duration_s = 3;
+  s.laws = {.lag = 5,
+            .metric = Metric::time_to_go,
+            .guidance = 0.7,
+            .soft_price = 10,
+            .learn_prices = true,
+            .steer = true,
+            .look_s = 0.1,
+            .stop_in_goal = true,
+            .hold = true,
+            .end_hopeless = true};
+  s.settle.max_duration_s = 10;
+  return s;
+}
+
+void for_each_toy(const std::function<void(Toy&)>& law) {
+  Toy point(1, true, false, 99), chain(5, true, true, 1.6f);
+  for (Toy* toy : {&point, &chain}) {
+    SCOPED_TRACE(toy->nodes);
+    law(*toy);
+  }
+}
+
+struct Threads {
+  explicit Threads(int n) { set_thread_count(n); }
+  ~Threads() { set_thread_count(0); }
+};
+
+// One expansion after the other; each is chosen by a chooser that was told of the nodes of all expansions but
+// the lag before it.
+Tree lagged_tree(const System& system, const Settings& s, std::int64_t iterations) {
+  Tree all;
+  const State start = system.start();
+  all.add(start, -1, Control{}, -1, system.robot_center(start).cast<float>());
+  const Guidance guidance(system.workspace(), s.goal.center_of_mass_m, s.laws.soft_price);
+  const auto propagator = system.make_propagator();
+  for (std::int64_t i = 0; i < iterations; ++i) {
+    Chooser chooser(system, s, s.laws.guidance > 0 ? &guidance : nullptr);
+    for (int node = 0; node < all.size(); ++node)
+      if (node == 0 || all.iterations[std::size_t(node)] < i - s.laws.lag) chooser.add(all, node);
+    const Aim aim = chooser.choose(draw(s, system, i));
+    const State from = all.states[std::size_t(aim.node)];
+    Rollout r{&from, aim.control, {}, false};
+    propagator->propagate({&r, 1});
+    if (r.ok && system.acceptable(r.to))
+      all.add(r.to, aim.node, aim.control, i, system.robot_center(r.to).cast<float>());
+  }
+  return all;
+}
+
+TEST(Laws, ALaggingTreeIsTheSequentialOneOfItsRule) {
+  for_each_toy([](Toy& toy) {
+    for (const int lag : {1, 5, 31}) {
+      Settings s = fast_settings();
+      s.laws.lag = lag;
+      s.laws.look_s = 0, s.laws.stop_in_goal = s.laws.end_hopeless = false;  // rollouts are whole
+      s.goal.radius_m = 1e-6;                                                // never reached
+      s.max_iterations = 60;
+      EXPECT_EQ(hash_of(plan(toy, s).tree), hash_of(lagged_tree(toy, s, 60))) << lag;
+    }
+  });
+}
+
+TEST(Laws, SameBytesForAnyThreadsAndLanes) {
+  for_each_toy([](Toy& toy) {
+    const Settings s = fast_settings();
+    std::optional<Plan> first;
+    for (const int threads : {1, 2})
+      for (const int lanes : {1, 3, 16}) {
+        const Threads limited(threads);
+        toy.jitter = threads > 1 && toy.nodes == 1;
+        toy.lanes_wanted = lanes;
+        const Plan p = plan(toy, s);
+        ASSERT_TRUE(p.solved());
+        EXPECT_EQ(p.statistics.rollouts_wrong, 0) << "nothing is computed in vain";
+        if (!first) first = p;
+        ASSERT_EQ(hash_of(p.tree), hash_of(first->tree)) << threads << ' ' << lanes;
+        ASSERT_EQ(hash_of(p.trajectory), hash_of(first->trajectory));
+        ASSERT_EQ(p.statistics.rollout_steps, first->statistics.rollout_steps);
+      }
+  });
+}
+
+TEST(Laws, CutAndResumedAnywhereEqualsUninterrupted) {
+  for_each_toy([](Toy& toy) {
+    const Settings s = fast_settings();
+    const Plan whole = plan(toy, s);
+    for (std::int64_t cut = 0; cut < whole.statistics.iterations;
+         cut += 1 + whole.statistics.iterations / 9) {
+      Settings part = s;
+      part.max_iterations = cut;
+      const Plan resumed = plan(toy, s, plan(toy, part));
+      ASSERT_EQ(hash_of(resumed.tree), hash_of(whole.tree)) << cut;
+      ASSERT_EQ(hash_of(resumed.trajectory), hash_of(whole.trajectory)) << cut;
+    }
+  });
+}
+
+// Seen at its looks, no push but its last state is in the goal; and it is as its stored control says.
+TEST(Laws, APushEndsWhereItIsSeenInTheGoal) {
+  Toy toy;
+  Settings s = fast_settings();
+  s.settle.mean_speed_m_s = 1e-9;  // nothing is at rest: many arrive
+  s.max_iterations = 120;
+  const auto in_goal = [&](const State& state) {
+    return (toy.robot_center(state) - s.goal.center_of_mass_m).norm() <= s.goal.radius_m;
+  };
+  const auto arrivals = [&](const Plan& p) {
+    int count = 0;
+    for (int node = 1; node < p.tree.size(); ++node) {
+      State state = p.tree.states[std::size_t(p.tree.parents[std::size_t(node)])];
+      const Control& c = p.tree.controls[std::size_t(node)];
+      for (int step = 1; step <= c.steps; ++step) {
+        EXPECT_TRUE(toy.step(c, state));
+        if (step % 10 == 0 && step < c.steps && in_goal(state)) return -1;
+      }
+      EXPECT_EQ(state, p.tree.states[std::size_t(node)]);
+      count += in_goal(state);
+    }
+    return count;
+  };
+  EXPECT_GT(arrivals(plan(toy, s)), 5);
+  s.laws.stop_in_goal = false;
+  EXPECT_EQ(arrivals(plan(toy, s)), -1) << "the law makes no difference";
+}
+
+// A push into the wall that holds it is given up; without the law it lasts.
+TEST(Laws, AHopelessPushIsShorter) {
+  Toy toy(1, true, false, 99);
+  Settings s = fast_settings();
+  s.laws.guidance = 0, s.goal_bias = 1, s.weights = {1, 0, 0};
+  s.laws.steer = false, s.min_duration_s = s.max_duration_s = 8;
+  s.max_iterations = 1;
+  const int patient = (s.laws.end_hopeless = false, plan(toy, s).tree.controls.at(1).steps);
+  EXPECT_EQ(patient, 800);
+  s.laws.end_hopeless = true;
+  const Plan p = plan(toy, s);
+  EXPECT_LT(p.tree.controls.at(1).steps, patient);
+  EXPECT_GT(p.tree.controls.at(1).steps, 100);  // it flew to the wall first
+  EXPECT_NEAR(p.tree.centers[1].x(), 4.8, 1e-6);
+}
+
+// The law whose worth the table of docs/planning.md shows, on a point before a wall with a gap.
+TEST(Laws, GuidanceFindsTheGapSooner) {
+  Toy toy(1, true, false, 99);
+  std::int64_t with = 0, without = 0;
+  for (std::uint64_t seed = 1; seed <= 10; ++seed) {
+    Settings s = fast_settings();
+    s.seed = seed;
+    with += plan(toy, s).statistics.iterations;
+    s.laws.guidance = 0;
+    without += plan(toy, s).statistics.iterations;
+  }
+  EXPECT_LT(2 * with, without);
+}
+
+}  // namespace
+}  // namespace limber::plan
