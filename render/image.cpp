@@ -4,6 +4,7 @@
 #include <array>
 #include <bit>
 #include <cmath>
+#include <limits>
 
 #include "core/error.h"
 
@@ -30,6 +31,26 @@ const std::array<std::uint8_t, last_key - first_key + 1>& level_table() {
     return t;
   }();
   return table;
+}
+
+// Formulas, not the table: pictures with alpha or 16 bit are made now and then.
+template <class Level>
+Raster<Level> shown_as(const Image& image, int channels) {
+  constexpr double top = std::numeric_limits<Level>::max();
+  const auto level_of = [](double share) { return Level(std::lround(top * std::clamp(share, 0.0, 1.0))); };
+  Raster<Level> shown{image.width, image.height, channels, {}};
+  const std::size_t pixels = std::size_t(image.width) * image.height;
+  shown.levels.reserve(pixels * std::size_t(channels));
+  for (std::size_t p = 0; p < pixels; ++p) {
+    const float* rgba = &image.rgba[4 * p];
+    const double alpha = channels == 4 ? rgba[3] : 1;
+    for (int c = 0; c < 3; ++c) {
+      const double light = alpha > 0 ? rgba[c] / alpha : 0;
+      shown.levels.push_back(light > 0 ? level_of(srgb_from_linear(tone_mapped(light))) : Level(0));
+    }
+    if (channels == 4) shown.levels.push_back(level_of(alpha));
+  }
+  return shown;
 }
 
 }  // namespace
@@ -68,6 +89,10 @@ Image8 tone_mapped(const Image& image) {
     for (int c = 0; c < 3; ++c) shown.rgb[3 * p + c] = lookup(image.rgba[4 * p + c]);
   return shown;
 }
+
+Raster16 tone_mapped_16(const Image& image) { return shown_as<std::uint16_t>(image, 3); }
+Raster8 tone_mapped_alpha(const Image& image) { return shown_as<std::uint8_t>(image, 4); }
+Raster16 tone_mapped_alpha_16(const Image& image) { return shown_as<std::uint16_t>(image, 4); }
 
 Image8 shrunk(const Image8& image, int width, int height) {
   LIMBER_CHECK(0 < width && width <= image.width && 0 < height && height <= image.height, width, height,

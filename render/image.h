@@ -8,10 +8,12 @@
 
 namespace limber::render {
 
-// Linear light, as the renderer leaves it. Row 0 is the top.
+// Linear light, as the renderer leaves it. Row 0 is the top. Alpha is the share of the pixel that meshes and
+// lines cover; colours are those of the whole pixel. With a transparent background they are what meshes and
+// lines add (premultiplied), and alpha counts the shadows on the ground too, which are black.
 struct Image {
   int width = 0, height = 0;
-  std::vector<float> rgba;  // (height × width × 4); alpha: the share of the pixel that meshes and lines cover
+  std::vector<float> rgba;  // (height × width × 4)
 };
 
 // What a PNG holds: sRGB, 8 bit. Row 0 is the top.
@@ -20,6 +22,18 @@ struct Image8 {
   std::vector<std::uint8_t> rgb;  // (height × width × 3)
   bool operator==(const Image8&) const = default;
 };
+
+// The other pictures a PNG can hold: 1 channel (grey), 2 (grey, alpha), 3 (red, green, blue) or 4 (and alpha,
+// which is straight: not multiplied into the colours). Row 0 is the top.
+template <class Level>
+struct Raster {
+  int width = 0, height = 0, channels = 0;
+  std::vector<Level> levels;  // (height × width × channels)
+  bool operator==(const Raster&) const = default;
+};
+using Raster8 = Raster<std::uint8_t>;
+using Raster16 = Raster<std::uint16_t>;
+
 Image8 filled(int width, int height, const Vec3& color_srgb);
 
 // The sRGB transfer curve (IEC 61966-2-1), a channel at a time, 0 … 1.
@@ -33,6 +47,10 @@ double tone_unmapped(double shown);  // inverse, for colours that must come out 
 
 // Tone map, then sRGB; within one level of the formulas (a table over the bits of the float).
 Image8 tone_mapped(const Image&);
+// The same to 16 bit; and with alpha, for images with a transparent background.
+Raster16 tone_mapped_16(const Image&);
+Raster8 tone_mapped_alpha(const Image&);
+Raster16 tone_mapped_alpha_16(const Image&);
 
 // Average of the covered area, in linear light. The new size is at most the old one.
 Image8 shrunk(const Image8&, int width, int height);

@@ -3,6 +3,7 @@
 #include <png.h>
 #include <zlib.h>
 
+#include <bit>
 #include <csetjmp>
 #include <cstring>
 
@@ -17,21 +18,91 @@ void append(png_structp png, png_bytep bytes, png_size_t size) {
 }
 void nothing(png_structp) {}
 
+// What libpng is handed.
+struct Rows {
+  int width, height, channels, bits;
+  const std::uint8_t* bytes;  // 16 bit: as this machine has them
+};
+
 // libpng leaves an error by longjmp, so nothing with a destructor may live in here.
-bool encode(png_structp png, png_infop info, const Image8& image, png_text* texts, int text_count,
+bool encode(png_structp png, png_infop info, const Rows& rows, png_text* texts, int text_count,
             std::string* out) {
+  constexpr int kinds[] = {PNG_COLOR_TYPE_GRAY, PNG_COLOR_TYPE_GRAY_ALPHA, PNG_COLOR_TYPE_RGB,
+                           PNG_COLOR_TYPE_RGB_ALPHA};
   if (setjmp(png_jmpbuf(png))) return false;
   png_set_write_fn(png, out, append, nothing);
-  png_set_IHDR(png, info, png_uint_32(image.width), png_uint_32(image.height), 8, PNG_COLOR_TYPE_RGB,
-               PNG_INTERLACE_NONE, PNG_COMPRESSION_TYPE_BASE, PNG_FILTER_TYPE_BASE);
+  png_set_IHDR(png, info, png_uint_32(rows.width), png_uint_32(rows.height), rows.bits,
+               kinds[rows.channels - 1], PNG_INTERLACE_NONE, PNG_COMPRESSION_TYPE_BASE, PNG_FILTER_TYPE_BASE);
   png_set_compression_level(png, 1);
   png_set_compression_strategy(png, Z_RLE);
   png_set_filter(png, PNG_FILTER_TYPE_BASE, PNG_FILTER_SUB);
-  png_set_sRGB(png, info, PNG_sRGB_INTENT_PERCEPTUAL);
+  if (rows.channels > 2) png_set_sRGB(png, info, PNG_sRGB_INTENT_PERCEPTUAL);
   png_set_text(png, info, texts, text_count);
   png_write_info(png, info);
-  for (int y = 0; y < image.height; ++y) png_write_row(png, &image.rgb[std::size_t(y) * image.width * 3]);
+  if (rows.bits == 16 && std::endian::native == std::endian::little) png_set_swap(png);
+  const std::size_t stride = std::size_t(rows.width) * std::size_t(rows.channels * rows.bits / 8);
+  for (int y = 0; y < rows.height; ++y) png_write_row(png, rows.bytes + std::size_t(y) * stride);
   png_write_end(png, info);
+  return true;
+}
+
+std::string encoded(const Rows& rows, std::size_t levels, const Texts& texts) {
+  LIMBER_CHECK(rows.width > 0 && rows.height > 0 && 1 <= rows.channels && rows.channels <= 4, rows.width,
+               rows.height, rows.channels);
+  LIMBER_CHECK(levels == std::size_t(rows.width) * std::size_t(rows.height) * std::size_t(rows.channels),
+               levels, rows.width, rows.height, rows.channels);
+  std::vector<png_text> chunks;
+  for (const auto& [key, text] : texts) {
+    LIMBER_CHECK(!key.empty() && key.size() < 80 && text.find('\0') == text.npos, key, text);
+    png_text chunk{};
+    chunk.compression = PNG_TEXT_COMPRESSION_NONE;
+    chunk.key = const_cast<char*>(key.c_str());
+    chunk.text = const_cast<char*>(text.c_str());
+    chunk.text_length = text.size();
+    chunks.push_back(chunk);
+  }
+  std::string out;
+  png_structp png = png_create_write_struct(PNG_LIBPNG_VER_STRING, nullptr, nullptr, nullptr);
+  png_infop info = png ? png_create_info_struct(png) : nullptr;
+  const bool done = info && encode(png, info, rows, chunks.data(), int(chunks.size()), &out);
+  png_destroy_write_struct(&png, &info);
+  LIMBER_CHECK(done, rows.width, rows.height);
+  return out;
+}
+
+struct Source {
+  const std::string& file;
+  std::size_t at = 0;
+};
+void take(png_structp png, png_bytep bytes, png_size_t size) {
+  auto& source = *static_cast<Source*>(png_get_io_ptr(png));
+  if (size > source.file.size() - source.at) png_error(png, "is cut short");
+  std::memcpy(bytes, source.file.data() + source.at, size);
+  source.at += size;
+}
+// The whole of a message is told in the InputError.
+[[noreturn]] void keep_message(png_structp png, png_const_charp message) {
+  std::strncpy(static_cast<char*>(png_get_error_ptr(png)), message, 199);
+  png_longjmp(png, 1);
+}
+void no_warning(png_structp, png_const_charp) {}
+
+bool decode(png_structp png, png_infop info, Source* source, Raster16* image) {
+  if (setjmp(png_jmpbuf(png))) return false;
+  png_set_read_fn(png, source, take);
+  png_read_info(png, info);
+  png_set_expand_16(png);
+  if (std::endian::native == std::endian::little) png_set_swap(png);
+  const int passes = png_set_interlace_handling(png);
+  png_read_update_info(png, info);
+  image->width = int(png_get_image_width(png, info)), image->height = int(png_get_image_height(png, info));
+  image->channels = png_get_channels(png, info);
+  const std::size_t stride = std::size_t(image->width) * std::size_t(image->channels);
+  image->levels.assign(stride * std::size_t(image->height), 0);
+  for (int pass = 0; pass < passes; ++pass)
+    for (int y = 0; y < image->height; ++y)
+      png_read_row(png, reinterpret_cast<png_bytep>(&image->levels[std::size_t(y) * stride]), nullptr);
+  png_read_end(png, nullptr);
   return true;
 }
 
@@ -67,43 +138,48 @@ std::optional<PngInfo> inspect(std::string_view file) {
   return std::nullopt;
 }
 
-}  // namespace
-
-std::string png_bytes(const Image8& image, const Texts& texts) {
-  LIMBER_CHECK(image.width > 0 && image.height > 0, image.width, image.height);
-  LIMBER_CHECK(image.rgb.size() == std::size_t(image.width) * image.height * 3, image.rgb.size(), image.width,
-               image.height);
-  std::vector<png_text> chunks;
-  for (const auto& [key, text] : texts) {
-    LIMBER_CHECK(!key.empty() && key.size() < 80 && text.find('\0') == text.npos, key, text);
-    png_text chunk{};
-    chunk.compression = PNG_TEXT_COMPRESSION_NONE;
-    chunk.key = const_cast<char*>(key.c_str());
-    chunk.text = const_cast<char*>(text.c_str());
-    chunk.text_length = text.size();
-    chunks.push_back(chunk);
-  }
-  std::string out;
-  png_structp png = png_create_write_struct(PNG_LIBPNG_VER_STRING, nullptr, nullptr, nullptr);
-  png_infop info = png ? png_create_info_struct(png) : nullptr;
-  const bool done = info && encode(png, info, image, chunks.data(), int(chunks.size()), &out);
-  png_destroy_write_struct(&png, &info);
-  LIMBER_CHECK(done, image.width, image.height);
-  return out;
-}
-
-void write_png(const fs::path& path, const Image8& image, const Texts& texts) {
-  write_file(path, png_bytes(image, texts));
-}
-
-Image8 read_png(const fs::path& path, Texts* texts) {
-  const std::string file = read_file(path);
-  const auto info = inspect(file);
+struct WholeFile {
+  std::string bytes;
+  PngInfo info;
+};
+WholeFile read_whole(const fs::path& path) {
+  std::string file = read_file(path);
+  auto info = inspect(file);
   if (!info)
     throw InputError(fmt::format("{}: is not a PNG, is cut short or damaged; make it again", path.string()));
   if (std::int64_t(info->width) * info->height > (1 << 28))
     throw InputError(
         fmt::format("{}: {} × {} pixels are too many", path.string(), info->width, info->height));
+  return {std::move(file), std::move(*info)};
+}
+
+}  // namespace
+
+std::string png_bytes(const Image8& image, const Texts& texts) {
+  return encoded({image.width, image.height, 3, 8, image.rgb.data()}, image.rgb.size(), texts);
+}
+std::string png_bytes(const Raster8& image, const Texts& texts) {
+  return encoded({image.width, image.height, image.channels, 8, image.levels.data()}, image.levels.size(),
+                 texts);
+}
+std::string png_bytes(const Raster16& image, const Texts& texts) {
+  return encoded({image.width, image.height, image.channels, 16,
+                  reinterpret_cast<const std::uint8_t*>(image.levels.data())},
+                 image.levels.size(), texts);
+}
+
+void write_png(const fs::path& path, const Image8& image, const Texts& texts) {
+  write_file(path, png_bytes(image, texts));
+}
+void write_png(const fs::path& path, const Raster8& image, const Texts& texts) {
+  write_file(path, png_bytes(image, texts));
+}
+void write_png(const fs::path& path, const Raster16& image, const Texts& texts) {
+  write_file(path, png_bytes(image, texts));
+}
+
+Image8 read_png(const fs::path& path, Texts* texts) {
+  const auto [file, info] = read_whole(path);
   png_image reader{};
   reader.version = PNG_IMAGE_VERSION;
   Image8 image;
@@ -117,7 +193,21 @@ Image8 read_png(const fs::path& path, Texts* texts) {
   const std::string message = reader.message;
   png_image_free(&reader);
   if (!done) throw InputError(fmt::format("{}: {}; make it again", path.string(), message));
-  if (texts) *texts = info->texts;
+  if (texts) *texts = info.texts;
+  return image;
+}
+
+Raster16 read_png_16(const fs::path& path, Texts* texts) {
+  const auto [file, info] = read_whole(path);
+  char message[200] = "";
+  png_structp png = png_create_read_struct(PNG_LIBPNG_VER_STRING, message, keep_message, no_warning);
+  png_infop details = png ? png_create_info_struct(png) : nullptr;
+  Source source{file};
+  Raster16 image;
+  const bool done = details && decode(png, details, &source, &image);
+  png_destroy_read_struct(&png, &details, nullptr);
+  if (!done) throw InputError(fmt::format("{}: {}; make it again", path.string(), message));
+  if (texts) *texts = info.texts;
   return image;
 }
 

@@ -1,4 +1,4 @@
-// PNG files: 8-bit sRGB, quick to write (zlib level 1, run lengths, SUB filter), never half written.
+// PNG files, quick to write (zlib level 1, run lengths, SUB filter), never half written.
 #pragma once
 
 #include <map>
@@ -12,12 +12,20 @@ namespace limber::render {
 
 using Texts = std::map<std::string, std::string>;  // tEXt chunks: keyword (1 … 79 Latin-1 letters) → text
 
+// 3 channels or 4 are said to be sRGB; grey ones are plain numbers (depth, scalars).
 std::string png_bytes(const Image8&, const Texts& = {});
+std::string png_bytes(const Raster8&, const Texts& = {});
+std::string png_bytes(const Raster16&, const Texts& = {});
 void write_png(const fs::path&, const Image8&, const Texts& = {});  // throws DiskError
+void write_png(const fs::path&, const Raster8&, const Texts& = {});
+void write_png(const fs::path&, const Raster16&, const Texts& = {});
 
 // Any PNG, brought to 8-bit sRGB; transparency over white. Throws InputError when the file is missing, is not
 // a PNG or is cut short.
 Image8 read_png(const fs::path&, Texts* texts = nullptr);
+
+// Any PNG with the channels it has (a palette becomes colours), 8-bit levels times 257. Throws as read_png.
+Raster16 read_png_16(const fs::path&, Texts* texts = nullptr);
 
 struct PngInfo {
   int width, height;

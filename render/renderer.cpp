@@ -10,10 +10,13 @@
 #include <span>
 
 #include "core/error.h"
-#include "render/detail/drawn_mesh.h"
 #include "render/detail/gl_context.h"
 #include "render/detail/ground_shade.h"
+#include "render/detail/line_quads.h"
+#include "render/detail/mesh_on_card.h"
+#include "render/detail/program.h"
 #include "render/detail/shaders.h"
+#include "render/detail/targets.h"
 
 namespace limber::render {
 
@@ -21,7 +24,7 @@ namespace {
 
 using namespace detail;
 
-constexpr int shadow_size = 2048;
+constexpr int shadow_size = Targets::shadow_size;
 constexpr int ground_key_cells = 768, ground_sky_cells = 384;
 // A level patch at height h hides the share h²/(π(h²+r²)²) of the sky from a place r beside its foot. Half a
 // narrow and half a wide Gaussian (deviations in units of h) keep within 0.03 of what it sums to over a disk.
@@ -29,85 +32,14 @@ constexpr double sky_spreads[] = {0.5, 1.6};
 const Vec3 key_light(0.80, 0.78, 0.75);
 const Vec3 sky_light(0.42, 0.445, 0.48);
 
-class Program {
- public:
-  Program(const char* vertex, const char* fragment) : id_(glCreateProgram()) {
-    for (const auto& [kind, text] :
-         {std::pair{GL_VERTEX_SHADER, vertex}, std::pair{GL_FRAGMENT_SHADER, fragment}}) {
-      const GLuint shader = glCreateShader(GLenum(kind));
-      glShaderSource(shader, 1, &text, nullptr);
-      glCompileShader(shader);
-      glAttachShader(id_, shader);
-      glDeleteShader(shader);
-    }
-    glLinkProgram(id_);
-    GLint linked = 0;
-    glGetProgramiv(id_, GL_LINK_STATUS, &linked);
-    char log[2000] = "";
-    glGetProgramInfoLog(id_, sizeof log, nullptr, log);
-    LIMBER_CHECK(linked, log);
-  }
-  void use() const { glUseProgram(id_); }
-  void set(const char* name, int v) const { glUniform1i(at(name), v); }
-  void set(const char* name, double v) const { glUniform1f(at(name), float(v)); }
-  void set(const char* name, const Eigen::Vector2d& v) const {
-    glUniform2f(at(name), float(v.x()), float(v.y()));
-  }
-  void set(const char* name, const Vec3& v) const {
-    glUniform3f(at(name), float(v.x()), float(v.y()), float(v.z()));
-  }
-  void set(const char* name, const Eigen::Vector4d& v) const {
-    glUniform4f(at(name), float(v[0]), float(v[1]), float(v[2]), float(v[3]));
-  }
-  void set(const char* name, const Eigen::Matrix3d& m) const {
-    glUniformMatrix3fv(at(name), 1, GL_FALSE, Eigen::Matrix3f(m.cast<float>()).data());
-  }
-  void set(const char* name, const Mat4& m) const {
-    glUniformMatrix4fv(at(name), 1, GL_FALSE, Eigen::Matrix4f(m.cast<float>()).data());
-  }
-
- private:
-  GLint at(const char* name) const { return glGetUniformLocation(id_, name); }
-  GLuint id_;
-};
-
-GLuint new_texture(GLenum filter, GLenum wrap) {
-  GLuint texture = 0;
-  glGenTextures(1, &texture);
-  glBindTexture(GL_TEXTURE_2D, texture);
-  glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GLint(filter));
-  glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAG_FILTER, GLint(filter));
-  glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_WRAP_S, GLint(wrap));
-  glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_WRAP_T, GLint(wrap));
-  return texture;
-}
-
-GLuint new_framebuffer(GLuint color, GLuint depth) {
-  GLuint framebuffer = 0;
-  glGenFramebuffers(1, &framebuffer);
-  glBindFramebuffer(GL_FRAMEBUFFER, framebuffer);
-  if (color) glFramebufferTexture2D(GL_FRAMEBUFFER, GL_COLOR_ATTACHMENT0, GL_TEXTURE_2D, color, 0);
-  if (depth) glFramebufferTexture2D(GL_FRAMEBUFFER, GL_DEPTH_ATTACHMENT, GL_TEXTURE_2D, depth, 0);
-  if (!color) glDrawBuffer(GL_NONE), glReadBuffer(GL_NONE);
-  const GLenum status = glCheckFramebufferStatus(GL_FRAMEBUFFER);
-  LIMBER_CHECK(status == GL_FRAMEBUFFER_COMPLETE, status);
-  return framebuffer;
-}
-
-void bind_texture(int unit, GLuint texture) {
-  glActiveTexture(GLenum(GL_TEXTURE0 + unit));
-  glBindTexture(GL_TEXTURE_2D, texture);
-}
-
-struct MeshOnCard {
+struct Mesh {
   MeshLook look;
-  DrawnMesh drawn;
-  Eigen::Index vertices = 0;  // rows the caller hands over
-  Box box;
-  GLuint array = 0, position_buffer = 0, normal_buffer = 0;
+  MeshOnCard card;
+  Points colors_srgb = {};         // empty: the look's
+  Eigen::VectorXd occlusion = {};  // empty: none
 
   bool transparent() const { return look.opacity < 1; }
-  bool casts() const { return look.opacity >= 0.5; }
+  bool casts() const { return look.casts_shadow && (!look.seen || look.opacity >= 0.5); }
 };
 
 struct Lines {
@@ -173,79 +105,101 @@ Points edges_of(const Box& box) {
   return ends;
 }
 
+namespace {
+
+// How a shader reads the samples of a pixel.
+std::string sample_defines(const Look& look) {
+  if (look.multisampling)
+    return "#define SAMPLER sampler2DMS\n#define INTEGER_SAMPLER isampler2DMS\n#define SAMPLES 4\n"
+           "#extension GL_ARB_sample_shading : require\n#define SAMPLE gl_SampleID\n"
+           "#define FETCH(samples, pixel, i) texelFetch(samples, pixel, i)\n";
+  return fmt::format(
+      "#define SAMPLER sampler2D\n#define INTEGER_SAMPLER isampler2D\n#define SAMPLES {1}\n"
+      "#define SAMPLE 0\n"
+      "#define FETCH(samples, pixel, i) texelFetch(samples, pixel * {0} + ivec2(i % {0}, i / {0}), 0)\n",
+      look.supersampling, look.supersampling * look.supersampling);
+}
+
+SampleGrid sample_grid(const Look& look) {
+  if (look.multisampling) return {look.width, look.height, 4};
+  return {look.width * look.supersampling, look.height * look.supersampling, 0};
+}
+
+}  // namespace
+
 struct Renderer::Impl {
   explicit Impl(const Look& l);
+
+  Image draw(const Camera&, Passes*);
 
   // The stages of a picture.
   Box shown() const;
   Box stage() const;
-  void draw_shadow_map(const Box& stage);
-  void shade_ground_maps(const Box& stage);
-  void draw_meshes(const Camera&, const Mat4& clip_from_world, const Box& stage);
-  void draw_lines(const Mat4& clip_from_world);
-  Image finish(const Camera&, const Box& stage);
+  void look_through(const Camera&);
+  void draw_shadow_map();
+  void shade_ground_maps();
+  void draw_opaque(bool passes);
+  void draw_veils();
+  void draw_lines(bool over_veils);
+  Image finish();
+  Passes finish_passes();
+
+  std::vector<Plane> planes_of(const Mesh&) const;
+  void draw_mesh(Mesh&, const std::string& defines);
+  void draw_depth(Mesh&, const Mat4& clip_from, const std::vector<Plane>&, const std::string& defines);
+  bool has_veils() const;
+  // Checks the number, and that there is a value for each of its vertices.
+  Mesh& mesh_with(int number, Eigen::Index values, bool may_be_empty);
 
   Look look;
   GlContext context;
-  Program mesh_program{mesh_vertex_shader, mesh_fragment_shader};
-  Program shadow_program{shadow_vertex_shader, shadow_fragment_shader};
-  Program line_program{line_vertex_shader, line_fragment_shader};
-  Program picture_program{picture_vertex_shader, picture_fragment_shader};
-  GLuint shadow_map, shadow_frame, samples, samples_depth, samples_frame, picture, picture_frame;
-  GLuint ground_key_map, ground_sky_map, empty_array, line_array, line_buffer;
-  std::vector<MeshOnCard> meshes;
+  Variants mesh_programs{mesh_vertex_shader, mesh_fragment_shader};
+  Variants depth_programs{depth_vertex_shader, depth_fragment_shader};
+  Variants line_programs{line_vertex_shader, line_fragment_shader};
+  Variants picture_programs{picture_vertex_shader, picture_fragment_shader};
+  Variants passes_programs{picture_vertex_shader, passes_fragment_shader};
+  std::string samples;  // defines
+  Targets targets;
+  GLuint empty_array, line_array, line_buffer, query;
+  std::vector<Mesh> meshes;
   std::vector<Lines> lines;
+  std::vector<Plane> clip_planes;
 
   // Left by one stage for the next.
-  Mat4 shadow_from_world = Mat4::Identity();
+  Camera camera;
+  Box stage_box;
+  double near_m = 1, far_m = 1;
+  Mat4 clip_from_world = Mat4::Identity(), shadow_from_world = Mat4::Identity();
   double shadow_texel_m = 1;
   GroundFrame ground;
+  Plane ground_plane;
+  bool ground_seen = false;  // there is one, and the eye is above it
   ShadeMap key_shade, sky_shade;
 };
 
-Renderer::Impl::Impl(const Look& l) : look(l) {
+Renderer::Impl::Impl(const Look& l)
+    : look(l), samples(sample_defines(l)), targets(l.width, l.height, sample_grid(l)) {
   look.up.normalize();
   look.toward_key.normalize();
   ground = ground_frame(look.up, look.ground_height_m.value_or(0));
-  const int width = look.width * look.supersampling, height = look.height * look.supersampling;
-
-  shadow_map = new_texture(GL_LINEAR, GL_CLAMP_TO_BORDER);
-  const float lit[] = {1, 1, 1, 1};
-  glTexParameterfv(GL_TEXTURE_2D, GL_TEXTURE_BORDER_COLOR, lit);
-  glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_COMPARE_MODE, GL_COMPARE_REF_TO_TEXTURE);
-  glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_COMPARE_FUNC, GL_LEQUAL);
-  glTexImage2D(GL_TEXTURE_2D, 0, GL_DEPTH_COMPONENT32F, shadow_size, shadow_size, 0, GL_DEPTH_COMPONENT,
-               GL_FLOAT, nullptr);
-  shadow_frame = new_framebuffer(0, shadow_map);
-
-  samples = new_texture(GL_NEAREST, GL_CLAMP_TO_EDGE);
-  glTexImage2D(GL_TEXTURE_2D, 0, GL_RGBA16F, width, height, 0, GL_RGBA, GL_FLOAT, nullptr);
-  samples_depth = new_texture(GL_NEAREST, GL_CLAMP_TO_EDGE);
-  glTexImage2D(GL_TEXTURE_2D, 0, GL_DEPTH_COMPONENT32F, width, height, 0, GL_DEPTH_COMPONENT, GL_FLOAT,
-               nullptr);
-  samples_frame = new_framebuffer(samples, samples_depth);
-
-  picture = new_texture(GL_NEAREST, GL_CLAMP_TO_EDGE);
-  glTexImage2D(GL_TEXTURE_2D, 0, GL_RGBA32F, look.width, look.height, 0, GL_RGBA, GL_FLOAT, nullptr);
-  picture_frame = new_framebuffer(picture, 0);
-
-  ground_key_map = new_texture(GL_LINEAR, GL_CLAMP_TO_EDGE);
-  ground_sky_map = new_texture(GL_LINEAR, GL_CLAMP_TO_EDGE);
+  ground_plane << ground.up, -ground.height_m;
+  glGenQueries(1, &query);
   glGenVertexArrays(1, &empty_array);
   glGenVertexArrays(1, &line_array);
   glGenBuffers(1, &line_buffer);
   glBindVertexArray(line_array);
   glBindBuffer(GL_ARRAY_BUFFER, line_buffer);
-  glVertexAttribPointer(0, 4, GL_FLOAT, GL_FALSE, 5 * sizeof(float), nullptr);
-  glVertexAttribPointer(1, 1, GL_FLOAT, GL_FALSE, 5 * sizeof(float),
-                        reinterpret_cast<void*>(4 * sizeof(float)));
+  constexpr GLsizei stride = line_corner_floats * sizeof(float);
+  glVertexAttribPointer(0, 4, GL_FLOAT, GL_FALSE, stride, nullptr);
+  glVertexAttribPointer(1, 1, GL_FLOAT, GL_FALSE, stride, reinterpret_cast<void*>(4 * sizeof(float)));
   glEnableVertexAttribArray(0);
   glEnableVertexAttribArray(1);
 }
 
 Box Renderer::Impl::shown() const {
   Box box;
-  for (const MeshOnCard& mesh : meshes) box.include(mesh.box);
+  for (const Mesh& mesh : meshes)
+    if (mesh.look.seen) box.include(mesh.card.box());
   for (const Lines& l : lines)
     if (l.ends.rows() > 0) box.include(bounding_box(l.ends));
   if (box.empty()) box.include(Vec3::Zero().eval());
@@ -255,14 +209,35 @@ Box Renderer::Impl::shown() const {
 Box Renderer::Impl::stage() const {
   if (!look.stage.empty()) return look.stage;
   Box box;
-  for (const MeshOnCard& mesh : meshes) box.include(mesh.box);
+  for (const Mesh& mesh : meshes) box.include(mesh.card.box());
   return box.empty() ? shown() : box;
 }
 
+bool Renderer::Impl::has_veils() const {
+  return std::any_of(meshes.begin(), meshes.end(),
+                     [](const Mesh& m) { return m.look.seen && m.transparent(); });
+}
+
+void Renderer::Impl::look_through(const Camera& c) {
+  camera = c;
+  stage_box = stage();
+  ground_seen = look.ground_height_m && ground_plane.dot(camera.eye.homogeneous()) > 0;
+  const Mat4 camera_from = camera_from_world(camera);
+  double nearest = 1e300, farthest = -1e300;
+  for_corners(shown(), [&](const Vec3& p) {
+    const double depth = -(camera_from * p.homogeneous()).z();
+    nearest = std::min(nearest, depth), farthest = std::max(farthest, depth);
+  });
+  far_m = std::max(1.01 * farthest, 1e-3);
+  near_m = std::clamp(0.98 * nearest, 1e-3 * far_m, 0.9 * far_m);
+  clip_from_world =
+      clip_from_camera(camera.fov_deg, double(look.width) / look.height, near_m, far_m) * camera_from;
+}
+
 // Orthographic, along the key light, just large enough for the stage and all that casts.
-void Renderer::Impl::draw_shadow_map(const Box& stage) {
+void Renderer::Impl::draw_shadow_map() {
   Camera light;
-  light.target = stage.center();
+  light.target = stage_box.center();
   light.eye = light.target + look.toward_key;
   light.up = std::abs(look.toward_key.dot(look.up)) > 0.99 ? ground.plane_from_world.row(1).transpose().eval()
                                                            : look.up;
@@ -271,69 +246,96 @@ void Renderer::Impl::draw_shadow_map(const Box& stage) {
   const auto include = [&](const Vec3& p) {
     seen.include(Vec3((light_from_world * p.homogeneous()).head<3>()));
   };
-  for_corners(stage, include);
-  for (const MeshOnCard& mesh : meshes)
-    if (mesh.casts()) for_corners(mesh.box, include);
+  for_corners(stage_box, include);
+  for (const Mesh& mesh : meshes)
+    if (mesh.casts()) for_corners(mesh.card.box(), include);
   const double side = std::max({seen.size().x(), seen.size().y(), 1e-6}) * (1 + 8.0 / shadow_size);
   const double depth = std::max(seen.size().z(), 1e-6);
   shadow_texel_m = side / shadow_size;
 
   Mat4 clip_from_light = Mat4::Identity();
   clip_from_light.diagonal() << 2 / side, 2 / side, -2 / (1.02 * depth), 1;
-  Mat4 clip_from_world = clip_from_light * light_from_world;
-  clip_from_world.topRightCorner<3, 1>() -= (clip_from_light * seen.center().homogeneous()).head<3>();
+  Mat4 clip_from = clip_from_light * light_from_world;
+  clip_from.topRightCorner<3, 1>() -= (clip_from_light * seen.center().homogeneous()).head<3>();
   Mat4 half = Mat4::Identity();
   half.diagonal() << 0.5, 0.5, 0.5, 1;
   half.col(3) << 0.5, 0.5, 0.5, 1;
-  shadow_from_world = half * clip_from_world;
+  shadow_from_world = half * clip_from;
 
-  glBindFramebuffer(GL_FRAMEBUFFER, shadow_frame);
+  glBindFramebuffer(GL_FRAMEBUFFER, targets.shadow_frame);
   glViewport(0, 0, shadow_size, shadow_size);
   glEnable(GL_DEPTH_TEST);
   glDepthMask(GL_TRUE);
   glClear(GL_DEPTH_BUFFER_BIT);
   glEnable(GL_POLYGON_OFFSET_FILL);
   glPolygonOffset(1.5f, 2.0f);
-  shadow_program.use();
-  shadow_program.set("clip_from_world", clip_from_world);
-  for (const MeshOnCard& mesh : meshes) {
+  glCullFace(GL_FRONT);
+  for (Mesh& mesh : meshes) {
     if (!mesh.casts()) continue;
-    glBindVertexArray(mesh.array);
-    glDrawElements(GL_TRIANGLES, GLsizei(mesh.drawn.corners.size()), GL_UNSIGNED_INT, nullptr);
+    (mesh.look.seen ? glDisable : glEnable)(GL_CULL_FACE);
+    draw_depth(mesh, clip_from, clip_planes, "");
   }
+  glDisable(GL_CULL_FACE);
   glDisable(GL_POLYGON_OFFSET_FILL);
 }
 
-void Renderer::Impl::shade_ground_maps(const Box& stage) {
+void Renderer::Impl::shade_ground_maps() {
   std::vector<const DrawnMesh*> casters;
-  Box box = stage;
+  Box box = stage_box;
   if (look.ground_height_m)
-    for (const MeshOnCard& mesh : meshes)
-      if (mesh.casts()) casters.push_back(&mesh.drawn), box.include(mesh.box);
+    for (const Mesh& mesh : meshes)
+      if (mesh.casts()) casters.push_back(&mesh.card.drawn()), box.include(mesh.card.box());
   const double key_spreads[] = {0.5 * std::tan(look.key_size_deg * std::numbers::pi / 180)};
-  key_shade = shade_ground(casters, ground, look.toward_key, key_spreads, box, ground_key_cells);
-  sky_shade = shade_ground(casters, ground, look.up, sky_spreads, box, ground_sky_cells);
-  for (const auto& [texture, map] :
-       {std::pair{ground_key_map, &key_shade}, std::pair{ground_sky_map, &sky_shade}}) {
-    bind_texture(0, texture);
-    glTexImage2D(GL_TEXTURE_2D, 0, GL_R32F, map->columns, map->rows, 0, GL_RED, GL_FLOAT,
-                 map->blocked.data());
-  }
+  key_shade = shade_ground(casters, ground, look.toward_key, key_spreads, box, ground_key_cells, clip_planes);
+  sky_shade = shade_ground(casters, ground, look.up, sky_spreads, box, ground_sky_cells, clip_planes);
+  fill(targets.ground_key_map, key_shade.columns, key_shade.rows, key_shade.blocked.data());
+  fill(targets.ground_sky_map, sky_shade.columns, sky_shade.rows, sky_shade.blocked.data());
 }
 
-void Renderer::Impl::draw_meshes(const Camera& camera, const Mat4& clip_from_world, const Box& stage) {
-  glBindFramebuffer(GL_FRAMEBUFFER, samples_frame);
-  glViewport(0, 0, look.width * look.supersampling, look.height * look.supersampling);
-  glDepthMask(GL_TRUE);
-  glClearColor(0, 0, 0, 0);
-  glClear(GL_COLOR_BUFFER_BIT | GL_DEPTH_BUFFER_BIT);
-  glEnable(GL_DEPTH_TEST);
+// What is below the ground is cut off, too, where the eye sees it from above.
+std::vector<Plane> Renderer::Impl::planes_of(const Mesh& mesh) const {
+  std::vector<Plane> planes = clip_planes;
+  bool below = false;
+  for_corners(mesh.card.box(), [&](const Vec3& c) { below |= ground_plane.dot(c.homogeneous()) < 0; });
+  if (ground_seen && below) planes.push_back(ground_plane);
+  return planes;
+}
 
-  const Eigen::Vector4d ground_plane(ground.up.x(), ground.up.y(), ground.up.z(), -ground.height_m);
-  const bool ground_hides = look.ground_height_m && ground_plane.dot(camera.eye.homogeneous()) > 0;
-  const Vec3 ground_color = look.ground_height_m ? linear_from_srgb(look.ground_srgb) : Vec3::Zero();
-  const Program& p = mesh_program;
+namespace {
+
+// Mesa 22.3 clips by what a shader writes even where clipping is off: so a shader writes as many as are
+// wanted.
+std::string plane_defines(const std::vector<Plane>& planes) {
+  for (int i = 0; i <= most_clip_planes; ++i)
+    (i < int(planes.size()) ? glEnable : glDisable)(GLenum(GL_CLIP_DISTANCE0 + i));
+  return fmt::format("#define PLANES {}\n", planes.size());
+}
+
+void set_planes(const Program& program, const std::vector<Plane>& planes) {
+  for (std::size_t i = 0; i < planes.size(); ++i)
+    program.set(fmt::format("planes[{}]", i).c_str(), planes[i]);
+}
+
+}  // namespace
+
+void Renderer::Impl::draw_depth(Mesh& mesh, const Mat4& clip_from, const std::vector<Plane>& planes,
+                                const std::string& defines) {
+  const Program& p = depth_programs.with(plane_defines(planes) + defines);
   p.use();
+  p.set("clip_from_world", clip_from);
+  p.set("nearer", 0);
+  set_planes(p, planes);
+  mesh.card.draw();
+}
+
+void Renderer::Impl::draw_mesh(Mesh& mesh, const std::string& defines) {
+  const std::vector<Plane> planes = planes_of(mesh);
+  std::string all = plane_defines(planes) + defines;
+  if (mesh.card.tinted()) all += "#define TINTED\n";
+  if (!clip_planes.empty()) all += "#define FLAT_INSIDE\n";
+  const Program& p = mesh_programs.with(all);
+  p.use();
+  set_planes(p, planes);
   p.set("clip_from_world", clip_from_world);
   p.set("shadow_from_world", shadow_from_world);
   p.set("shadow_offset_m", 2.0 * shadow_texel_m);
@@ -348,102 +350,143 @@ void Renderer::Impl::draw_meshes(const Camera& camera, const Mat4& clip_from_wor
   p.set("toward_key", look.toward_key);
   p.set("key_light", key_light);
   p.set("sky_light", sky_light);
-  p.set("ground_color", ground_color);
+  p.set("ground_color", look.ground_height_m ? linear_from_srgb(look.ground_srgb) : Vec3(Vec3::Zero()));
   p.set("ground_key", look.toward_key.dot(look.up));
   p.set("ground_height", ground.height_m);
-  p.set("faced_m", std::max(0.05 * stage.diagonal(), 1e-6));
+  p.set("faced_m", std::max(0.05 * stage_box.diagonal(), 1e-6));
   p.set("shadow_map", 0);
   p.set("ground_sky_map", 1);
-  bind_texture(0, shadow_map);
-  bind_texture(1, ground_sky_map);
+  targets.shadow_map.bind(0);
+  targets.ground_sky_map.bind(1);
 
-  const auto draw = [&](const MeshOnCard& mesh) {
-    p.set("albedo", linear_from_srgb(mesh.look.color_srgb));
-    p.set("roughness", mesh.look.roughness);
-    p.set("metallic", mesh.look.metallic);
-    p.set("opacity", mesh.look.opacity);
-    bool below = false;
-    for_corners(mesh.box, [&](const Vec3& c) { below |= ground_plane.dot(c.homogeneous()) < 0; });
-    // A distance that is always positive as well, because Mesa 22.3 clips even where clipping is off.
-    const bool cut = ground_hides && below;
-    (cut ? glEnable : glDisable)(GL_CLIP_DISTANCE0);
-    p.set("cut", cut ? ground_plane : Eigen::Vector4d(0, 0, 0, 1));
-    glBindVertexArray(mesh.array);
-    glDrawElements(GL_TRIANGLES, GLsizei(mesh.drawn.corners.size()), GL_UNSIGNED_INT, nullptr);
-  };
-  glDisable(GL_BLEND);
-  std::vector<const MeshOnCard*> veils;
-  for (const MeshOnCard& mesh : meshes)
-    if (mesh.transparent())
-      veils.push_back(&mesh);
-    else
-      draw(mesh);
-
-  // Far ones first; of each only its nearest layer, found by a pass for the depth alone.
-  const auto distance = [&](const MeshOnCard* mesh) { return (mesh->box.center() - camera.eye).norm(); };
-  std::stable_sort(veils.begin(), veils.end(), [&](auto a, auto b) { return distance(a) > distance(b); });
-  glEnable(GL_BLEND);
-  glBlendFunc(GL_ONE, GL_ONE_MINUS_SRC_ALPHA);
-  for (const MeshOnCard* mesh : veils) {
-    glColorMask(GL_FALSE, GL_FALSE, GL_FALSE, GL_FALSE);
-    draw(*mesh);
-    glColorMask(GL_TRUE, GL_TRUE, GL_TRUE, GL_TRUE);
-    glDepthFunc(GL_EQUAL);
-    draw(*mesh);
-    glDepthFunc(GL_LESS);
-  }
-  glDisable(GL_CLIP_DISTANCE0);
+  p.set("albedo", linear_from_srgb(mesh.look.color_srgb));
+  p.set("roughness", mesh.look.roughness);
+  p.set("metallic", mesh.look.metallic);
+  p.set("opacity", mesh.look.opacity);
+  p.set("object", int(&mesh - meshes.data()));
+  mesh.card.draw();
 }
 
-// Each segment becomes a quad of constant width on the screen, half a sample wider on each side for its soft
-// edge.
-void Renderer::Impl::draw_lines(const Mat4& clip_from_world) {
-  const Eigen::Vector2d size = Eigen::Vector2d(look.width, look.height) * look.supersampling;
-  glEnable(GL_BLEND);
-  glBlendFunc(GL_ONE, GL_ONE_MINUS_SRC_ALPHA);
-  glDepthMask(GL_FALSE);
-  line_program.use();
-  glBindVertexArray(line_array);
-  glBindBuffer(GL_ARRAY_BUFFER, line_buffer);
-  std::vector<float> corners;
-  for (const Lines& l : lines) {
-    const double half_width = 0.5 * l.look.width_px * look.supersampling;
-    corners.clear();
-    for (Eigen::Index i = 0; i + 1 < l.ends.rows(); i += 2) {
-      Eigen::Vector4d a = clip_from_world * Vec3(l.ends.row(i)).homogeneous();
-      Eigen::Vector4d b = clip_from_world * Vec3(l.ends.row(i + 1)).homogeneous();
-      const double near_a = a.z() + a.w(), near_b = b.z() + b.w();  // > 0: in front of the near plane
-      if (near_a <= 0 && near_b <= 0) continue;
-      if (near_a <= 0) a += (b - a) * (near_a / (near_a - near_b)) * (1 + 1e-9);
-      if (near_b <= 0) b += (a - b) * (near_b / (near_b - near_a)) * (1 + 1e-9);
-      const Eigen::Vector2d along = (b.head<2>() / b.w() - a.head<2>() / a.w()).cwiseProduct(0.5 * size);
-      if (!(along.norm() > 1e-9)) continue;
-      const double reach = half_width + 0.5;
-      const Eigen::Vector2d across = Eigen::Vector2d(-along.y(), along.x()).normalized() * reach;
-      const auto corner = [&](const Eigen::Vector4d& end, double side) {
-        const Eigen::Vector2d moved = end.head<2>() + side * across.cwiseQuotient(0.5 * size) * end.w();
-        corners.insert(corners.end(), {float(moved.x()), float(moved.y()), float(end.z()), float(end.w()),
-                                       float(side * reach)});
-      };
-      corner(a, -1), corner(b, -1), corner(b, 1);
-      corner(a, -1), corner(b, 1), corner(a, 1);
-    }
-    if (corners.empty()) continue;
-    const Vec3 color = linear_from_srgb(l.look.color_srgb);
-    line_program.set("line_color", Eigen::Vector4d(color.x(), color.y(), color.z(), l.look.opacity));
-    line_program.set("half_width", half_width);
-    glBufferData(GL_ARRAY_BUFFER, GLsizeiptr(corners.size() * sizeof(float)), corners.data(), GL_STREAM_DRAW);
-    glDrawArrays(GL_TRIANGLES, 0, GLsizei(corners.size() / 5));
+// Drawn with its edges over it, a surface stands back by as much as its depth changes over half the width of
+// a line.
+static void stand_back_for_edges(const Mesh& mesh, int samples_per_pixel_side) {
+  (mesh.look.edges ? glEnable : glDisable)(GL_POLYGON_OFFSET_FILL);
+  if (mesh.look.edges)
+    glPolygonOffset(float(0.5 * mesh.look.edges->width_px * samples_per_pixel_side + 1.5), 4.0f);
+}
+
+void Renderer::Impl::draw_opaque(bool passes) {
+  glBindFramebuffer(GL_FRAMEBUFFER, passes ? targets.passes().frame : targets.samples_frame);
+  const SampleGrid grid = sample_grid(look);
+  glViewport(0, 0, grid.width, grid.height);
+  glDepthMask(GL_TRUE);
+  glEnable(GL_DEPTH_TEST);
+  glDisable(GL_BLEND);
+  const float nothing[4] = {0, 0, 0, 0}, no_scalar[4] = {0, 0, 0, NAN}, far[1] = {1};
+  const int no_object[4] = {-1, 0, 0, 0};
+  glClearBufferfv(GL_COLOR, 0, nothing);
+  glClearBufferfv(GL_DEPTH, 0, far);
+  if (passes) {
+    glClearBufferfv(GL_COLOR, 1, no_scalar);
+    glClearBufferiv(GL_COLOR, 2, no_object);
   }
+  for (Mesh& mesh : meshes) {
+    if (!mesh.look.seen || mesh.transparent()) continue;
+    stand_back_for_edges(mesh, look.multisampling ? 1 : look.supersampling);
+    draw_mesh(mesh, passes ? "#define PASSES\n" : "");
+  }
+  glDisable(GL_POLYGON_OFFSET_FILL);
+  plane_defines({});
+}
+
+// Depth peeling, front to back: of all veils the layer behind the last one is found by depth alone, then
+// shaded and put under what is there.
+void Renderer::Impl::draw_veils() {
+  const Targets::Veils& veils = targets.veils();
+  const SampleGrid grid = sample_grid(look);
+  const float nothing[4] = {0, 0, 0, 0};
+  glBindFramebuffer(GL_FRAMEBUFFER, veils.frame[0]);
+  glClearBufferfv(GL_COLOR, 0, nothing);
+  for (int layer = 0; layer < most_veil_layers; ++layer) {
+    // The first layer's depth is kept: lines before it are drawn over it.
+    const auto place = [](int l) { return std::size_t(l == 0 ? 0 : 1 + l % 2); };
+    const unsigned frame = veils.frame[place(layer)];
+    glBindFramebuffer(GL_READ_FRAMEBUFFER, targets.samples_frame);
+    glBindFramebuffer(GL_DRAW_FRAMEBUFFER, frame);
+    glBlitFramebuffer(0, 0, grid.width, grid.height, 0, 0, grid.width, grid.height, GL_DEPTH_BUFFER_BIT,
+                      GL_NEAREST);
+    glBindFramebuffer(GL_FRAMEBUFFER, frame);
+    const auto draw_all = [&](const auto& draw) {
+      for (Mesh& mesh : meshes) {
+        if (!mesh.look.seen || !mesh.transparent()) continue;
+        stand_back_for_edges(mesh, look.multisampling ? 1 : look.supersampling);
+        draw(mesh);
+      }
+    };
+    glColorMask(GL_FALSE, GL_FALSE, GL_FALSE, GL_FALSE);
+    glDepthMask(GL_TRUE);
+    glDisable(GL_BLEND);
+    if (layer > 0) veils.depth[place(layer - 1)].bind(0);
+    glBeginQuery(GL_ANY_SAMPLES_PASSED, query);
+    draw_all([&](Mesh& mesh) {
+      draw_depth(mesh, clip_from_world, planes_of(mesh), layer > 0 ? samples + "#define BEHIND\n" : "");
+    });
+    glEndQuery(GL_ANY_SAMPLES_PASSED);
+    glColorMask(GL_TRUE, GL_TRUE, GL_TRUE, GL_TRUE);
+    GLuint any = 0;
+    glGetQueryObjectuiv(query, GL_QUERY_RESULT, &any);
+    if (!any) break;
+
+    glDepthMask(GL_FALSE);
+    glDepthFunc(GL_EQUAL);
+    glEnable(GL_BLEND);
+    glBlendFunc(GL_ONE_MINUS_DST_ALPHA, GL_ONE);
+    draw_all([&](Mesh& mesh) { draw_mesh(mesh, ""); });
+    glDepthFunc(GL_LESS);
+  }
+  glDisable(GL_BLEND);
+  glDisable(GL_POLYGON_OFFSET_FILL);
+  plane_defines({});
+}
+
+// Under the veils all lines are drawn on what is opaque; over them, those before the first layer, where there
+// is one.
+void Renderer::Impl::draw_lines(bool over_veils) {
+  const double per_pixel = look.multisampling ? 1 : look.supersampling;
+  const SampleGrid grid = sample_grid(look);
+  const Screen screen{clip_from_world, Eigen::Vector2d(grid.width, grid.height)};
+  glBindFramebuffer(GL_FRAMEBUFFER, over_veils ? targets.veils().frame[0] : targets.samples_frame);
+  glEnable(GL_BLEND);
+  glBlendFunc(GLenum(over_veils ? GL_DST_ALPHA : GL_ONE), GL_ONE_MINUS_SRC_ALPHA);
+  glDepthMask(GL_FALSE);
+  const Program& p = line_programs.with("");
+  p.use();
+  glBindVertexArray(line_array);
+  std::vector<float> corners;
+  const auto draw = [&](const Points& ends, const LineLook& line, const std::vector<Plane>& planes) {
+    line_quads(ends, screen, line.width_px * per_pixel, planes, corners);
+    if (corners.empty()) return;
+    const Vec3 color = linear_from_srgb(line.color_srgb);
+    p.set("line_color", Eigen::Vector4d(color.x(), color.y(), color.z(), line.opacity));
+    p.set("half_width", 0.5 * line.width_px * per_pixel);
+    glBindBuffer(GL_ARRAY_BUFFER, line_buffer);
+    glBufferData(GL_ARRAY_BUFFER, GLsizeiptr(corners.size() * sizeof(float)), corners.data(), GL_STREAM_DRAW);
+    glDrawArrays(GL_TRIANGLES, 0, GLsizei(corners.size() / line_corner_floats));
+  };
+  for (const Lines& l : lines) draw(l.ends, l.look, {});
+  for (Mesh& mesh : meshes)
+    if (mesh.look.seen && mesh.look.edges) draw(mesh.card.edge_ends(), *mesh.look.edges, planes_of(mesh));
   glDisable(GL_BLEND);
   glDepthMask(GL_TRUE);
 }
 
-Image Renderer::Impl::finish(const Camera& camera, const Box& stage) {
-  glBindFramebuffer(GL_FRAMEBUFFER, picture_frame);
+Image Renderer::Impl::finish() {
+  glBindFramebuffer(GL_FRAMEBUFFER, targets.picture_frame);
   glViewport(0, 0, look.width, look.height);
   glDisable(GL_DEPTH_TEST);
-  const Program& p = picture_program;
+  const bool veiled = has_veils();
+  const Program& p = picture_programs.with(samples + (veiled ? "#define VEILS\n" : "") +
+                                           (look.transparent_background ? "#define TRANSPARENT\n" : ""));
   p.use();
 
   const double tangent = std::tan(0.5 * camera.fov_deg * std::numbers::pi / 180);
@@ -453,11 +496,10 @@ Image Renderer::Impl::finish(const Camera& camera, const Box& stage) {
   const auto shown_as = [](const Vec3& srgb) {
     return Vec3(linear_from_srgb(srgb).unaryExpr(&tone_unmapped));
   };
-  const Eigen::Vector4d ground_plane(ground.up.x(), ground.up.y(), ground.up.z(), -ground.height_m);
   const double key_share = key_light.y() * look.toward_key.dot(look.up);
   p.set("ray_from_screen", ray);
   p.set("samples", 0);
-  p.set("per_side", look.supersampling);
+  p.set("veils", 3);
   p.set("last_row", look.height - 1);
   p.set("background_bottom", shown_as(look.background_bottom_srgb));
   p.set("background_top", shown_as(look.background_top_srgb));
@@ -466,12 +508,12 @@ Image Renderer::Impl::finish(const Camera& camera, const Box& stage) {
   p.set("ground_x", Vec3(ground.plane_from_world.row(0)));
   p.set("ground_y", Vec3(ground.plane_from_world.row(1)));
   p.set("ground_color", shown_as(look.ground_srgb));
-  p.set("ground_shown", look.ground_height_m && ground_plane.dot(camera.eye.homogeneous()) > 0 ? 1.0 : 0.0);
+  p.set("ground_shown", ground_seen ? 1.0 : 0.0);
   p.set("key_share", key_share / (key_share + sky_light.y()));
   p.set("sky_darkening", 0.85);
-  p.set("fade_middle", Eigen::Vector2d(ground.plane_from_world * stage.center()));
-  p.set("fade_begin", 0.7 * stage.diagonal());
-  p.set("fade_end", 2.6 * stage.diagonal() + 1e-6);
+  p.set("fade_middle", Eigen::Vector2d(ground.plane_from_world * stage_box.center()));
+  p.set("fade_begin", 0.7 * stage_box.diagonal());
+  p.set("fade_end", 2.6 * stage_box.diagonal() + 1e-6);
   p.set("ground_key_map", 1);
   p.set("ground_sky_map", 2);
   const auto place = [&](const ShadeMap& map, const char* lower, const char* scale) {
@@ -480,9 +522,10 @@ Image Renderer::Impl::finish(const Camera& camera, const Box& stage) {
   };
   place(key_shade, "key_lower", "key_scale");
   place(sky_shade, "sky_lower", "sky_scale");
-  bind_texture(0, samples);
-  bind_texture(1, ground_key_map);
-  bind_texture(2, ground_sky_map);
+  targets.samples.bind(0);
+  targets.ground_key_map.bind(1);
+  targets.ground_sky_map.bind(2);
+  if (veiled) targets.veils().color.bind(3);
   glBindVertexArray(empty_array);
   glDrawArrays(GL_TRIANGLES, 0, 3);
 
@@ -491,6 +534,45 @@ Image Renderer::Impl::finish(const Camera& camera, const Box& stage) {
   const GLenum error = glGetError();
   LIMBER_CHECK(error == GL_NO_ERROR, error);
   return image;
+}
+
+Passes Renderer::Impl::finish_passes() {
+  const Targets::Passes& from = targets.passes();
+  glBindFramebuffer(GL_FRAMEBUFFER, from.pixel_frame);
+  glViewport(0, 0, look.width, look.height);
+  glDisable(GL_DEPTH_TEST);
+  const Program& p = passes_programs.with(samples);
+  p.use();
+  p.set("samples_depth", 0);
+  p.set("normal_scalar", 1);
+  p.set("object", 2);
+  p.set("last_row", look.height - 1);
+  targets.samples_depth.bind(0);
+  from.normal_scalar.bind(1);
+  from.object.bind(2);
+  glBindVertexArray(empty_array);
+  glDrawArrays(GL_TRIANGLES, 0, 3);
+
+  const std::size_t pixels = std::size_t(look.width) * look.height;
+  Passes passes{look.width, look.height, std::vector<float>(pixels), {}, std::vector<int>(pixels), {}};
+  std::vector<float> normal_scalar(4 * pixels);
+  glReadBuffer(GL_COLOR_ATTACHMENT0);
+  glReadPixels(0, 0, look.width, look.height, GL_RGBA, GL_FLOAT, normal_scalar.data());
+  glReadBuffer(GL_COLOR_ATTACHMENT1);
+  glReadPixels(0, 0, look.width, look.height, GL_RED, GL_FLOAT, passes.depth_m.data());
+  glReadBuffer(GL_COLOR_ATTACHMENT2);
+  glReadPixels(0, 0, look.width, look.height, GL_RED_INTEGER, GL_INT, passes.object.data());
+  const GLenum error = glGetError();
+  LIMBER_CHECK(error == GL_NO_ERROR, error);
+
+  passes.normal.reserve(3 * pixels), passes.scalar.reserve(pixels);
+  for (std::size_t i = 0; i < pixels; ++i) {
+    passes.normal.insert(passes.normal.end(), &normal_scalar[4 * i], &normal_scalar[4 * i] + 3);
+    passes.scalar.push_back(normal_scalar[4 * i + 3]);
+    float& depth = passes.depth_m[i];  // 0 at near_m, 1 at far_m, linear in 1 / distance
+    depth = passes.object[i] < 0 ? INFINITY : float(near_m * far_m / (far_m - depth * (far_m - near_m)));
+  }
+  return passes;
 }
 
 Renderer::Renderer(const Look& look) {
@@ -503,44 +585,66 @@ int Renderer::add_mesh(const Triangles& triangles, const Points& rest_positions,
   validate(look);
   limber::validate(SurfaceMesh{rest_positions, triangles}, fmt::format("mesh '{}'", look.name));
   impl_->context.make_current();
-  MeshOnCard mesh;
-  mesh.look = look;
-  mesh.vertices = rest_positions.rows();
-  mesh.drawn = order_for_drawing(triangles, rest_positions, look.crease_angle_deg);
-  glGenVertexArrays(1, &mesh.array);
-  glBindVertexArray(mesh.array);
-  GLuint buffers[3];
-  glGenBuffers(3, buffers);
-  for (int i = 0; i < 2; ++i) {
-    glBindBuffer(GL_ARRAY_BUFFER, buffers[i]);
-    glVertexAttribPointer(GLuint(i), 3, GL_FLOAT, GL_FALSE, 0, nullptr);
-    glEnableVertexAttribArray(GLuint(i));
+  impl_->meshes.push_back({look, MeshOnCard(triangles, rest_positions, look.crease_angle_deg)});
+  return int(impl_->meshes.size()) - 1;
+}
+
+namespace {
+
+void tint(Mesh& mesh) {
+  Eigen::Matrix<float, Eigen::Dynamic, 4, Eigen::RowMajor> tints(mesh.card.vertices(), 4);
+  const Vec3 plain = linear_from_srgb(mesh.look.color_srgb);
+  for (Eigen::Index v = 0; v < tints.rows(); ++v) {
+    const Vec3 color = mesh.colors_srgb.rows() > 0 ? linear_from_srgb(Vec3(mesh.colors_srgb.row(v))) : plain;
+    const double open = mesh.occlusion.size() > 0 ? 1 - mesh.occlusion[v] : 1;
+    tints.row(v) << color.transpose().cast<float>(), float(open);
   }
-  mesh.position_buffer = buffers[0], mesh.normal_buffer = buffers[1];
-  glBindBuffer(GL_ELEMENT_ARRAY_BUFFER, buffers[2]);
-  const auto& corners = mesh.drawn.corners;
-  glBufferData(GL_ELEMENT_ARRAY_BUFFER, GLsizeiptr(corners.size() * sizeof corners[0]), corners.data(),
-               GL_STATIC_DRAW);
-  impl_->meshes.push_back(std::move(mesh));
-  const int number = int(impl_->meshes.size()) - 1;
-  set_positions(number, rest_positions);
-  return number;
+  mesh.card.set_tints(tints);
+}
+
+}  // namespace
+
+Mesh& Renderer::Impl::mesh_with(int number, Eigen::Index values, bool may_be_empty) {
+  LIMBER_CHECK(0 <= number && number < int(meshes.size()), number, meshes.size());
+  Mesh& mesh = meshes[std::size_t(number)];
+  LIMBER_CHECK(values == mesh.card.vertices() || (may_be_empty && values == 0), mesh.look.name, values,
+               mesh.card.vertices());
+  context.make_current();
+  return mesh;
 }
 
 void Renderer::set_positions(int number, const Points& positions, const Points& normals) {
-  LIMBER_CHECK(0 <= number && number < int(impl_->meshes.size()), number, impl_->meshes.size());
-  MeshOnCard& mesh = impl_->meshes[std::size_t(number)];
-  LIMBER_CHECK(positions.rows() == mesh.vertices && positions.allFinite(), mesh.look.name, positions.rows(),
-               mesh.vertices);
-  LIMBER_CHECK(normals.rows() == 0 || normals.rows() == mesh.vertices, mesh.look.name, normals.rows(),
-               mesh.vertices);
-  impl_->context.make_current();
-  deform(mesh.drawn, positions, normals);
-  mesh.box = bounding_box(positions);
-  for (const auto& [buffer, values] : {std::pair{mesh.position_buffer, &mesh.drawn.positions},
-                                       std::pair{mesh.normal_buffer, &mesh.drawn.normals}}) {
-    glBindBuffer(GL_ARRAY_BUFFER, buffer);
-    glBufferData(GL_ARRAY_BUFFER, GLsizeiptr(values->size() * sizeof(float)), values->data(), GL_STREAM_DRAW);
+  Mesh& mesh = impl_->mesh_with(number, positions.rows(), false);
+  LIMBER_CHECK(positions.allFinite(), mesh.look.name);
+  impl_->mesh_with(number, normals.rows(), true).card.set_positions(positions, normals);
+}
+
+void Renderer::set_colors(int number, const Points& colors_srgb) {
+  Mesh& mesh = impl_->mesh_with(number, colors_srgb.rows(), true);
+  LIMBER_CHECK(colors_srgb.allFinite(), mesh.look.name);
+  mesh.colors_srgb = colors_srgb;
+  tint(mesh);
+}
+
+void Renderer::set_occlusion(int number, const Eigen::VectorXd& occlusion) {
+  Mesh& mesh = impl_->mesh_with(number, occlusion.size(), true);
+  LIMBER_CHECK(occlusion.allFinite(), mesh.look.name);
+  mesh.occlusion = occlusion;
+  tint(mesh);
+}
+
+void Renderer::set_scalars(int number, const Eigen::VectorXd& values) {
+  impl_->mesh_with(number, values.size(), false).card.set_scalars(values);
+}
+
+void Renderer::set_clip_planes(const std::vector<Plane>& planes) {
+  require(planes.size() <= most_clip_planes,
+          fmt::format("{} clip planes: at most {}", planes.size(), most_clip_planes));
+  impl_->clip_planes.clear();
+  for (std::size_t i = 0; i < planes.size(); ++i) {
+    require(planes[i].allFinite() && planes[i].head<3>().norm() > 0,
+            fmt::format("clip plane {}: its normal is zero, or a number is not finite", i));
+    impl_->clip_planes.push_back(planes[i] / planes[i].head<3>().norm());
   }
 }
 
@@ -557,28 +661,23 @@ void Renderer::set_lines(int number, const Points& ends) {
   impl_->lines[std::size_t(number)].ends = ends;
 }
 
-Image Renderer::draw(const Camera& camera) {
-  render::validate(camera);
-  Impl& r = *impl_;
-  r.context.make_current();
-
-  const Mat4 camera_from = camera_from_world(camera);
-  double nearest = 1e300, farthest = -1e300;
-  for_corners(r.shown(), [&](const Vec3& p) {
-    const double depth = -(camera_from * p.homogeneous()).z();
-    nearest = std::min(nearest, depth), farthest = std::max(farthest, depth);
-  });
-  const double far_m = std::max(1.01 * farthest, 1e-3),
-               near_m = std::clamp(0.98 * nearest, 1e-3 * far_m, 0.9 * far_m);
-  const Mat4 clip_from_world =
-      clip_from_camera(camera.fov_deg, double(r.look.width) / r.look.height, near_m, far_m) * camera_from;
-
-  const Box stage = r.stage();
-  r.draw_shadow_map(stage);
-  r.shade_ground_maps(stage);
-  r.draw_meshes(camera, clip_from_world, stage);
-  r.draw_lines(clip_from_world);
-  return r.finish(camera, stage);
+Image Renderer::Impl::draw(const Camera& from, Passes* passes) {
+  render::validate(from);
+  context.make_current();
+  look_through(from);
+  draw_shadow_map();
+  shade_ground_maps();
+  draw_opaque(passes != nullptr);
+  draw_lines(false);
+  if (has_veils()) {
+    draw_veils();
+    draw_lines(true);
+  }
+  if (passes) *passes = finish_passes();
+  return finish();
 }
+
+Image Renderer::draw(const Camera& camera) { return impl_->draw(camera, nullptr); }
+Image Renderer::draw(const Camera& camera, Passes& passes) { return impl_->draw(camera, &passes); }
 
 }  // namespace limber::render

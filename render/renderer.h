@@ -16,6 +16,8 @@ namespace limber::render {
 struct Look {
   int width = 1920, height = 1080;  // pixels, 1 … 8192
   int supersampling = 2;            // samples a pixel are this squared; 1 … 4
+  // The fast mode: 4 samples a pixel that share one shading (MSAA); supersampling then counts for nothing.
+  bool multisampling = false;
   Vec3 background_top_srgb = {0.80, 0.84, 0.88};
   Vec3 background_bottom_srgb = {0.93, 0.94, 0.95};
   Vec3 ground_srgb = {0.93, 0.935, 0.94};  // where nothing shades it
@@ -26,6 +28,15 @@ struct Look {
   // The box over the whole motion. Shadow maps and the ground's fade are laid out for it, so nothing swims
   // from frame to frame. Empty: laid out anew for what each frame shows.
   Box stage;
+  // The picture holds the bodies, lines and the shadows on the ground alone, to be put over another: see
+  // Image.
+  bool transparent_background = false;
+};
+
+struct LineLook {
+  Vec3 color_srgb = {0.55, 0.6, 0.66};
+  double width_px = 1.5;  // pixels of the finished picture
+  double opacity = 0.8;
 };
 
 struct MeshLook {
@@ -33,15 +44,32 @@ struct MeshLook {
   Vec3 color_srgb = {0.75, 0.75, 0.75};
   double roughness = 0.45;  // 0.05 … 1
   double metallic = 0;      // 0 … 1
-  double opacity = 1;       // below 1 only the layer nearest to the eye is seen; below 0.5 it casts no shadow
+  double opacity = 1;       // of each layer that a ray of sight meets; below 0.5 it casts no shadow
   // Edges sharper than this at rest are drawn sharp; 180: all smooth.
   double crease_angle_deg = 50;
+  // A coarse closed mesh that is not seen may cast the shadows of a fine one within it that casts none: only
+  // its faces turned from the light do, so that it does not shade what it encloses.
+  bool seen = true;
+  bool casts_shadow = true;
+  std::optional<LineLook> edges = {};  // drawn over the surface; what hides the surface hides them
 };
 
-struct LineLook {
-  Vec3 color_srgb = {0.55, 0.6, 0.66};
-  double width_px = 1.5;  // pixels of the finished picture
-  double opacity = 0.8;
+// Where one ray of sight meets more layers of veils (opacity below 1) than this, the farthest are left out.
+constexpr int most_veil_layers = 8;
+
+// A plane n·p + d = 0 as (n, d).
+using Plane = Eigen::Vector4d;
+constexpr int most_clip_planes = 6;
+
+// What the picture shows, apart from how it looks: of each pixel the sample nearest to the eye. Of opaque
+// meshes only; ground, lines and veils are left out. Row 0 is the top.
+struct Passes {
+  int width = 0, height = 0;
+  std::vector<float> depth_m;  // along the view axis; infinity where there is nothing
+  std::vector<float>
+      normal;  // (height × width × 3), world axes, towards the eye; zero where there is nothing
+  std::vector<int> object;    // number of the mesh; −1 where there is nothing
+  std::vector<float> scalar;  // set_scalars, 0 for meshes without; NaN where there is nothing
 };
 
 // The 12 edges, (24 × 3): edge i runs from row 2i to row 2i + 1.
@@ -63,11 +91,25 @@ class Renderer {
   // normals (V × 3) are unit vectors, or empty: then computed. At creases they are always computed.
   void set_positions(int mesh, const Points& positions, const Points& normals = {});
 
+  // One colour a vertex (V × 3, sRGB), in linear light in between; empty: the look's colour again.
+  void set_colors(int mesh, const Points& colors_srgb);
+  // The share of the sky that each vertex does not see, 0 … 1, as occlusion.h finds it. It darkens the light
+  // of sky and ground, not the key light. Empty: none.
+  void set_occlusion(int mesh, const Eigen::VectorXd&);
+  void set_scalars(int mesh, const Eigen::VectorXd&);  // one a vertex, for Passes
+
+  // What lies where n·p + d < 0 for one of the planes is cut off all meshes and edges, not off other lines,
+  // and casts no shadow. Insides seen through the cut are drawn flat and darker; meshes must be wound
+  // outwards for that. Throws InputError when there are more than most_clip_planes or a normal is zero.
+  void set_clip_planes(const std::vector<Plane>&);
+
   // ends: row 2i to row 2i + 1. Lines are hidden by what is before them and cast no shadow.
   int add_lines(const Points& ends, const LineLook&);
   void set_lines(int lines, const Points& ends);
 
   Image draw(const Camera&);
+  // The passes of the same drawing as well. Costs about as much again.
+  Image draw(const Camera&, Passes&);
 
  private:
   struct Impl;

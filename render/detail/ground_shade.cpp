@@ -138,8 +138,8 @@ GroundFrame ground_frame(const Vec3& up, double height_m) {
 }
 
 ShadeMap shade_ground(std::span<const DrawnMesh* const> casters, const GroundFrame& frame,
-                      const Vec3& toward_light, std::span<const double> spreads, const Box& stage,
-                      int cells) {
+                      const Vec3& toward_light, std::span<const double> spreads, const Box& stage, int cells,
+                      std::span<const Eigen::Vector4d> planes) {
   const Vec3 light = toward_light / frame.up.dot(toward_light);
   const double widest = *std::max_element(spreads.begin(), spreads.end());
   const auto height = [&](const Vec3& p) { return std::max(0.0, frame.up.dot(p) - frame.height_m); };
@@ -171,9 +171,18 @@ ShadeMap shade_ground(std::span<const DrawnMesh* const> casters, const GroundFra
       const Eigen::Vector2d at = (onto_ground(p) - map.lower) / map.cell_m;
       corners[v] = {at.x(), at.y(), height(p) / band_0_m};
     }
+    const auto is_cut = [&](std::size_t c) {
+      Vec3 middle = Vec3::Zero();
+      for (std::size_t i = 0; i < 3; ++i)
+        for (std::size_t k = 0; k < 3; ++k)
+          middle[int(k)] += mesh->positions[3 * mesh->corners[c + i] + k] / 3;
+      return std::any_of(planes.begin(), planes.end(),
+                         [&](const Eigen::Vector4d& plane) { return plane.dot(middle.homogeneous()) < 0; });
+    };
     for (std::size_t c = 0; c < mesh->corners.size(); c += 3)
-      rasterize({corners[mesh->corners[c]], corners[mesh->corners[c + 1]], corners[mesh->corners[c + 2]]},
-                raster);
+      if (planes.empty() || !is_cut(c))
+        rasterize({corners[mesh->corners[c]], corners[mesh->corners[c + 1]], corners[mesh->corners[c + 2]]},
+                  raster);
   }
 
   map.blocked.assign(std::size_t(map.columns) * map.rows, 0.0f);

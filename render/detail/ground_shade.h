@@ -28,8 +28,10 @@ struct ShadeMap {
 
 // Rays arrive from `toward_light` (above the horizon). What is at height h is blurred by the average of
 // Gaussians with the deviations spreads[i] × h metres. The map is large enough for `stage` and its longer
-// side has about `cells` cells; at its border it fades out.
+// side has about `cells` cells; at its border it fades out. Triangles whose middle has n·p + d < 0 for a
+// plane (n, d) cast nothing.
 ShadeMap shade_ground(std::span<const DrawnMesh* const> casters, const GroundFrame&, const Vec3& toward_light,
-                      std::span<const double> spreads, const Box& stage, int cells);
+                      std::span<const double> spreads, const Box& stage, int cells,
+                      std::span<const Eigen::Vector4d> planes = {});
 
 }  // namespace limber::render::detail

@@ -2,15 +2,27 @@
 
 namespace limber::render::detail {
 
-const char* const mesh_vertex_shader = R"(#version 330 core
+const char* const mesh_vertex_shader = R"(
 layout(location = 0) in vec3 position_in;
 layout(location = 1) in vec3 normal_in;
+#ifdef TINTED
+layout(location = 2) in vec4 tint_in;
+out vec4 tint;
+#endif
+#ifdef PASSES
+layout(location = 3) in float scalar_in;
+out float scalar;
+#endif
 uniform mat4 clip_from_world;
 uniform mat4 shadow_from_world;
 uniform vec3 toward_key;
 uniform float shadow_offset_m;   // along the normal: about a texel of the shadow map, or surfaces shade themselves
-uniform vec4 cut;                // a plane: what is below it is cut off
+#if PLANES > 0
+uniform vec4 planes[PLANES];     // what is below one is cut off
+out float gl_ClipDistance[PLANES];
+#endif
 out vec3 position, normal, shadow_place;
+invariant gl_Position;           // the same in all variants: veils compare depths for equality
 void main() {
   position = position_in;
   normal = normal_in;
@@ -18,14 +30,34 @@ void main() {
   vec3 offset = shadow_offset_m * (dot(normal_in, toward_key) < 0.0 ? -normal_in : normal_in);
   shadow_place = (shadow_from_world * vec4(position_in + offset, 1.0)).xyz;
   gl_Position = clip_from_world * vec4(position_in, 1.0);
-  gl_ClipDistance[0] = dot(cut, vec4(position_in, 1.0));
+#ifdef TINTED
+  tint = tint_in;
+#endif
+#ifdef PASSES
+  scalar = scalar_in;
+#endif
+#if PLANES > 0
+  for (int i = 0; i < PLANES; ++i) gl_ClipDistance[i] = dot(planes[i], vec4(position_in, 1.0));
+#endif
 }
 )";
 
 // Key: Lambert and GGX with Schlick's approximations (Karis, SIGGRAPH 2013 course). Ambient: a sky above, the
 // ground below.
-const char* const mesh_fragment_shader = R"(#version 330 core
+const char* const mesh_fragment_shader = R"(
 in vec3 position, normal, shadow_place;
+#ifdef TINTED
+in vec4 tint;                    // colour, and the share of the sky that is open
+#define albedo tint.rgb
+#else
+uniform vec3 albedo;
+#endif
+#ifdef PASSES
+in float scalar;
+uniform int object;
+layout(location = 1) out vec4 normal_scalar;
+layout(location = 2) out int object_seen;
+#endif
 uniform vec3 eye, up, toward_key;
 uniform vec3 key_light, sky_light, ground_color;  // ground_color is black without a ground
 uniform float ground_key;        // share of the key light that a level surface gets
@@ -33,12 +65,11 @@ uniform vec3 ground_x, ground_y;
 uniform vec2 ground_lower, ground_scale;
 uniform float ground_height;
 uniform float faced_m;           // how far before a wall lies the ground that lights it
-uniform vec3 albedo;
 uniform float roughness, metallic, opacity;
 uniform float shadow_step;       // between taps, in units of the map
 uniform sampler2DShadow shadow_map;
 uniform sampler2D ground_sky_map;
-out vec4 color;
+layout(location = 0) out vec4 color;
 
 float key_visibility() {
   float sum = 0.0;
@@ -87,26 +118,59 @@ void main() {
 
   float edge = 1.0 - n_v;
   vec3 rim = sky_light * (0.55 * edge * edge * edge * (0.5 + 0.5 * n_up)) * (0.4 + 0.6 * albedo);
-  color = vec4((key + ambient + rim) * opacity, opacity);
+#ifdef TINTED
+  // What hides the sky sends some light itself, the more the lighter it is (Jimenez et al., Practical Realtime Strategies
+  // for Accurate Indirect Occlusion, 2016, eq. 10).
+  float sky = tint.a;
+  vec3 open_sky = max(vec3(sky), ((sky * (2.0404 * albedo - 0.3324) + (0.6417 - 4.7951 * albedo)) * sky + (2.7552 * albedo + 0.6903)) * sky);
+  ambient *= open_sky;
+  rim *= open_sky;
+#endif
+  vec3 light = key + ambient + rim;
+#ifdef FLAT_INSIDE
+  if (!gl_FrontFacing) light = 0.5 * albedo * (sky_light + 0.5 * key_light);
+#endif
+  color = vec4(light * opacity, opacity);
+#ifdef PASSES
+  normal_scalar = vec4(n, scalar);
+  object_seen = object;
+#endif
 }
 )";
 
-const char* const shadow_vertex_shader = R"(#version 330 core
+const char* const depth_vertex_shader = R"(
 layout(location = 0) in vec3 position_in;
 uniform mat4 clip_from_world;
-void main() { gl_Position = clip_from_world * vec4(position_in, 1.0); }
+#if PLANES > 0
+uniform vec4 planes[PLANES];
+out float gl_ClipDistance[PLANES];
+#endif
+invariant gl_Position;
+void main() {
+  gl_Position = clip_from_world * vec4(position_in, 1.0);
+#if PLANES > 0
+  for (int i = 0; i < PLANES; ++i) gl_ClipDistance[i] = dot(planes[i], vec4(position_in, 1.0));
+#endif
+}
 )";
-const char* const shadow_fragment_shader = R"(#version 330 core
-void main() {}
+const char* const depth_fragment_shader = R"(
+#ifdef BEHIND
+uniform SAMPLER nearer;
+#endif
+void main() {
+#ifdef BEHIND
+  if (gl_FragCoord.z <= texelFetch(nearer, ivec2(gl_FragCoord.xy), SAMPLE).r) discard;
+#endif
+}
 )";
 
-const char* const line_vertex_shader = R"(#version 330 core
+const char* const line_vertex_shader = R"(
 layout(location = 0) in vec4 clip_in;
 layout(location = 1) in float across_in;  // distance from the middle, in samples; not bent by perspective
 noperspective out float across;
 void main() { across = across_in; gl_Position = clip_in; }
 )";
-const char* const line_fragment_shader = R"(#version 330 core
+const char* const line_fragment_shader = R"(
 noperspective in float across;
 uniform vec4 line_color;    // straight
 uniform float half_width;   // samples
@@ -117,7 +181,7 @@ void main() {
 }
 )";
 
-const char* const picture_vertex_shader = R"(#version 330 core
+const char* const picture_vertex_shader = R"(
 uniform mat3 ray_from_screen;   // columns: right, up, forward; scaled so that (x, y, 1) of the screen gives the ray
 out vec3 ray;
 out float height;               // 0 at the bottom, 1 at the top
@@ -129,11 +193,14 @@ void main() {
   gl_Position = vec4(place, 0.0, 1.0);
 }
 )";
-const char* const picture_fragment_shader = R"(#version 330 core
+const char* const picture_fragment_shader = R"(
 in vec3 ray;
 in float height;
-uniform sampler2D samples;
-uniform int per_side, last_row;
+uniform SAMPLER samples;
+#ifdef VEILS
+uniform SAMPLER veils;
+#endif
+uniform int last_row;
 uniform vec3 background_bottom, background_top;
 uniform vec3 eye;
 uniform vec4 ground;
@@ -147,11 +214,17 @@ uniform sampler2D ground_key_map, ground_sky_map;
 uniform vec2 key_lower, key_scale, sky_lower, sky_scale;
 out vec4 color;
 void main() {
-  ivec2 corner = ivec2(gl_FragCoord.x, last_row - int(gl_FragCoord.y)) * per_side;
+  ivec2 pixel = ivec2(gl_FragCoord.x, last_row - int(gl_FragCoord.y));
   vec4 sum = vec4(0.0);
-  for (int y = 0; y < per_side; ++y)
-    for (int x = 0; x < per_side; ++x) sum += texelFetch(samples, corner + ivec2(x, y), 0);
-  sum *= 1.0 / float(per_side * per_side);
+  for (int i = 0; i < SAMPLES; ++i) {
+    vec4 nearest = FETCH(samples, pixel, i);
+#ifdef VEILS
+    vec4 veil = FETCH(veils, pixel, i);
+    nearest = veil + (1.0 - veil.a) * nearest;
+#endif
+    sum += nearest;
+  }
+  sum *= 1.0 / float(SAMPLES);
 
   vec3 background = mix(background_bottom, background_top, height);
   float down = -dot(ground.xyz, ray);
@@ -162,8 +235,34 @@ void main() {
   float sky = 1.0 - sky_darkening * texture(ground_sky_map, (uv - sky_lower) * sky_scale).r;
   float light = key_share * key + (1.0 - key_share) * sky;
   float shown = ground_shown * step(1e-6, down) * (1.0 - smoothstep(fade_begin, fade_end, length(uv - fade_middle)));
+#ifdef TRANSPARENT
+  color = vec4(sum.rgb, sum.a + (1.0 - sum.a) * shown * max(1.0 - light, 0.0));
+#else
   background = mix(background, ground_color * light, shown);
   color = vec4(sum.rgb + (1.0 - sum.a) * background, sum.a);
+#endif
+}
+)";
+
+// Of each pixel the sample nearest to the eye.
+const char* const passes_fragment_shader = R"(
+uniform SAMPLER samples_depth, normal_scalar;
+uniform INTEGER_SAMPLER object;
+uniform int last_row;
+layout(location = 0) out vec4 pixel_normal_scalar;
+layout(location = 1) out float pixel_depth;
+layout(location = 2) out int pixel_object;
+void main() {
+  ivec2 pixel = ivec2(gl_FragCoord.x, last_row - int(gl_FragCoord.y));
+  int nearest = 0;
+  pixel_depth = 1.0;
+  for (int i = 0; i < SAMPLES; ++i) {
+    float depth = FETCH(samples_depth, pixel, i).r;
+    if (depth < pixel_depth) nearest = i;
+    pixel_depth = min(pixel_depth, depth);
+  }
+  pixel_normal_scalar = FETCH(normal_scalar, pixel, nearest);
+  pixel_object = FETCH(object, pixel, nearest).r;
 }
 )";
 

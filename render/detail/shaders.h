@@ -1,15 +1,22 @@
-// GLSL 3.30. Light is linear; radiance 1 is what a white, matt surface square to the key light sends.
+// Shader texts; Program puts the version and the defines before them. Light is linear; radiance 1 is what a
+// white, matt surface square to the key light sends.
+//
+// Defines of mesh and depth: PLANES (how many cut it). Of the mesh: TINTED (a colour a vertex and its open
+// share of the sky), PASSES, FLAT_INSIDE. Of depth: BEHIND (only what lies behind a layer). Of the picture:
+// VEILS, TRANSPARENT. How samples are read: SAMPLER, INTEGER_SAMPLER, SAMPLES (a pixel), FETCH(sampler,
+// pixel, i), SAMPLE (the one being drawn).
 #pragma once
 
 namespace limber::render::detail {
 
 extern const char* const mesh_vertex_shader;
 extern const char* const mesh_fragment_shader;  // shaded, premultiplied
-extern const char* const shadow_vertex_shader;  // depth only, from the key light
-extern const char* const shadow_fragment_shader;
+extern const char* const depth_vertex_shader;   // depth only: shadow map, layers of veils
+extern const char* const depth_fragment_shader;
 extern const char* const line_vertex_shader;  // quads already in clip space
 extern const char* const line_fragment_shader;
 extern const char* const picture_vertex_shader;    // one triangle over everything
 extern const char* const picture_fragment_shader;  // averages the samples over background and ground
+extern const char* const passes_fragment_shader;
 
 }  // namespace limber::render::detail

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <fstream>
 
 #include "core/error.h"
@@ -32,6 +33,33 @@ TEST(PngFile, RoundTrip) {
   EXPECT_EQ(png_bytes(noise(9, 9)), png_bytes(noise(9, 9)));
 }
 
+TEST(PngFile, EveryKindOfRasterComesBack) {
+  const Folder folder;
+  Rng rng(22, 0);
+  for (int channels = 1; channels <= 4; ++channels) {
+    Raster8 eight{13, 7, channels, {}};
+    Raster16 sixteen{13, 7, channels, {}};
+    for (int i = 0; i < 13 * 7 * channels; ++i) {
+      eight.levels.push_back(std::uint8_t(rng.below(256)));
+      sixteen.levels.push_back(std::uint16_t(rng.below(65536)));
+    }
+    write_png(folder / "16.png", sixteen, {{"limber-hash", "1"}});
+    Texts texts;
+    EXPECT_EQ(read_png_16(folder / "16.png", &texts), sixteen);
+    EXPECT_EQ(texts, (Texts{{"limber-hash", "1"}}));
+    write_png(folder / "8.png", eight);
+    Raster16 times_257 = sixteen;
+    std::transform(eight.levels.begin(), eight.levels.end(), times_257.levels.begin(),
+                   [](std::uint8_t v) { return std::uint16_t(257 * v); });
+    EXPECT_EQ(read_png_16(folder / "8.png"), times_257);
+  }
+  // Without alpha the two readers agree.
+  const Image8 image = noise(9, 4);
+  write_png(folder / "a.png", image);
+  const Raster16 wide = read_png_16(folder / "a.png");
+  for (std::size_t i = 0; i < image.rgb.size(); ++i) EXPECT_EQ(wide.levels[i], 257 * image.rgb[i]);
+}
+
 // core's write_file waits for the disk each time.
 void write_quickly(const fs::path& path, const std::string& content) {
   std::ofstream(path, std::ios::binary) << content;
@@ -44,6 +72,7 @@ TEST(PngFile, EveryPrefixAndEveryChangedByteIsRecognised) {
     write_quickly(folder / "a.png", good.substr(0, size));
     EXPECT_EQ(frame_hash(folder / "a.png"), std::nullopt) << size;
     EXPECT_THROW(read_png(folder / "a.png"), InputError) << size;
+    EXPECT_THROW(read_png_16(folder / "a.png"), InputError) << size;
   }
   for (std::size_t at = 0; at < good.size(); ++at) {
     std::string bad = good;

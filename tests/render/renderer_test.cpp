@@ -9,6 +9,7 @@
 #include <iostream>
 #include <numeric>
 #include <thread>
+#include <tuple>
 
 #include "core/error.h"
 #include "core/hash.h"
@@ -72,6 +73,7 @@ TEST(Renderer, ASpheresSilhouetteHasTheAreaOfPerspective) {
   Look look = small_look();
   for (const Vec3& center : {Vec3(0, 0, 0), Vec3(0.6, 0, 0.4), Vec3(-0.7, 1, -0.3)})
     for (const double radius : {0.25, 0.6}) {
+      look.multisampling = !look.multisampling;
       const Camera camera = camera_from({0, -5, 0});
       const double f = 0.5 * look.height / std::tan(0.5 * camera.fov_deg * std::numbers::pi / 180);
       const double l2 = (center - camera.eye).squaredNorm(), z = center.y() + 5, r2 = radius * radius;
@@ -261,10 +263,327 @@ TEST(Renderer, ALineThatPassesTheEyeIsCutAndNotMirrored) {
   EXPECT_EQ(below, 0);
 }
 
-TEST(Renderer, AVeilShowsItsNearestLayerOnly) {
-  const Image image = picture_of(sphere_mesh({0, 0, 0}, 0.5, 30), small_look(), camera_from({0, -4, 0}),
-                                 {"veil", {1, 1, 1}, 0.5, 0, 0.25});
-  EXPECT_NEAR(alpha(image, 160, 120), 0.25, 1e-3);
+SurfaceMesh upright_quad(double y, double half = 1) {
+  return quad_mesh({-half, y, -half}, {half, y, -half}, {half, y, half}, {-half, y, half});
+}
+
+void add(Renderer& renderer, const SurfaceMesh& mesh, const MeshLook& look) {
+  renderer.add_mesh(mesh.triangles, mesh.positions, look);
+}
+
+// Colour and alpha, premultiplied.
+Eigen::Vector4d rgba(const Image& image, int x, int y) {
+  const float* p = &image.rgba[4 * (std::size_t(y) * image.width + x)];
+  return {p[0], p[1], p[2], p[3]};
+}
+Eigen::Vector4d over(const Eigen::Vector4d& front, const Eigen::Vector4d& back) {
+  return front + (1 - front[3]) * back;
+}
+
+TEST(Renderer, AVeilShowsItsFrontAndItsBackLayer) {
+  const SurfaceMesh ball = sphere_mesh({0, 0, 0}, 0.5, 30);
+  for (const bool multisampling : {false, true}) {
+    Look look = small_look();
+    look.multisampling = multisampling;
+    const Image image = picture_of(ball, look, camera_from({0, -4, 0}), {"veil", {1, 1, 1}, 0.5, 0, 0.25});
+    EXPECT_NEAR(alpha(image, 160, 120), 1 - 0.75 * 0.75, 1e-3);
+  }
+}
+
+// Two veils that pass through each other, a third behind them and something opaque: as if each were drawn
+// alone and the four pictures laid over one another, nearest first, whatever the order they were added in.
+TEST(Renderer, VeilsAreSortedWithinEachPixel) {
+  const MeshLook red{"red", {0.9, 0.2, 0.1}, 0.5, 0, 0.4}, green{"green", {0.2, 0.8, 0.1}, 0.5, 0, 0.3},
+      blue{"blue", {0.1, 0.2, 0.9}, 0.5, 0, 0.45}, solid{"solid", {0.7, 0.7, 0.7}};
+  const SurfaceMesh falling = quad_mesh({-1, -0.5, -1}, {1, 0.5, -1}, {1, 0.5, 1}, {-1, -0.5, 1}),
+                    rising = quad_mesh({-1, 0.5, -1}, {1, -0.5, -1}, {1, -0.5, 1}, {-1, 0.5, 1});
+  const std::vector<std::pair<SurfaceMesh, MeshLook>> all{
+      {falling, red}, {rising, green}, {upright_quad(1), blue}, {upright_quad(2, 2), solid}};
+  const Camera camera = camera_from({0, -5, 0});
+  for (const bool multisampling : {false, true}) {
+    Look look = small_look();
+    look.multisampling = multisampling;
+    look.transparent_background = true;
+    for (const auto& [mesh, mesh_look] : all) look.stage.include(bounding_box(mesh.positions));
+    std::vector<Image> alone;
+    for (const auto& [mesh, mesh_look] : all) alone.push_back(picture_of(mesh, look, camera, mesh_look));
+    for (const std::vector<int>& order : {std::vector{0, 1, 2, 3}, std::vector{3, 2, 1, 0}}) {
+      Renderer renderer(look);
+      for (const int i : order) add(renderer, all[std::size_t(i)].first, all[std::size_t(i)].second);
+      const Image image = renderer.draw(camera);
+      for (const auto& [x, near, far] : {std::tuple{130, 0, 1}, std::tuple{190, 1, 0}}) {
+        const Eigen::Vector4d expected = over(rgba(alone[std::size_t(near)], x, 100),
+                                              over(rgba(alone[std::size_t(far)], x, 100),
+                                                   over(rgba(alone[2], x, 100), rgba(alone[3], x, 100))));
+        EXPECT_LT((rgba(image, x, 100) - expected).cwiseAbs().maxCoeff(), 2e-3) << x << ' ' << multisampling;
+      }
+    }
+  }
+}
+
+TEST(Renderer, NoMoreLayersOfVeilsThanSaid) {
+  Renderer renderer(small_look());
+  for (int i = 0; i < most_veil_layers + 3; ++i)
+    add(renderer, upright_quad(0.1 * i), {"veil", {1, 1, 1}, 0.5, 0, 0.2});
+  EXPECT_NEAR(alpha(renderer.draw(camera_from({0, -5, 0})), 160, 120), 1 - std::pow(0.8, most_veil_layers),
+              2e-3);
+}
+
+TEST(Renderer, ALineBehindAVeilIsVeiledAndOneBeforeItIsNot) {
+  Look look = small_look();
+  look.transparent_background = true;
+  const MeshLook veil{"veil", {0, 0, 1}, 1, 0, 0.45};
+  const Camera camera = camera_from({0, -5, 0});
+  const Eigen::Vector4d veil_alone = rgba(picture_of(upright_quad(0), look, camera, veil), 160, 120);
+  for (const double y : {-1.0, 1.0}) {
+    Renderer renderer(look);
+    add(renderer, upright_quad(0), veil);
+    Points ends(2, 3);
+    ends << -2, y, 0, 2, y, 0;
+    renderer.add_lines(ends, {{1, 0, 0}, 8, 1});
+    const Eigen::Vector4d line(1, 0, 0, 1), seen = rgba(renderer.draw(camera), 160, 120);
+    EXPECT_LT((seen - (y < 0 ? line : over(veil_alone, line))).cwiseAbs().maxCoeff(), 2e-3) << y;
+  }
+}
+
+TEST(Renderer, ColoursOfVerticesAreMixedInLinearLight) {
+  const SurfaceMesh quad = upright_quad(0);
+  const Camera camera = camera_from({0, -5, 0});
+  const Vec3 left(0.9, 0.3, 0.1), right(0.1, 0.6, 0.7);
+  Renderer renderer(small_look());
+  const int mesh = renderer.add_mesh(quad.triangles, quad.positions, {"quad", left});
+  const Image plain = renderer.draw(camera);
+  Points colors(4, 3);
+  colors.rowwise() = left.transpose();
+  renderer.set_colors(mesh, colors);
+  EXPECT_LE(difference(renderer.draw(camera), plain).largest, 1);
+
+  colors.row(1) = colors.row(2) = right.transpose();
+  renderer.set_colors(mesh, colors);
+  const Image mixed = renderer.draw(camera);
+  for (const double share : {0.25, 0.5, 0.75}) {
+    const Vec3 middle =
+        ((1 - share) * linear_from_srgb(left) + share * linear_from_srgb(right)).unaryExpr([](double c) {
+          return srgb_from_linear(c);
+        });
+    const int x = int(pixel_from_world(camera, {2 * share - 1, 0, 0}, 320, 240).x());
+    const Image expected = picture_of(quad, small_look(), camera, {"quad", middle});
+    EXPECT_LT((rgba(mixed, x, 120) - rgba(expected, x, 120)).cwiseAbs().maxCoeff(), 0.01) << share;
+  }
+  renderer.set_colors(mesh, {});
+  EXPECT_LE(difference(renderer.draw(camera), plain).largest, 1);
+}
+
+// A side that the key light does not reach has only the sky's light; the other keeps the key's.
+TEST(Renderer, OcclusionTakesTheSkyAndLeavesTheKeyLight) {
+  const SurfaceMesh quad = upright_quad(0);
+  for (const bool lit : {false, true}) {
+    Look look = small_look();
+    look.toward_key = {0, lit ? -1.0 : 1.0, 0.2};
+    Renderer renderer(look);
+    const int mesh = renderer.add_mesh(quad.triangles, quad.positions, {"quad", {0.8, 0.8, 0.8}});
+    const auto light = [&](double occlusion) {
+      renderer.set_occlusion(mesh, Eigen::VectorXd::Constant(4, occlusion));
+      return rgba(renderer.draw(camera_from({0, -5, 0})), 160, 120).head<3>().eval();
+    };
+    const Vec3 open = light(0), half = light(0.5), hidden = light(1);
+    EXPECT_GT((open - half).minCoeff(), 0.01);
+    EXPECT_GT((half - hidden).minCoeff(), 0.01);
+    if (lit) {
+      EXPECT_GT(hidden.minCoeff(), 0.3);
+    } else {
+      EXPECT_EQ(hidden, Vec3::Zero());
+    }
+    renderer.set_occlusion(mesh, {});
+    EXPECT_EQ(rgba(renderer.draw(camera_from({0, -5, 0})), 160, 120).head<3>(), open);
+  }
+}
+
+// A coarse mesh casts for a fine one inside it: it is not seen, does not shade the fine one, and its shadow
+// falls where it would if it were seen.
+TEST(Renderer, AnUnseenCasterShadesAllButWhatItEncloses) {
+  const SurfaceMesh ball = sphere_mesh({0, 0, 1}, 0.5, 60), shell = sphere_mesh({0, 0, 1}, 0.55, 12),
+                    floor = quad_mesh({-4, -4, 0}, {4, -4, 0}, {4, 4, 0}, {-4, 4, 0});
+  const Camera camera = camera_from({0, -5, 3}, {0, 0, 0.5});
+  Look look = small_look();
+  look.stage.include(Vec3(-2, -2, 0)), look.stage.include(Vec3(2, 2, 2));
+  const auto picture = [&](bool with_shell, bool shell_seen, bool ball_casts, bool with_ball) {
+    Renderer renderer(look);
+    add(renderer, floor, {"floor"});
+    if (with_ball) {
+      MeshLook ball_look{"ball"};
+      ball_look.casts_shadow = ball_casts;
+      add(renderer, ball, ball_look);
+    }
+    if (with_shell) {
+      MeshLook shell_look{"shell"};
+      shell_look.seen = shell_seen;
+      add(renderer, shell, shell_look);
+    }
+    return renderer.draw(camera);
+  };
+  const Image by_shell = picture(true, false, false, true), by_ball = picture(false, false, true, true),
+              lit = picture(false, false, false, true), seen_shell = picture(true, true, false, false),
+              empty = picture(false, false, false, false);
+  const Vec3 ball_pixel = pixel_from_world(camera, {0, 0, 1}, look.width, look.height);
+  int shaded = 0, shaded_by_ball = 0;
+  for (int y = 0; y < look.height; ++y)
+    for (int x = 0; x < look.width; ++x) {
+      const double away = std::hypot(x - ball_pixel.x(), y - ball_pixel.y());
+      if (away <
+          42) {  // on the ball: as without any caster, but at the shade's edge where its own map is coarse
+        EXPECT_LT((rgba(by_shell, x, y) - rgba(lit, x, y)).cwiseAbs().maxCoeff(), 0.02) << x << ' ' << y;
+      } else if (away > 60) {
+        const bool dark = rgba(by_shell, x, y)[1] < rgba(empty, x, y)[1] - 0.1;
+        shaded += dark, shaded_by_ball += rgba(by_ball, x, y)[1] < rgba(empty, x, y)[1] - 0.1;
+        if (dark) {
+          EXPECT_LT(rgba(seen_shell, x, y)[1], rgba(empty, x, y)[1] - 0.05);
+        }
+      }
+    }
+  EXPECT_GT(shaded, 300);
+  EXPECT_NEAR(double(shaded) / shaded_by_ball, 1.15, 0.2);
+}
+
+// What is left of a box cut in half covers what half a box covers: its inside shows through the cut, flat.
+TEST(Renderer, ACutBoxCoversWhatIsLeftOfIt) {
+  const Look look = small_look();
+  const Camera camera = camera_from({2, -4, 1.5});
+  Renderer renderer(look);
+  add(renderer, box_mesh({-0.5, -0.5, -0.5}, {0.5, 0.5, 0.5}), {"box", {0.9, 0.2, 0.1}});
+  renderer.set_clip_planes({Plane(-2, 0, 0, 0.2), Plane(0, 0, -1, 0.3)});  // x < 0.1, z < 0.3
+  const Image cut = renderer.draw(camera);
+  const Image rest = picture_of(box_mesh({-0.5, -0.5, -0.5}, {0.1, 0.5, 0.3}), look, camera);
+  for (std::size_t i = 3; i < cut.rgba.size(); i += 4) ASSERT_NEAR(cut.rgba[i], rest.rgba[i], 0.51) << i / 4;
+  EXPECT_NEAR(covered_pixels(cut) / covered_pixels(rest), 1, 0.002);
+  // Two places on the cut, of different insides behind it.
+  const auto at = [&](double y, double z) {
+    const Vec3 p = pixel_from_world(camera, {0.1, y, z}, look.width, look.height);
+    return rgba(cut, int(p.x()), int(p.y()));
+  };
+  EXPECT_EQ(at(-0.4, 0.2), at(0.4, -0.4));
+  renderer.set_clip_planes({});
+  EXPECT_EQ(
+      renderer.draw(camera).rgba,
+      picture_of(box_mesh({-0.5, -0.5, -0.5}, {0.5, 0.5, 0.5}), look, camera, {"box", {0.9, 0.2, 0.1}}).rgba);
+  EXPECT_THROW(renderer.set_clip_planes({Plane(0, 0, 0, 1)}), InputError);
+  EXPECT_THROW(renderer.set_clip_planes(std::vector<Plane>(most_clip_planes + 1, Plane(1, 0, 0, 0))),
+               InputError);
+}
+
+// An edge is seen when one of its two faces looks towards the eye.
+TEST(Renderer, EdgesAreDrawnOverTheSurfaceThatHidesTheOthers) {
+  const Look look = small_look();
+  const Camera camera = camera_from({1.5, -4, 2});
+  const SurfaceMesh box = box_mesh({-0.5, -0.5, -0.5}, {0.5, 0.5, 0.5});
+  Renderer renderer(look);
+  MeshLook mesh_look{"box", {0.9, 0.9, 0.9}};
+  mesh_look.edges = LineLook{{1, 0, 0}, 3, 1};
+  add(renderer, box, mesh_look);
+  const Image image = renderer.draw(camera);
+  int seen = 0, hidden = 0;
+  const Points ends = edges_of(bounding_box(box.positions));
+  for (int e = 0; e < 12; ++e) {
+    const Vec3 middle = 0.5 * (ends.row(2 * e) + ends.row(2 * e + 1));
+    bool faces_eye = false;
+    for (int axis = 0; axis < 3; ++axis)
+      if (middle[axis] != 0) faces_eye |= (camera.eye[axis] - middle[axis]) * middle[axis] > 0;
+    const Vec3 pixel = pixel_from_world(camera, middle, look.width, look.height);
+    const Eigen::Vector4d c = rgba(image, int(pixel.x()), int(pixel.y()));
+    EXPECT_EQ(c[0] > 2 * c[1], faces_eye) << middle.transpose();
+    ++(faces_eye ? seen : hidden);
+  }
+  EXPECT_EQ(seen, 9);
+  EXPECT_EQ(hidden, 3);
+}
+
+TEST(Renderer, ATransparentPictureOverABackgroundIsThePictureWithIt) {
+  const SurfaceMesh ball = sphere_mesh({0, 0, 0.5}, 0.5, 30);
+  const Camera camera = camera_from({1, -4, 2}, {0, 0, 0.5});
+  Look look = small_look();
+  look.stage = bounding_box(ball.positions);
+  const Image whole = picture_of(ball, look, camera, {"ball", {0.8, 0.3, 0.2}}),
+              background = Renderer(look).draw(camera);
+  look.transparent_background = true;
+  const Image alone = picture_of(ball, look, camera, {"ball", {0.8, 0.3, 0.2}});
+  for (int y = 0; y < look.height; ++y)
+    for (int x = 0; x < look.width; ++x)
+      EXPECT_LT((over(rgba(alone, x, y), rgba(background, x, y)) - rgba(whole, x, y))
+                    .head<3>()
+                    .cwiseAbs()
+                    .maxCoeff(),
+                1e-3);
+  look.ground_height_m = 0;  // its shadow is black, and alpha says how dark
+  const Image with_shadow = picture_of(ball, look, camera, {"ball", {0.8, 0.3, 0.2}});
+  const Vec3 foot =
+      pixel_from_world(camera, -0.5 / look.toward_key.z() * look.toward_key + Vec3(0, 0, 0.5), 320, 240);
+  const Eigen::Vector4d shadow = rgba(with_shadow, int(foot.x()), int(foot.y()));
+  EXPECT_EQ(shadow.head<3>(), Vec3::Zero());
+  EXPECT_GT(shadow[3], 0.3);
+}
+
+TEST(Renderer, PassesTellDepthNormalObjectAndScalarOfASphere) {
+  const Vec3 center(0.3, 1, 0.1);
+  const double radius = 0.7;
+  const SurfaceMesh behind = upright_quad(3, 2), ball = sphere_mesh(center, radius, 120);
+  const Camera camera = camera_from({0, -4, 0.5});
+  const Mat4 camera_from_world_m = camera_from_world(camera);
+  for (const bool multisampling : {false, true}) {
+    Look look = small_look();
+    look.multisampling = multisampling;
+    Renderer renderer(look);
+    add(renderer, behind, {"behind"});
+    const int mesh = renderer.add_mesh(ball.triangles, ball.positions, {"ball"});
+    renderer.set_scalars(mesh, ball.positions.col(2));
+    Passes passes;
+    const Image image = renderer.draw(camera, passes);
+    EXPECT_EQ(image.rgba, renderer.draw(camera).rgba);
+    int on_ball = 0, on_quad = 0, nowhere = 0;
+    for (int y = 0; y < look.height; ++y)
+      for (int x = 0; x < look.width; ++x) {
+        const std::size_t i = std::size_t(y) * look.width + x;
+        if (passes.object[i] < 0) {
+          ++nowhere;
+          EXPECT_EQ(passes.depth_m[i], INFINITY);
+          EXPECT_TRUE(std::isnan(passes.scalar[i]));
+          EXPECT_EQ(alpha(image, x, y), 0);
+          continue;
+        }
+        const Vec3 normal(passes.normal[3 * i], passes.normal[3 * i + 1], passes.normal[3 * i + 2]);
+        if (passes.object[i] == 0) {
+          ++on_quad;
+          EXPECT_LT((normal - Vec3(0, -1, 0)).norm(), 1e-5);
+          EXPECT_EQ(passes.scalar[i], 0);
+          continue;
+        }
+        ++on_ball;
+        if (normal.dot((camera.eye - center).normalized()) < 0.4)
+          continue;  // the rim changes fast within a pixel
+        const Vec3 p = center + radius * normal;
+        // Samples that share one shading have depths of their own.
+        const double facing = normal.dot((camera.eye - p).normalized());
+        const double slack = multisampling ? 0.006 * std::sqrt(1 - facing * facing) / facing : 0;
+        EXPECT_NEAR(passes.depth_m[i], -(camera_from_world_m * p.homogeneous()).z(), 2e-3 + slack);
+        EXPECT_NEAR(passes.scalar[i], p.z(), 2e-3);
+        const Vec3 pixel = pixel_from_world(camera, p, look.width, look.height);
+        EXPECT_LT(std::max(std::abs(pixel.x() - x - 0.5), std::abs(pixel.y() - y - 0.5)), 0.55);
+      }
+    EXPECT_GT(on_ball, 3000);
+    EXPECT_GT(on_quad, 10000);
+    EXPECT_GT(nowhere, 1000);
+  }
+}
+
+TEST(Renderer, MultisamplingDrawsNearlyTheSamePicture) {
+  const SurfaceMesh ball = sphere_mesh({0, 0, 0.5}, 0.5, 60);
+  Look look = small_look();
+  look.ground_height_m = 0;
+  const Camera camera = camera_from({1, -4, 2}, {0, 0, 0.5});
+  const Image slow = picture_of(ball, look, camera);
+  look.multisampling = true;
+  const Image fast = picture_of(ball, look, camera);
+  EXPECT_NEAR(covered_pixels(fast) / covered_pixels(slow), 1, 0.002);
+  EXPECT_LT(difference(slow, fast).mean, 0.1);
 }
 
 TEST(Renderer, TheGroundHidesWhatIsBelowItFromAboveOnly) {

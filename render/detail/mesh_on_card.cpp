@@ -1,0 +1,101 @@
+#include "render/detail/mesh_on_card.h"
+
+#define GL_GLEXT_PROTOTYPES
+#include <GL/glcorearb.h>
+
+#include <algorithm>
+
+namespace limber::render::detail {
+
+namespace {
+
+enum Attribute : GLuint { at_position, at_normal, at_tint, at_scalar };
+
+GLuint new_attribute(GLuint array, Attribute attribute, GLint components, GLenum type) {
+  GLuint buffer = 0;
+  glBindVertexArray(array);
+  glGenBuffers(1, &buffer);
+  glBindBuffer(GL_ARRAY_BUFFER, buffer);
+  glVertexAttribPointer(attribute, components, type, GL_TRUE, 0, nullptr);
+  glEnableVertexAttribArray(attribute);
+  return buffer;
+}
+
+template <class Values>
+void upload(GLuint buffer, const Values& values) {
+  glBindBuffer(GL_ARRAY_BUFFER, buffer);
+  glBufferData(GL_ARRAY_BUFFER, GLsizeiptr(values.size() * sizeof values[0]), values.data(), GL_STREAM_DRAW);
+}
+
+}  // namespace
+
+MeshOnCard::MeshOnCard(const Triangles& triangles, const Points& rest_positions, double crease_angle_deg)
+    : drawn_(order_for_drawing(triangles, rest_positions, crease_angle_deg)),
+      vertices_(rest_positions.rows()) {
+  glGenVertexArrays(1, &array_);
+  position_buffer_ = new_attribute(array_, at_position, 3, GL_FLOAT);
+  normal_buffer_ = new_attribute(array_, at_normal, 3, GL_FLOAT);
+  GLuint corners = 0;
+  glGenBuffers(1, &corners);
+  glBindBuffer(GL_ELEMENT_ARRAY_BUFFER, corners);
+  glBufferData(GL_ELEMENT_ARRAY_BUFFER, GLsizeiptr(drawn_.corners.size() * sizeof drawn_.corners[0]),
+               drawn_.corners.data(), GL_STATIC_DRAW);
+  set_positions(rest_positions, {});
+}
+
+void MeshOnCard::set_positions(const Points& positions, const Points& normals) {
+  deform(drawn_, positions, normals);
+  box_ = bounding_box(positions);
+  upload(position_buffer_, drawn_.positions);
+  upload(normal_buffer_, drawn_.normals);
+}
+
+void MeshOnCard::set_tints(const Eigen::Matrix<float, Eigen::Dynamic, 4, Eigen::RowMajor>& tints) {
+  std::vector<std::uint16_t> levels;
+  levels.reserve(4 * drawn_.vertex_from_drawn.size());
+  for (const int vertex : drawn_.vertex_from_drawn)
+    for (int c = 0; c < 4; ++c)
+      levels.push_back(std::uint16_t(65535 * std::clamp(tints(vertex, c), 0.0f, 1.0f) + 0.5f));
+  if (tint_buffer_ == 0) tint_buffer_ = new_attribute(array_, at_tint, 4, GL_UNSIGNED_SHORT);
+  upload(tint_buffer_, levels);
+}
+
+void MeshOnCard::set_scalars(const Eigen::VectorXd& values) {
+  std::vector<float> drawn;
+  drawn.reserve(drawn_.vertex_from_drawn.size());
+  for (const int vertex : drawn_.vertex_from_drawn) drawn.push_back(float(values[vertex]));
+  if (scalar_buffer_ == 0) scalar_buffer_ = new_attribute(array_, at_scalar, 1, GL_FLOAT);
+  upload(scalar_buffer_, drawn);
+}
+
+void MeshOnCard::draw() const {
+  glBindVertexArray(array_);
+  if (scalar_buffer_ == 0) glVertexAttrib1f(at_scalar, 0);
+  glDrawElements(GL_TRIANGLES, GLsizei(drawn_.corners.size()), GL_UNSIGNED_INT, nullptr);
+}
+
+Points MeshOnCard::edge_ends() {
+  if (edges_.empty()) {
+    // Vertices that a crease parts are one to an edge: the first of them stands for all.
+    std::vector<int> first(std::size_t(vertices_), -1);
+    for (int d = int(drawn_.vertex_from_drawn.size()) - 1; d >= 0; --d)
+      first[std::size_t(drawn_.vertex_from_drawn[std::size_t(d)])] = d;
+    const auto merged = [&](std::uint32_t d) { return first[std::size_t(drawn_.vertex_from_drawn[d])]; };
+    for (std::size_t c = 0; c < drawn_.corners.size(); ++c) {
+      const std::size_t next = c % 3 == 2 ? c - 2 : c + 1;
+      edges_.push_back(std::minmax({merged(drawn_.corners[c]), merged(drawn_.corners[next])}));
+    }
+    std::sort(edges_.begin(), edges_.end());
+    edges_.erase(std::unique(edges_.begin(), edges_.end()), edges_.end());
+  }
+  Points ends(2 * Eigen::Index(edges_.size()), 3);
+  Eigen::Index row = 0;
+  for (const auto& [a, b] : edges_)
+    for (const int d : {a, b}) {
+      const float* p = &drawn_.positions[3 * std::size_t(d)];
+      ends.row(row++) << p[0], p[1], p[2];
+    }
+  return ends;
+}
+
+}  // namespace limber::render::detail

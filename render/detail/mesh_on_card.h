@@ -1,0 +1,37 @@
+// A mesh's buffers: what moves (positions, normals) is streamed each frame, what seldom changes (triangles,
+// tint, scalars) has buffers of its own.
+#pragma once
+
+#include <utility>
+#include <vector>
+
+#include "core/mesh.h"
+#include "render/detail/drawn_mesh.h"
+
+namespace limber::render::detail {
+
+class MeshOnCard {
+ public:
+  MeshOnCard(const Triangles&, const Points& rest_positions, double crease_angle_deg);
+
+  void set_positions(const Points& positions, const Points& normals);
+  // Linear colour and the share of the sky that is open, per row of the positions, (V × 4).
+  void set_tints(const Eigen::Matrix<float, Eigen::Dynamic, 4, Eigen::RowMajor>&);
+  void set_scalars(const Eigen::VectorXd&);
+  void draw() const;
+  Points edge_ends();  // each edge once, row 2i to row 2i + 1
+
+  const DrawnMesh& drawn() const { return drawn_; }
+  Eigen::Index vertices() const { return vertices_; }
+  const Box& box() const { return box_; }
+  bool tinted() const { return tint_buffer_ != 0; }
+
+ private:
+  DrawnMesh drawn_;
+  Eigen::Index vertices_;  // rows the caller hands over
+  Box box_;
+  unsigned array_ = 0, position_buffer_ = 0, normal_buffer_ = 0, tint_buffer_ = 0, scalar_buffer_ = 0;
+  std::vector<std::pair<int, int>> edges_;  // drawn vertices; found when first asked for
+};
+
+}  // namespace limber::render::detail

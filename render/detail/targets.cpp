@@ -1,0 +1,121 @@
+#include "render/detail/targets.h"
+
+#define GL_GLEXT_PROTOTYPES
+#include <GL/glcorearb.h>
+
+#include <span>
+
+#include "core/error.h"
+
+namespace limber::render::detail {
+
+namespace {
+
+Texture new_texture(GLenum filter, GLenum wrap) {
+  Texture texture;
+  glGenTextures(1, &texture.id);
+  glBindTexture(GL_TEXTURE_2D, texture.id);
+  for (const auto& [name, value] :
+       {std::pair{GL_TEXTURE_MIN_FILTER, filter}, std::pair{GL_TEXTURE_MAG_FILTER, filter},
+        std::pair{GL_TEXTURE_WRAP_S, wrap}, std::pair{GL_TEXTURE_WRAP_T, wrap}})
+    glTexParameteri(GL_TEXTURE_2D, GLenum(name), GLint(value));
+  return texture;
+}
+
+Texture new_target(GLenum format, const SampleGrid& grid) {
+  if (grid.per_pixel > 0) {
+    Texture texture{0, true};
+    glGenTextures(1, &texture.id);
+    glBindTexture(GL_TEXTURE_2D_MULTISAMPLE, texture.id);
+    glTexImage2DMultisample(GL_TEXTURE_2D_MULTISAMPLE, grid.per_pixel, format, grid.width, grid.height,
+                            GL_TRUE);
+    return texture;
+  }
+  const Texture texture = new_texture(GL_NEAREST, GL_CLAMP_TO_EDGE);
+  const GLenum layout = format == GL_DEPTH_COMPONENT32F ? GL_DEPTH_COMPONENT
+                        : format == GL_R32I             ? GL_RED_INTEGER
+                                                        : GL_RGBA;
+  glTexImage2D(GL_TEXTURE_2D, 0, GLint(format), grid.width, grid.height, 0, layout,
+               format == GL_R32I ? GL_INT : GL_FLOAT, nullptr);
+  return texture;
+}
+
+unsigned new_framebuffer(std::initializer_list<Texture> colors, Texture depth) {
+  const auto target = [](const Texture& t) {
+    return GLenum(t.multisampled ? GL_TEXTURE_2D_MULTISAMPLE : GL_TEXTURE_2D);
+  };
+  GLuint framebuffer = 0;
+  glGenFramebuffers(1, &framebuffer);
+  glBindFramebuffer(GL_FRAMEBUFFER, framebuffer);
+  const GLenum places[] = {GL_COLOR_ATTACHMENT0, GL_COLOR_ATTACHMENT1, GL_COLOR_ATTACHMENT2};
+  GLsizei count = 0;
+  for (const Texture& color : colors)
+    glFramebufferTexture2D(GL_FRAMEBUFFER, places[count++], target(color), color.id, 0);
+  if (depth.id) glFramebufferTexture2D(GL_FRAMEBUFFER, GL_DEPTH_ATTACHMENT, target(depth), depth.id, 0);
+  if (count > 0)
+    glDrawBuffers(count, places);
+  else
+    glDrawBuffer(GL_NONE), glReadBuffer(GL_NONE);
+  const GLenum status = glCheckFramebufferStatus(GL_FRAMEBUFFER);
+  LIMBER_CHECK(status == GL_FRAMEBUFFER_COMPLETE, status);
+  return framebuffer;
+}
+
+}  // namespace
+
+void Texture::bind(int unit) const {
+  glActiveTexture(GLenum(GL_TEXTURE0 + unit));
+  glBindTexture(multisampled ? GL_TEXTURE_2D_MULTISAMPLE : GL_TEXTURE_2D, id);
+}
+
+Targets::Targets(int width, int height, SampleGrid grid) : width_(width), height_(height), grid_(grid) {
+  shadow_map = new_texture(GL_LINEAR, GL_CLAMP_TO_BORDER);
+  const float lit[] = {1, 1, 1, 1};
+  glTexParameterfv(GL_TEXTURE_2D, GL_TEXTURE_BORDER_COLOR, lit);
+  glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_COMPARE_MODE, GL_COMPARE_REF_TO_TEXTURE);
+  glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_COMPARE_FUNC, GL_LEQUAL);
+  glTexImage2D(GL_TEXTURE_2D, 0, GL_DEPTH_COMPONENT32F, shadow_size, shadow_size, 0, GL_DEPTH_COMPONENT,
+               GL_FLOAT, nullptr);
+  shadow_frame = new_framebuffer({}, shadow_map);
+
+  samples = new_target(GL_RGBA16F, grid);
+  samples_depth = new_target(GL_DEPTH_COMPONENT32F, grid);
+  samples_frame = new_framebuffer({samples}, samples_depth);
+  picture = new_target(GL_RGBA32F, {width, height, 0});
+  picture_frame = new_framebuffer({picture}, {});
+  ground_key_map = new_texture(GL_LINEAR, GL_CLAMP_TO_EDGE);
+  ground_sky_map = new_texture(GL_LINEAR, GL_CLAMP_TO_EDGE);
+}
+
+const Targets::Veils& Targets::veils() {
+  if (veils_.color.id == 0) {
+    veils_.color = new_target(GL_RGBA16F, grid_);
+    for (std::size_t i = 0; i < veils_.depth.size(); ++i) {
+      veils_.depth[i] = new_target(GL_DEPTH_COMPONENT32F, grid_);
+      veils_.frame[i] = new_framebuffer({veils_.color}, veils_.depth[i]);
+    }
+  }
+  return veils_;
+}
+
+const Targets::Passes& Targets::passes() {
+  if (passes_.object.id == 0) {
+    passes_.normal_scalar = new_target(GL_RGBA32F, grid_);
+    passes_.object = new_target(GL_R32I, grid_);
+    passes_.frame = new_framebuffer({samples, passes_.normal_scalar, passes_.object}, samples_depth);
+    const SampleGrid pixels{width_, height_, 0};
+    passes_.pixel_normal_scalar = new_target(GL_RGBA32F, pixels);
+    passes_.pixel_object = new_target(GL_R32I, pixels);
+    passes_.pixel_depth = new_target(GL_R32F, pixels);
+    passes_.pixel_frame =
+        new_framebuffer({passes_.pixel_normal_scalar, passes_.pixel_depth, passes_.pixel_object}, {});
+  }
+  return passes_;
+}
+
+void fill(const Texture& texture, int columns, int rows, const float* values) {
+  texture.bind(0);
+  glTexImage2D(GL_TEXTURE_2D, 0, GL_R32F, columns, rows, 0, GL_RED, GL_FLOAT, values);
+}
+
+}  // namespace limber::render::detail

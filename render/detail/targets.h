@@ -1,0 +1,63 @@
+// What the renderer draws into, and the textures it reads back from. Those that only veils or passes need are
+// made when they are first asked for.
+#pragma once
+
+#include <array>
+
+namespace limber::render::detail {
+
+struct Texture {
+  unsigned id = 0;
+  bool multisampled = false;
+  void bind(int unit) const;
+};
+
+// How an axis of samples is laid out: either a larger picture, or several samples a pixel.
+struct SampleGrid {
+  int width = 0, height = 0;  // of the textures
+  int per_pixel = 0;          // 0: one a texel
+};
+
+class Targets {
+ public:
+  Targets(int width, int height, SampleGrid);
+
+  static constexpr int shadow_size = 2048;
+  Texture shadow_map;
+  unsigned shadow_frame;
+
+  // The opaque: colour (premultiplied, linear) and depth.
+  Texture samples, samples_depth;
+  unsigned samples_frame;
+  Texture picture;  // (height × width), four floats
+  unsigned picture_frame;
+  Texture ground_key_map, ground_sky_map;
+
+  // Veils: their sum, and the depths of the first layer and of the last two.
+  struct Veils {
+    Texture color;
+    std::array<Texture, 3> depth;
+    std::array<unsigned, 3> frame;  // colour with depth[i]
+  };
+  const Veils& veils();
+
+  // Beside the colours of the opaque: normal and scalar, number of the mesh; and the same once a pixel.
+  struct Passes {
+    Texture normal_scalar, object;
+    unsigned frame;  // samples, samples_depth and these
+    Texture pixel_normal_scalar, pixel_object, pixel_depth;
+    unsigned pixel_frame;
+  };
+  const Passes& passes();
+
+ private:
+  int width_, height_;
+  SampleGrid grid_;
+  Veils veils_{};
+  Passes passes_{};
+};
+
+// A channel a texel, replaced as a whole.
+void fill(const Texture&, int columns, int rows, const float* values);
+
+}  // namespace limber::render::detail
