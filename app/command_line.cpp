@@ -116,9 +116,16 @@ void add_render(CLI::App& command, RenderOptions& options) {
       ->type_name("I/N");
   command.add_option("--size", options.size, "pixels of a frame, 16x16 … 8192x8192; default: the scene's")
       ->type_name("WxH");
+  command.add_option("--camera", options.camera, "one of the scene's cameras")->capture_default_str();
+  command
+      .add_option("--as", options.name,
+                  "name of this film: frames-NAME, film-NAME.mp4, sheet-NAME.png; default: the camera's, "
+                  "none for main")
+      ->type_name("NAME");
   command
       .add_option("--video", options.video,
-                  "the film, made when every frame is there; default: film.mp4 in the work folder")
+                  "the film, .mp4, .webm or .gif, made when every frame is there; default: film.mp4 in the "
+                  "work folder")
       ->type_name("FILE");
 }
 
@@ -252,6 +259,12 @@ int run_command_line(int argc, const char* const* argv) {
   CLI::App& render_command = *program.add_subcommand("render", "path → frames, contact sheet, film");
   render_command.add_option("DIR", render_options.folder, "work folder with a plan")->required();
   add_render(render_command, render_options);
+  render_command
+      .add_option("--set", render_options.sets,
+                  "edit how it is filmed: film.KEY=VALUE, camera.KEY=VALUE, bodies.NAME.color=… (also "
+                  "opacity, roughness, metallic)")
+      ->type_name("KEY=VALUE")
+      ->allow_extra_args(false);
   render_command.add_flag("--resume", render_options.resume,
                           "keep frames that already show what they should");
   add_global(render_command, global), add_threads(render_command, global);

@@ -68,10 +68,14 @@ Outcome plan(const PlanOptions&);
 
 struct RenderOptions {
   fs::path folder;
-  std::string frames;             // "1-30,47-327:2"; empty: all
-  std::string chunk;              // "i/n"; empty: 1/1
-  bool resume = false;            // keep the frames that already show what they should
-  std::string size;               // "1920x1080"; empty: the scene's
+  std::string frames;   // "1-30,47-327:2"; empty: all
+  std::string chunk;    // "i/n"; empty: 1/1
+  bool resume = false;  // keep the frames that already show what they should
+  std::string size;     // "1920x1080"; empty: the scene's
+  std::string camera = "main";
+  std::vector<std::string> sets;  // of film, cameras and the looks of bodies
+  // Names frames-NAME/, film-NAME.mp4 and sheet-NAME.png; empty: the camera's, and none for "main".
+  std::string name;
   std::optional<fs::path> video;  // default film.mp4 in the folder, made when every frame is there
 };
 Outcome render(const RenderOptions&);

@@ -165,7 +165,7 @@ plan::Settings settings_of(const scenes::Scene& scene, const PlanOptions& option
             .stop_in_goal = p.stop_in_goal,
             .hold = p.hold && !scene.goal.shape,  // which would leave the shape alone
             .end_hopeless = p.end_hopeless};
-  s.frames_per_second = scene.film.frames_per_second;
+  s.frames_per_second = scene.film.frames_per_second / scene.film.speed;
   s.in_flight = options.in_flight;
   s.time_limit_s = options.time_limit_s;
   return s;

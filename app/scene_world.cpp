@@ -7,6 +7,7 @@
 #include "core/log.h"
 #include "core/mesh_files.h"
 #include "core/progress.h"
+#include "core/version.h"
 #include "scenes/library.h"
 #include "scenes/models.h"
 
@@ -75,6 +76,36 @@ BodySource source_of(const scenes::Scene& scene, const scenes::BodySpec& body,
 
 }  // namespace
 
+namespace {
+
+fs::path scenery_file(const fs::path& work_folder, const scenes::BodySpec& body, const char* extension) {
+  return work_folder / "scenery" / (body.name + extension);
+}
+
+// NAME.ply, and beside it NAME.json, which says where it comes from.
+void prepare_scenery(const BodySource& source, const scenes::BodySpec& body, const fs::path& work_folder) {
+  const fs::path mesh = scenery_file(work_folder, body, ".ply"),
+                 origin = scenery_file(work_folder, body, ".json");
+  try {
+    const Json made = read_json(origin);
+    if (made.at("version") == version && made.at("input") == source.identity &&
+        made.at("hash") == hex(hash_of(std::string_view(read_file(mesh)))))
+      return;
+  } catch (const InputError&) {
+  } catch (const Json::exception&) {
+  }
+  log::info("{}: reading {}", mesh.string(), source.model);
+  const meshing::ImportedModel model = source.load();
+  validate(model.surface, source.model);
+  make_folder(mesh.parent_path());
+  write_ply(mesh, model.surface);
+  write_json(origin, {{"version", version},
+                      {"input", source.identity},
+                      {"hash", hex(hash_of(std::string_view(read_file(mesh))))}});
+}
+
+}  // namespace
+
 fs::path body_folder(const fs::path& work_folder, const scenes::BodySpec& body) {
   return work_folder / "bodies" / body.name;
 }
@@ -87,7 +118,24 @@ std::vector<PreparedBody> prepare_bodies(const scenes::Scene& scene, const std::
     prepare_body(source, {.shells = body.cage.shells, .tets = body.cage.tets, .mode = body.cage.mode},
                  body_folder(work_folder, body));
   }
+  for (const scenes::BodySpec& body : scene.scenery) {
+    throw_if_stopped();
+    prepare_scenery(source_of(scene, body, data), body, work_folder);
+  }
   return read_bodies(scene, work_folder);
+}
+
+std::vector<SurfaceMesh> read_scenery(const scenes::Scene& scene, const fs::path& work_folder) {
+  std::vector<SurfaceMesh> meshes;
+  for (const scenes::BodySpec& body : scene.scenery) {
+    const fs::path file = scenery_file(work_folder, body, ".ply");
+    try {
+      meshes.push_back(read_ply(file));
+    } catch (const InputError& error) {
+      throw InputError(fmt::format("{}; make it anew with limber plan", error.what()));
+    }
+  }
+  return meshes;
 }
 
 std::vector<PreparedBody> read_bodies(const scenes::Scene& scene, const fs::path& work_folder) {

@@ -17,6 +17,10 @@ fs::path body_folder(const fs::path& work_folder, const scenes::BodySpec&);
 std::vector<PreparedBody> prepare_bodies(const scenes::Scene&, const std::vector<fs::path>& data,
                                          const fs::path& work_folder);
 
+// The scene's scenery, in world coordinates, from `scenery/` of the work folder, where prepare_bodies puts
+// it. Throws InputError when a mesh is missing or damaged.
+std::vector<SurfaceMesh> read_scenery(const scenes::Scene&, const fs::path& work_folder);
+
 // Throws InputError when a body is missing or damaged.
 std::vector<PreparedBody> read_bodies(const scenes::Scene&, const fs::path& work_folder);
 

@@ -56,6 +56,41 @@ Image8 with_caption(const Image8& picture, const std::vector<std::string>& lines
   return image;
 }
 
+void draw_caption(Image8& image, const std::string& line, const std::string& small_line) {
+  const double margin = image.width / 40.0, room = image.width - 2 * margin;
+  const auto letter = [&](const std::string& text, double wanted) {
+    return text.empty() ? 0 : std::min(wanted, room / double(text.size()));
+  };
+  const double large = letter(line, image.height / 40.0), small = letter(small_line, image.height / 60.0);
+  const double baseline = image.height - margin;
+  detail::draw_text(image, small_line, margin, baseline, small, ink);
+  detail::draw_text(image, line, margin, baseline - 1.9 * small, large, ink);
+}
+
+void draw_color_bar(Image8& image, const ColorBar& bar) {
+  LIMBER_CHECK(bar.low < bar.high, bar.low, bar.high);
+  const double letter = image.height / 72.0, margin = image.width / 40.0;
+  const double top = 0.25 * image.height, bottom = 0.75 * image.height, wide = 1.6 * letter;
+  std::vector<std::pair<double, std::string>> ticks;
+  double room = 0;
+  for (const double value : round_ticks(bar.low, bar.high, 5)) {
+    const double slack = 1e-9 * (bar.high - bar.low);
+    if (value < bar.low - slack || value > bar.high + slack) continue;
+    ticks.emplace_back(value, fmt::format("{:.6g}", value));
+    room = std::max(room, text_width(ticks.back().second, letter));
+  }
+  const double left = image.width - margin - room - 1.2 * letter - wide;
+  for (double y = top; y < bottom; ++y)
+    fill(image, left, y, left + wide, y + 1, bar.color_srgb((bottom - y - 0.5) / (bottom - top)));
+  for (const auto& [value, label] : ticks) {
+    const double y = bottom - (value - bar.low) / (bar.high - bar.low) * (bottom - top);
+    fill(image, left + wide, y - 0.06 * letter, left + wide + 0.5 * letter, y + 0.06 * letter + 1, ink);
+    detail::draw_text(image, label, left + wide + 1.0 * letter, y + 0.5 * letter, letter, ink);
+  }
+  const double width = text_width(bar.label, letter);
+  detail::draw_text(image, bar.label, image.width - margin - width, top - 1.6 * letter, letter, ink);
+}
+
 std::vector<int> histogram_counts(const std::vector<double>& values, double low, double high, int bars) {
   LIMBER_CHECK(low < high && bars > 0, low, high, bars);
   std::vector<int> counts(std::size_t(bars), 0);

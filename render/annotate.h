@@ -1,6 +1,7 @@
 // Words on pictures: a caption with a legend below a picture, and a histogram. Printable ASCII only.
 #pragma once
 
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -17,6 +18,18 @@ struct LegendKey {
 // shrink until the longest line fits the width.
 Image8 with_caption(const Image8& picture, const std::vector<std::string>& lines,
                     const std::vector<LegendKey>& keys = {});
+
+// Words on the picture itself, in its lower left corner: a line, and a smaller one below it; either may be
+// empty. Letters shrink until they fit.
+void draw_caption(Image8&, const std::string& line, const std::string& small_line);
+
+// What a colour means, at the picture's right edge: `color_srgb` of 0 at the lower end, of 1 at the upper.
+struct ColorBar {
+  std::string label;
+  double low = 0, high = 1;
+  std::function<Vec3(double)> color_srgb;
+};
+void draw_color_bar(Image8&, const ColorBar&);
 
 struct HistogramLook {
   std::string x_label, y_label;

@@ -1,6 +1,7 @@
 #include "render/film.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 
 #include "core/error.h"
@@ -53,18 +54,20 @@ std::string last_lines(std::string text, int count) {
   return text.empty() ? "it said nothing" : text.substr(begin);
 }
 
+std::uint64_t big_endian(const std::string& file, std::size_t at, int bytes) {
+  std::uint64_t n = 0;
+  for (int i = 0; i < bytes; ++i) n = n << 8 | static_cast<unsigned char>(file[at + std::size_t(i)]);
+  return n;
+}
+
 // An mp4 is a row of boxes: 4 bytes of size, 4 of kind; size 1 puts the real one in the next 8. ffmpeg has
 // been seen to end with 0 on a file it could not finish.
 bool is_whole_mp4(const std::string& file) {
-  const auto number = [&](std::size_t at, int bytes) {
-    std::uint64_t n = 0;
-    for (int i = 0; i < bytes; ++i) n = n << 8 | static_cast<unsigned char>(file[at + std::size_t(i)]);
-    return n;
-  };
   bool has_index = false, has_pictures = false;
   std::size_t at = 0;
   while (file.size() - at >= 16) {
-    const std::uint64_t size = number(at, 4) == 1 ? number(at + 8, 8) : number(at, 4);
+    const std::uint64_t size =
+        big_endian(file, at, 4) == 1 ? big_endian(file, at + 8, 8) : big_endian(file, at, 4);
     if (size < 8 || size > file.size() - at) return false;
     has_index |= file.compare(at + 4, 4, "moov") == 0;
     has_pictures |= file.compare(at + 4, 4, "mdat") == 0;
@@ -73,67 +76,107 @@ bool is_whole_mp4(const std::string& file) {
   return has_index && has_pictures;
 }
 
+// WebM is EBML (RFC 8794): a head, then one segment that says how long it is. The number of leading zero bits
+// of a length's first byte says how many bytes follow.
+bool is_whole_webm(const std::string& file) {
+  std::size_t at = 0;
+  for (const std::uint64_t id : {0x1A45DFA3u, 0x18538067u}) {
+    if (file.size() < at + 12 || big_endian(file, at, 4) != id) return false;
+    const int bytes = 1 + std::countl_zero(static_cast<unsigned char>(file[at + 4]));
+    if (bytes > 8) return false;
+    const std::uint64_t size =
+        big_endian(file, at + 4, bytes) & ((std::uint64_t(1) << (7 * bytes)) - 1);  // without the marker
+    at += 4 + std::size_t(bytes) + std::size_t(size);
+    if (size > file.size() || at > file.size()) return false;
+  }
+  return at == file.size();
+}
+
+bool is_whole_gif(const std::string& file) { return file.starts_with("GIF89a") && file.back() == ';'; }
+
+struct Format {
+  const char* ending;
+  std::vector<std::string> words;  // of ffmpeg's output
+  bool (*is_whole)(const std::string&);
+};
+
+// A fixed number of threads: x264's and VP9's output depends on it.
+const std::vector<Format>& formats() {
+  static const std::vector<std::string> bt709{"-vf",
+                                              "scale=out_color_matrix=bt709:out_range=tv",
+                                              "-pix_fmt",
+                                              "yuv420p",
+                                              "-color_primaries",
+                                              "bt709",
+                                              "-color_trc",
+                                              "bt709",
+                                              "-colorspace",
+                                              "bt709",
+                                              "-color_range",
+                                              "tv"};
+  const auto with_bt709 = [](std::vector<std::string> words) {
+    words.insert(words.begin(), bt709.begin(), bt709.end());
+    return words;
+  };
+  static const std::vector<Format> all{
+      {".mp4",
+       with_bt709({"-c:v", "libx264", "-preset", "medium", "-crf", "18", "-threads", "2", "-movflags",
+                   "+faststart", "-f", "mp4"}),
+       is_whole_mp4},
+      {".webm",
+       with_bt709({"-c:v", "libvpx-vp9", "-crf", "30", "-b:v", "0", "-deadline", "good", "-cpu-used", "4",
+                   "-threads", "2", "-f", "webm"}),
+       is_whole_webm},
+      {".gif",
+       {"-filter_complex", "split[a][b];[a]palettegen=stats_mode=full[p];[b][p]paletteuse=dither=sierra2_4a",
+        "-f", "gif"},
+       is_whole_gif}};
+  return all;
+}
+
+const Format& format_of(const fs::path& film) {
+  for (const Format& format : formats())
+    if (film.extension() == format.ending) return format;
+  throw InputError(fmt::format("{}: a film's name ends in .mp4, .webm or .gif", film.string()));
+}
+
 }  // namespace
 
 void make_film(const std::vector<fs::path>& frames, double frames_per_second, const fs::path& film) {
   if (!(frames_per_second >= 0.1 && frames_per_second <= 240))
     throw InputError(fmt::format("{} frames a second: must lie between 0.1 and 240", frames_per_second));
+  const Format& format = format_of(film);
+  if (film.extension() == ".gif" && frames_per_second > 50)
+    throw InputError(fmt::format("{}: a GIF shows at most 50 frames a second, not {}; choose .mp4 or .webm",
+                                 film.string(), frames_per_second));
   require_all_good(frames);
   Image8 image = with_even_sides(read_png(frames[0]));
   const int width = image.width, height = image.height;
 
   PendingFile pending(film);
   write_file(pending.temporary(), "");  // our own complaint if the folder is missing or not writable
-  // Decoded pixels go in, so no damaged PNG and no odd file name can reach ffmpeg. A fixed number of threads:
-  // x264's output depends on it.
-  detail::Process ffmpeg({"ffmpeg",
-                          "-hide_banner",
-                          "-loglevel",
-                          "error",
-                          "-nostats",
-                          "-xerror",
-                          "-y",
-                          "-f",
-                          "rawvideo",
-                          "-pix_fmt",
-                          "rgb24",
-                          "-video_size",
-                          fmt::format("{}x{}", width, height),
-                          "-framerate",
-                          fmt::format("{}", frames_per_second),
-                          "-i",
-                          "pipe:0",
-                          "-vf",
-                          "scale=out_color_matrix=bt709:out_range=tv",
-                          "-pix_fmt",
-                          "yuv420p",
-                          "-color_primaries",
-                          "bt709",
-                          "-color_trc",
-                          "bt709",
-                          "-colorspace",
-                          "bt709",
-                          "-color_range",
-                          "tv",
-                          "-c:v",
-                          "libx264",
-                          "-preset",
-                          "medium",
-                          "-crf",
-                          "18",
-                          "-threads",
-                          "2",
-                          "-fflags",
-                          "+bitexact",
-                          "-flags:v",
-                          "+bitexact",
-                          "-map_metadata",
-                          "-1",
-                          "-movflags",
-                          "+faststart",
-                          "-f",
-                          "mp4",
-                          pending.temporary().string()});
+  // Decoded pixels go in, so no damaged PNG and no odd file name can reach ffmpeg.
+  std::vector<std::string> command{"ffmpeg",
+                                   "-hide_banner",
+                                   "-loglevel",
+                                   "error",
+                                   "-nostats",
+                                   "-xerror",
+                                   "-y",
+                                   "-f",
+                                   "rawvideo",
+                                   "-pix_fmt",
+                                   "rgb24",
+                                   "-video_size",
+                                   fmt::format("{}x{}", width, height),
+                                   "-framerate",
+                                   fmt::format("{}", frames_per_second),
+                                   "-i",
+                                   "pipe:0"};
+  command.insert(command.end(), format.words.begin(), format.words.end());
+  command.insert(command.end(), {"-fflags", "+bitexact", "-flags:v", "+bitexact", "-map_metadata", "-1",
+                                 pending.temporary().string()});
+  detail::Process ffmpeg(command);
   Progress progress("film", std::int64_t(frames.size()));
   bool taken = true;
   for (std::size_t f = 0; f < frames.size() && taken; ++f) {
@@ -150,7 +193,7 @@ void make_film(const std::vector<fs::path>& frames, double frames_per_second, co
       fmt::format("{}: ffmpeg failed (exit code {}): {}", film.string(), code, last_lines(words, 4));
   if (disk_full) throw DiskError(what);
   if (code != 0 || !taken) throw InputError(what);
-  if (!is_whole_mp4(read_file(pending.temporary())))
+  if (!format.is_whole(read_file(pending.temporary())))
     throw DiskError(
         fmt::format("{}: ffmpeg ended well but its file is not whole; is the disk full?", film.string()));
   pending.commit();

@@ -9,10 +9,11 @@
 
 namespace limber::render {
 
-// H.264 mp4 (yuv420p, BT.709, crf 18) by the ffmpeg in PATH. Every frame is looked at first; nothing is
-// written when one is missing or damaged. An odd width or height gets its last column or row twice. Same
-// frames, same ffmpeg: same bytes. Throws InputError (no frames; a bad one, which it names; sizes that
-// differ; no ffmpeg; ffmpeg's last words), DiskError, Interrupted.
+// By the ffmpeg in PATH, as the file's name ends: .mp4, H.264 (yuv420p, BT.709, crf 18); .webm, VP9 (the
+// same, crf 30); .gif, 256 colours chosen for the whole, at most 50 frames a second. Every frame is looked at
+// first; nothing is written when one is missing or damaged. An odd width or height gets its last column or
+// row twice. Same frames, same ffmpeg: same bytes. Throws InputError (another ending; no frames; a bad one,
+// which it names; sizes that differ; no ffmpeg; ffmpeg's last words), DiskError, Interrupted.
 void make_film(const std::vector<fs::path>& frames, double frames_per_second, const fs::path& film);
 
 struct SheetLook {

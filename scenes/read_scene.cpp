@@ -372,11 +372,14 @@ FixedSpec read_fixed(const Node& node) {
 }
 
 Role read_role(const std::string& word) {
-  return word == "robot" ? Role::robot : word == "obstacle" ? Role::obstacle : Role::free;
+  return word == "robot"      ? Role::robot
+         : word == "obstacle" ? Role::obstacle
+         : word == "free"     ? Role::free
+                              : Role::scenery;
 }
 
 Vec3 read_body_color(const Node& table, Role role) {
-  const char* usual[] = {"#c0392b", "#3f7cac", "#e0a030"};
+  const char* usual[] = {"#c0392b", "#3f7cac", "#e0a030", "#c8ccd0"};
   return as_color(text_or(table, "color", usual[int(role)]));
 }
 
@@ -402,12 +405,25 @@ BodySpec read_body(const Node& table, const Box& bounds) {
   body.kind = text(table, "kind") == "rigid" ? Kind::rigid : Kind::deformable;
   body.self_contact = flag(table, "self_contact");
   body.model = read_model(child(table, "model"), what);
-  body.cage = read_cage(child(table, "cage"), body.model, what);
-  body.material = read_material(table, body.kind, body.role, what);
-  body.parts = read_parts(list(table, "parts"), body, what);
+  body.color_srgb = read_body_color(table, body.role);
+  body.opacity = number(table, "opacity");
+  body.roughness = number(table, "roughness"), body.metallic = number(table, "metallic");
   const Node& pose = child(table, "pose");
   body.pose = {vector(pose, "position_m"), direction(pose, "axis", (what + ".pose.axis").c_str()),
                number(pose, "angle_deg"), text(pose, "anchor")};
+  body.where = child(pose, "position_m").where.text();
+  if (body.role == Role::scenery) {
+    for (const char* key : {"cage", "material"})
+      if (const Node* node = table.find(key))
+        complain(*node,
+                 fmt::format("{} is scenery, which has no {}; remove it, or choose another role", what, key));
+    return body;
+  }
+  if (!table.find("cage"))
+    complain(table, fmt::format("{} lacks a cage; add for example cage = {{ tets = 300 }}", what));
+  body.cage = read_cage(child(table, "cage"), body.model, what);
+  body.material = read_material(table, body.kind, body.role, what);
+  body.parts = read_parts(list(table, "parts"), body, what);
   body.fixed = read_fixed(child(table, "fixed"));
   if (body.kind == Kind::rigid && body.role != Role::obstacle &&
       (body.fixed.walls || !body.fixed.boxes_m.empty()))
@@ -416,19 +432,22 @@ BodySpec read_body(const Node& table, const Box& bounds) {
                  "{} is rigid and moves, so no node of it can be fixed; remove fixed, or make it deformable, "
                  "or role = \"obstacle\"",
                  what));
-  body.color_srgb = read_body_color(table, body.role);
   check_inside(body, bounds, child(pose, "position_m"), what);
-  body.where = child(pose, "position_m").where.text();
   return body;
 }
 
 void read_bodies(const Node& root, Scene& scene) {
   for (const Node& table : list(root, "bodies")) {
     BodySpec body = read_body(table, scene.bounds_m);
-    for (const BodySpec& other : scene.bodies)
-      if (other.name == body.name)
-        complain(child(table, "name"),
-                 fmt::format("two bodies are called \"{}\"; give each its own name", body.name));
+    for (const auto* bodies : {&scene.bodies, &scene.scenery})
+      for (const BodySpec& other : *bodies)
+        if (other.name == body.name)
+          complain(child(table, "name"),
+                   fmt::format("two bodies are called \"{}\"; give each its own name", body.name));
+    if (body.role == Role::scenery) {
+      scene.scenery.push_back(std::move(body));
+      continue;
+    }
     if (body.role == Role::robot) {
       if (scene.robot >= 0)
         complain(child(table, "role"),
@@ -440,6 +459,16 @@ void read_bodies(const Node& root, Scene& scene) {
   }
   if (scene.robot < 0)
     complain(child(root, "bodies"), "there is no robot; give the body that is to move role = \"robot\"");
+}
+
+int body_called(const Node& node, const Scene& scene, const std::string& key) {
+  std::vector<std::string> names;
+  for (const BodySpec& body : scene.bodies) names.push_back(body.name);
+  const auto at = std::find(names.begin(), names.end(), as_text(node));
+  if (at == names.end())
+    complain(node, fmt::format("{} is \"{}\"; it must be a body that is not scenery: {}", key, as_text(node),
+                               fmt::join(names, ", ")));
+  return int(at - names.begin());
 }
 
 // A body other than the robot, by its name.
@@ -556,8 +585,12 @@ PlannerSpec read_planner(const Node& table) {
   return planner;
 }
 
-CameraSpec read_camera(const Node& table) {
-  CameraSpec camera{direction(table, "direction", "camera.direction"), number(table, "fov_deg"), {}};
+CameraSpec read_camera(const Node& table, const Scene& scene, const std::string& name) {
+  CameraSpec camera;
+  camera.name = name;
+  camera.direction = direction(table, "direction", "camera.direction");
+  camera.fov_deg = number(table, "fov_deg");
+  camera.turn_deg = number(table, "turn_deg");
   for (const Node& node : list(table, "keyframes")) {
     const Keyframe frame{number(node, "at"), vector(node, "eye_m"), vector(node, "target_m")};
     if (!camera.keyframes.empty() && frame.at <= camera.keyframes.back().at)
@@ -568,19 +601,63 @@ CameraSpec read_camera(const Node& table) {
       complain(child(node, "target_m"), "the camera looks at the place where it is; move target_m or eye_m");
     camera.keyframes.push_back(frame);
   }
+  if (const Node* follow = table.find("follow")) camera.follow = body_called(*follow, scene, "follow");
   return camera;
+}
+
+std::vector<CameraSpec> read_cameras(const Node& root, const Scene& scene) {
+  std::vector<CameraSpec> cameras{read_camera(child(root, "camera"), scene, "main")};
+  for (const Node& table : list(root, "cameras")) {
+    const std::string& name = text(table, "name");
+    for (const CameraSpec& other : cameras)
+      if (other.name == name)
+        complain(child(table, "name"),
+                 fmt::format(
+                     "two cameras are called \"{}\" (\"main\" is the table camera); give each its own name",
+                     name));
+    cameras.push_back(read_camera(table, scene, name));
+  }
+  return cameras;
+}
+
+ColorBy read_color_by(const std::string& word) {
+  return word == "strain"        ? ColorBy::strain
+         : word == "volume"      ? ColorBy::volume
+         : word == "penetration" ? ColorBy::penetration
+         : word == "speed"       ? ColorBy::speed
+                                 : ColorBy::body;
 }
 
 FilmSpec read_film(const Node& table) {
   const Eigen::Vector2i size = vector2(table, "size_px").cast<int>(),
                         sheet = vector2(table, "sheet").cast<int>();
-  return {size[0],
-          size[1],
-          integer(table, "frames_per_second"),
-          as_color(text(table, "background")),
-          flag(table, "bounds_lines"),
-          sheet[0],
-          sheet[1]};
+  FilmSpec film;
+  film.width_px = size[0], film.height_px = size[1];
+  film.frames_per_second = integer(table, "frames_per_second");
+  film.speed = number(table, "speed");
+  if (film.frames_per_second / film.speed > 10'000)
+    complain(child(table, "speed"), fmt::format("film.frames_per_second over film.speed are {:g} states a "
+                                                "second of motion, more than 10,000; raise speed",
+                                                film.frames_per_second / film.speed));
+  film.background_srgb = as_color(text(table, "background"));
+  film.bounds_lines = flag(table, "bounds_lines");
+  film.transparent = flag(table, "transparent");
+  film.caption = text(table, "caption");
+  film.clock = flag(table, "clock");
+  film.color_by = read_color_by(text(table, "color_by"));
+  if (table.find("color_range")) {
+    film.color_range = vector2(table, "color_range");
+    if (!((*film.color_range)[0] < (*film.color_range)[1]))
+      complain(child(table, "color_range"),
+               "both ends of film.color_range are the same; write for example [0, 0.5]");
+  }
+  film.cages = flag(table, "cages");
+  film.forces = flag(table, "forces");
+  film.path = flag(table, "path");
+  film.tree = flag(table, "tree");
+  film.side_by_side = flag(table, "side_by_side");
+  film.sheet_columns = sheet[0], film.sheet_rows = sheet[1];
+  return film;
 }
 
 }  // namespace
@@ -608,7 +685,7 @@ Scene read_scene(const std::string& toml, const std::string& name_for_messages,
   read_bodies(root, scene);
   scene.goal = read_goal(root, scene);
   scene.planner = read_planner(child(root, "planner"));
-  scene.camera = read_camera(child(root, "camera"));
+  scene.cameras = read_cameras(root, scene);
   scene.film = read_film(child(root, "film"));
   scene.text = toml;
   scene.sets = sets;

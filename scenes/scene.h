@@ -13,7 +13,7 @@
 
 namespace limber::scenes {
 
-enum class Role { robot, obstacle, free };
+enum class Role { robot, obstacle, free, scenery };
 enum class Kind {
   deformable,
   rigid
@@ -108,7 +108,8 @@ struct BodySpec {
   Pose pose;
   FixedSpec fixed;
   Vec3 color_srgb = Vec3::Zero();  // 0 … 1
-  std::string where;               // "scene.toml:12:24": its place in the text, for complaints
+  double opacity = 1, roughness = 0.45, metallic = 0;
+  std::string where;  // "scene.toml:12:24": its place in the text, for complaints
 };
 
 struct Goal {
@@ -158,16 +159,29 @@ struct Keyframe {
   Vec3 eye_m = Vec3::Zero(), target_m = Vec3::Zero();
 };
 struct CameraSpec {
+  std::string name = "main";
   Vec3 direction = Vec3::UnitX();   // unit; from the scene to the camera
   double fov_deg = 0;               // vertical
   std::vector<Keyframe> keyframes;  // none: framed automatically from `direction`
+  double turn_deg = 0;              // over the film, round the target, counter-clockwise from above
+  int follow = -1;                  // index of the body that it goes along with; −1: none
 };
+
+// What the colours of the bodies mean.
+enum class ColorBy { body, strain, volume, penetration, speed };
 
 struct FilmSpec {
   int width_px = 0, height_px = 0;
   int frames_per_second = 0;
+  double speed = 1;  // a second of film shows so many of the motion
   Vec3 background_srgb = Vec3::Zero();
   bool bounds_lines = true;  // draw the edges of the bounds as pale lines
+  bool transparent = false;  // neither ground nor background
+  std::string caption;
+  bool clock = false;
+  ColorBy color_by = ColorBy::body;
+  std::optional<Eigen::Vector2d> color_range;  // nothing: over the whole motion
+  bool cages = false, forces = false, path = false, tree = false, side_by_side = false;
   int sheet_columns = 0, sheet_rows = 0;
 };
 
@@ -182,7 +196,8 @@ struct Scene {
   int robot = -1;  // index of the one body whose role is robot
   Goal goal;
   PlannerSpec planner;
-  CameraSpec camera;
+  std::vector<BodySpec> scenery;    // seen, but no part of the world; only names, models, poses and looks
+  std::vector<CameraSpec> cameras;  // the first is `camera`, called main
   FilmSpec film;
 
   fs::path folder;                // where the scene file lies; empty when the text came from elsewhere

@@ -72,6 +72,38 @@ TEST(Film, HasTheFramesAndIsTheSameEachTime) {
   EXPECT_EQ(files_in(folder), 10);
 }
 
+// The pixels of a film, as ffmpeg reads them.
+std::string decoded(const fs::path& film) {
+  const std::string command =
+      "ffmpeg -loglevel error -i '" + film.string() + "' -f rawvideo -pix_fmt rgb24 - 2>&1";
+  std::FILE* pipe = ::popen(command.c_str(), "r");
+  std::string pixels;
+  for (int c; (c = std::fgetc(pipe)) != EOF;) pixels.push_back(char(c));
+  EXPECT_EQ(::pclose(pipe), 0) << pixels;
+  return pixels;
+}
+
+TEST(Film, EveryFormatShowsTheFramesInTheirColours) {
+  const Folder folder;
+  const auto frames = write_frames(folder, 8, 64, 32);
+  for (const char* name : {"a.mp4", "a.webm", "a.gif"}) {
+    make_film(frames, 25, folder / name);
+    const std::string pixels = decoded(folder / name);
+    ASSERT_EQ(pixels.size(), 8u * 64 * 32 * 3) << name;
+    for (std::size_t f = 0; f < 8; ++f)
+      for (std::size_t c = 0; c < 3; ++c)
+        EXPECT_NEAR(static_cast<unsigned char>(pixels[(f * 64 * 32 + 700) * 3 + c]),
+                    read_png(frames[f]).rgb[700 * 3 + c], 6)
+            << name << " frame " << f;
+  }
+  const std::string again = read_file(folder / "a.webm");
+  make_film(frames, 25, folder / "a.webm");
+  EXPECT_EQ(read_file(folder / "a.webm"), again);
+  EXPECT_NE(message_of([&] { make_film(frames, 25, folder / "a.avi"); }).find(".webm"), std::string::npos);
+  EXPECT_NE(message_of([&] { make_film(frames, 60, folder / "a.gif"); }).find("50 frames"),
+            std::string::npos);
+}
+
 TEST(Film, IsNotMadeWhenAFrameIsMissingDamagedOrOfAnotherSize) {
   const Folder folder;
   auto frames = write_frames(folder, 3, 32, 16);

@@ -84,7 +84,7 @@ TEST(ReadScene, ReadsWhatIsWritten) {
   EXPECT_EQ(s.bodies[1].fixed.boxes_m[0].upper, Vec3(4, 1, 1));
   EXPECT_EQ(s.goal.center_of_mass_m, Vec3(9, 1.5, 1.5));
   EXPECT_EQ(s.planner.max_force_n, 500);
-  EXPECT_EQ(s.camera.keyframes[1].eye_m, Vec3(9, -9, 1));
+  EXPECT_EQ(s.cameras[0].keyframes[1].eye_m, Vec3(9, -9, 1));
   EXPECT_EQ(s.text, good);
 }
 
@@ -280,7 +280,7 @@ TEST(Sets, EditBeforeReading) {
   EXPECT_EQ(read_scene(good, "s", {"film.frames_per_second=60"}).film.frames_per_second, 60);
   EXPECT_EQ(read_scene(good, "s", {"description=two words"}).description, "two words");
   EXPECT_EQ(read_scene(good, "s", {"planner.seed=1", "planner.seed=2"}).planner.seed, 2);
-  EXPECT_EQ(read_scene(good, "s", {"camera.keyframes.0.eye_m=[1,2,3]"}).camera.keyframes[0].eye_m,
+  EXPECT_EQ(read_scene(good, "s", {"camera.keyframes.0.eye_m=[1,2,3]"}).cameras[0].keyframes[0].eye_m,
             Vec3(1, 2, 3));
 }
 
@@ -550,8 +550,9 @@ std::string all_of(const Scene& s) {
   t += fmt::format("{} {} {} {} {} {} {} {} {} {} {}\n", p.lag, p.metric, p.time_weight, p.guidance,
                    p.soft_price, p.look_s, p.learn_prices, p.steer, p.stop_in_goal, p.end_hopeless, p.hold);
   t += fmt::format("{}\n", p.shortcut_rounds);
-  t += fmt::format("{} {}", v(s.camera.direction), s.camera.fov_deg);
-  for (const Keyframe& k : s.camera.keyframes) t += fmt::format(" {} {} {}", k.at, v(k.eye_m), v(k.target_m));
+  t += fmt::format("{} {}", v(s.cameras[0].direction), s.cameras[0].fov_deg);
+  for (const Keyframe& k : s.cameras[0].keyframes)
+    t += fmt::format(" {} {} {}", k.at, v(k.eye_m), v(k.target_m));
   const FilmSpec& f = s.film;
   return t + fmt::format("\n{} {} {} {} {} {} {}", f.width_px, f.height_px, f.frames_per_second,
                          v(f.background_srgb), f.bounds_lines, f.sheet_columns, f.sheet_rows);
