@@ -42,6 +42,10 @@ radius_m = 0.25
 max_force_n = 500
 [camera]
 keyframes = [{ at = 0, eye_m = [0, -9, 1], target_m = [0, 0, 1] }, { at = 1, eye_m = [9, -9, 1], target_m = [9, 0, 1] }]
+[[cameras]]
+name = "side"
+follow = "gate"
+keyframes = [{ at = 0, eye_m = [0, -7, 1], target_m = [0, 0, 1] }]
 )";
 
 std::string replaced(std::string text, const std::string& from, const std::string& to) {
@@ -105,6 +109,31 @@ TEST(ReadScene, ReadsPartsAndRigidRobots) {
   EXPECT_EQ(box.density_kg_m3, 70);
   EXPECT_EQ(s.bodies[0].kind, Kind::rigid);
   EXPECT_EQ(s.bodies[0].material.density_kg_m3, 300);
+}
+
+TEST(ReadScene, SceneryIsSeenAndNoBody) {
+  const Scene s =
+      read_scene(good +
+                     "[[bodies]]\nname = \"skin\"\nrole = \"scenery\"\nopacity = 0.3\n"
+                     "model = { sphere = { diameter_m = 20 } }\npose = { position_m = [5, 1, 1] }\n",
+                 "s.toml", {"bodies.skin.color=#ff0000"});
+  ASSERT_EQ(s.scenery.size(), 1U);
+  EXPECT_EQ(s.scenery[0].name, "skin");
+  EXPECT_EQ(s.scenery[0].opacity, 0.3);
+  EXPECT_EQ(s.scenery[0].color_srgb, Vec3(1, 0, 0));
+  EXPECT_EQ(s.bodies.size(), 2U);
+  EXPECT_THAT(complaint(good, {"goal.above=skin"}), HasSubstr("robot, gate"));
+}
+
+TEST(ReadScene, CamerasAreMainAndThoseNamed) {
+  const Scene s = read_scene(good, "s.toml", {"cameras.side.turn_deg=90", "camera.fov_deg=20"});
+  ASSERT_EQ(s.cameras.size(), 2U);
+  EXPECT_EQ(s.cameras[0].name, "main");
+  EXPECT_EQ(s.cameras[0].fov_deg, 20);
+  EXPECT_EQ(s.cameras[0].follow, -1);
+  EXPECT_EQ(s.cameras[1].name, "side");
+  EXPECT_EQ(s.cameras[1].follow, 1);
+  EXPECT_EQ(s.cameras[1].turn_deg, 90);
 }
 
 TEST(ReadScene, PresetDecidesOnlyWhatIsNotWritten) {
@@ -243,6 +272,13 @@ TEST(ReadScene, ComplainsWithLineAndColumn) {
       {"max_force_n = 500", "max_force_n = 500\nweights = { body = 0, control_point = 0 }", "{ body",
        "both 0"},
       {"at = 1,", "at = 0,", "0, eye_m = [9", "put them in order"},
+      {"name = \"side\"", "name = \"main\"", "\"main\"", "two cameras are called \"main\""},
+      {"follow = \"gate\"", "follow = \"robt\"", "\"robt\"", "a body that is not scenery: robot, gate"},
+      {"role = \"obstacle\"", "role = \"scenery\"", "{ tets", "bodies.gate is scenery, which has no cage"},
+      {"cage = { tets = 200 }\n", "", "[[bodies]]\nname = \"gate", "bodies.gate lacks a cage"},
+      {"[[cameras]]", "[film]\ncolor_range = [2, 2]\n[[cameras]]", "[2, 2]", "are the same"},
+      {"[[cameras]]", "[film]\nframes_per_second = 100\nspeed = 0.005\n[[cameras]]", "0.005",
+       "more than 10,000"},
       {"target_m = [0, 0, 1]", "target_m = [0, -9, 1]", "[0, -9, 1] }", "looks at the place where it is"},
       {"fixed = [\"walls\"", "fixed = [\"wall\"", "\"wall\"", "must be \"walls\", or a list"},
       {"fixed = [\"walls\"", "fixed = [\"walls\", { boxm = 1 }", "boxm", "did you mean \"box_m\"?"},
@@ -376,6 +412,13 @@ std::string another_value(const Key& key) {
       {"camera.keyframes[].eye_m", "[0, -8, 1]"},
       {"camera.keyframes[].target_m", "[0, 0.5, 1]"},
       {"camera.keyframes", "[]"},
+      {"camera.follow", "\"robot\""},
+      {"cameras[].name", "\"other\""},
+      {"cameras[].follow", "\"robot\""},
+      {"cameras[].keyframes[].at", "0.5"},
+      {"cameras[].keyframes[].eye_m", "[0, -8, 1]"},
+      {"cameras[].keyframes[].target_m", "[0, 0.5, 1]"},
+      {"bodies[].role", "\"free\""},
       {"planner.duration_s", "[0.3, 0.4]"},
   };
   if (const auto at = particular.find(key.path); at != particular.end()) return at->second;
@@ -449,6 +492,7 @@ TEST(Keys, EveryKeyChangesTheScene) {
     if (path.starts_with("bodies[]")) path = replaced(path, "bodies[]", body);
     if (fixed && path.ends_with(".box_m")) path = replaced(path, "[]", ".1");
     if (path.find("parts[]") != path.npos) path = replaced(path, "parts[]", "parts.0");
+    if (path.starts_with("cameras[]")) path = replaced(path, "cameras[]", "cameras.side");
     if (path.find("keyframes[]") != path.npos) path = replaced(path, "keyframes[]", "keyframes.0");
     const std::string before = all_of(read_scene(good, "s", sets));
     sets.push_back(path + "=" + another_value(key));
@@ -528,6 +572,7 @@ std::string all_of(const Scene& s) {
                      m.youngs_modulus_pa, m.poisson_ratio, m.density_kg_m3, m.damping_ratio, m.friction,
                      m.mesh_independent, v(body.pose.position_m), v(body.pose.axis), body.pose.angle_deg,
                      body.pose.anchor, v(body.color_srgb));
+    t += fmt::format(" {} {} {}", body.opacity, body.roughness, body.metallic);
     t += fmt::format(" {}", body.fixed.walls);
     for (const Box& box : body.fixed.boxes_m) t += b(box);
     for (const PartSpec& part : body.parts)
@@ -550,12 +595,17 @@ std::string all_of(const Scene& s) {
   t += fmt::format("{} {} {} {} {} {} {} {} {} {} {}\n", p.lag, p.metric, p.time_weight, p.guidance,
                    p.soft_price, p.look_s, p.learn_prices, p.steer, p.stop_in_goal, p.end_hopeless, p.hold);
   t += fmt::format("{}\n", p.shortcut_rounds);
-  t += fmt::format("{} {}", v(s.cameras[0].direction), s.cameras[0].fov_deg);
-  for (const Keyframe& k : s.cameras[0].keyframes)
-    t += fmt::format(" {} {} {}", k.at, v(k.eye_m), v(k.target_m));
+  for (const CameraSpec& c : s.cameras) {
+    t += fmt::format("{} {} {} {} {}", c.name, v(c.direction), c.fov_deg, c.turn_deg, c.follow);
+    for (const Keyframe& k : c.keyframes) t += fmt::format(" {} {} {}", k.at, v(k.eye_m), v(k.target_m));
+  }
   const FilmSpec& f = s.film;
-  return t + fmt::format("\n{} {} {} {} {} {} {}", f.width_px, f.height_px, f.frames_per_second,
-                         v(f.background_srgb), f.bounds_lines, f.sheet_columns, f.sheet_rows);
+  const Eigen::Vector2d range = f.color_range.value_or(Eigen::Vector2d(-1, -1));
+  t += fmt::format("\n{} {} {} {} {} {} {}", f.width_px, f.height_px, f.frames_per_second,
+                   v(f.background_srgb), f.bounds_lines, f.sheet_columns, f.sheet_rows);
+  return t + fmt::format("\n{} {} {} {} {} {} {} {} {} {} {} {} {}", f.speed, f.transparent, f.caption,
+                         f.clock, int(f.color_by), range[0], range[1], f.cages, f.forces, f.path, f.tree,
+                         f.side_by_side, s.scenery.size());
 }
 
 }  // namespace
