@@ -5,6 +5,7 @@
 
 #include "app/commands.h"
 #include "app/export.h"
+#include "app/shot.h"
 #include "core/error.h"
 #include "core/log.h"
 #include "core/progress.h"
@@ -117,6 +118,18 @@ void add_render(CLI::App& command, RenderOptions& options) {
   command.add_option("--size", options.size, "pixels of a frame, 16x16 … 8192x8192; default: the scene's")
       ->type_name("WxH");
   command.add_option("--camera", options.camera, "one of the scene's cameras")->capture_default_str();
+  command
+      .add_option("--passes", options.passes,
+                  "pictures beside each frame, any of depth, normal, object, scalar (what film.color_by "
+                  "says); passes.json says "
+                  "what their levels mean")
+      ->type_name("PASS[,PASS…]")
+      ->delimiter(',')
+      ->check(CLI::IsMember(pass_names))
+      ->allow_extra_args(false);
+  command.add_option("--bits", options.bits, "a channel of frames and passes, 8 or 16")
+      ->check(CLI::IsMember({8, 16}))
+      ->capture_default_str();
   command
       .add_option("--as", options.name,
                   "name of this film: frames-NAME, film-NAME.mp4, sheet-NAME.png; default: the camera's, "

@@ -73,7 +73,9 @@ struct RenderOptions {
   bool resume = false;  // keep the frames that already show what they should
   std::string size;     // "1920x1080"; empty: the scene's
   std::string camera = "main";
-  std::vector<std::string> sets;  // of film, cameras and the looks of bodies
+  std::vector<std::string> passes;  // of depth, normal, object, scalar
+  int bits = 8;                     // a channel, 8 or 16
+  std::vector<std::string> sets;    // of film, cameras and the looks of bodies
   // Names frames-NAME/, film-NAME.mp4 and sheet-NAME.png; empty: the camera's, and none for "main".
   std::string name;
   std::optional<fs::path> video;  // default film.mp4 in the folder, made when every frame is there

@@ -24,9 +24,29 @@ struct Failure {
   std::string why;
 };
 
+// Where the pictures of a frame are: 0007.png, and of its passes 0007.depth.png and so on.
+struct FrameFiles {
+  fs::path folder;
+  fs::path of(int frame, const std::string& pass = "") const {
+    return folder / fmt::format("{:04}{}{}.png", frame, pass.empty() ? "" : ".", pass);
+  }
+};
+
+// The frame's own file last: where it is good, its passes are there.
+void write(const Picture& picture, const FrameFiles& files, int frame, const std::string& hash) {
+  const auto put = [&](const std::string& pass, const auto& any) {
+    std::visit(
+        [&](const auto& image) {
+          render::write_png(files.of(frame, pass), image, {{"limber-hash", hash}});
+        },
+        any);
+  };
+  for (const auto& [pass, image] : picture.passes) put(pass, image);
+  put("", picture.frame);
+}
+
 // Paints the frames on all threads. A frame that fails does not stop the others; a full disk does.
-std::vector<Failure> paint_all(const Shot& shot, const std::vector<int>& frames,
-                               const std::function<fs::path(int)>& path_of) {
+std::vector<Failure> paint_all(const Shot& shot, const std::vector<int>& frames, const FrameFiles& files) {
   std::vector<Failure> failures;
   std::atomic<std::size_t> next{0}, done{0};
   std::exception_ptr fatal;
@@ -39,8 +59,7 @@ std::vector<Failure> paint_all(const Shot& shot, const std::vector<int>& frames,
         const std::size_t i = next++;
         if (i >= frames.size()) break;
         try {
-          render::write_png(path_of(frames[i]), painter.paint(frames[i]),
-                            {{"limber-hash", shot.hash_of(frames[i])}});
+          write(painter.paint(frames[i]), files, frames[i], shot.hash_of(frames[i]));
         } catch (const InputError& error) {
           const std::lock_guard lock(mutex);
           failures.push_back({frames[i], error.what()});
@@ -105,7 +124,8 @@ Outcome render(const RenderOptions& options) {
   const scenes::FilmSpec& film = scene.film;
   const auto size =
       options.size.empty() ? std::pair(film.width_px, film.height_px) : parse_size(options.size);
-  const Shot shot(scene, options.camera, planned.plan, world, bodies, scenery, size);
+  const Output output{options.bits, options.passes};
+  const Shot shot(scene, options.camera, planned.plan, world, bodies, scenery, size, output);
   const int frame_count = shot.frames();
 
   int left_out = 0;
@@ -115,13 +135,20 @@ Outcome render(const RenderOptions& options) {
               frame_count - 1);
   const fs::path folder = options.folder / ("frames" + suffix);
   make_folder(folder);
-  const auto path_of = [&](int frame) { return folder / fmt::format("{:04}.png", frame); };
-  const auto is_good = [&](int frame) { return render::frame_hash(path_of(frame)) == shot.hash_of(frame); };
+  const FrameFiles files{folder};
+  const auto is_good = [&](int frame) {
+    const std::string hash = shot.hash_of(frame);
+    return render::frame_hash(files.of(frame)) == hash &&
+           std::all_of(options.passes.begin(), options.passes.end(), [&](const std::string& pass) {
+             return render::frame_hash(files.of(frame, pass)) == hash;
+           });
+  };
+  if (!options.passes.empty()) write_json(folder / "passes.json", shot.key_of_passes());
 
   std::vector<int> missing = wanted;
   if (options.resume) std::erase_if(missing, is_good);
   const double cpu_before = cpu_seconds();
-  const std::vector<Failure> failures = paint_all(shot, missing, path_of);
+  const std::vector<Failure> failures = paint_all(shot, missing, files);
   const double cpu_s = cpu_seconds() - cpu_before;
   throw_if_stopped();
   for (const Failure& failure : failures) log::warn("frame {}: {}", failure.frame, failure.why);
@@ -140,7 +167,7 @@ Outcome render(const RenderOptions& options) {
                   wanted.size() - missing.size(), failures.size(), cpu_s);
 
   std::vector<fs::path> paths;
-  for (int f = 0; f < frame_count; ++f) paths.push_back(path_of(f));
+  for (int f = 0; f < frame_count; ++f) paths.push_back(files.of(f));
   bool complete = true;
   for (int f = 0; f < frame_count && complete; ++f) complete = is_good(f);
   if (complete) {
@@ -149,13 +176,13 @@ Outcome render(const RenderOptions& options) {
     std::vector<fs::path> shown;
     std::vector<std::string> captions;
     for (const int f : render::spread_over(frame_count, film.sheet_columns * film.sheet_rows)) {
-      shown.push_back(path_of(f));
+      shown.push_back(files.of(f));
       captions.push_back(fmt::format("{:.2f} s", double(f) / planned.plan.trajectory.frames_per_second));
     }
     render::write_png(sheet, render::contact_sheet(shown, captions, {.columns = film.sheet_columns}));
     render::make_film(paths, film.frames_per_second, video);
     // Frames of an earlier, longer motion would only confuse.
-    for (int f = frame_count; fs::remove(path_of(f)); ++f) {
+    for (int f = frame_count; fs::remove(files.of(f)); ++f) {
     }
     result["film"] = video.string(), result["sheet"] = sheet.string();
     text += fmt::format("film {}, contact sheet {}\n", video.string(), sheet.string());

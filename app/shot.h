@@ -1,8 +1,10 @@
 // What one camera sees of a planned motion: from the number of a frame to a picture, by any worker alike.
 #pragma once
 
+#include <map>
 #include <memory>
 #include <string>
+#include <variant>
 #include <vector>
 
 #include "app/plan_folder.h"
@@ -13,15 +15,29 @@
 
 namespace limber::app {
 
+// What is written of a frame.
+struct Output {
+  int bits = 8;                     // a channel, 8 or 16
+  std::vector<std::string> passes;  // of pass_names
+};
+inline const std::vector<std::string> pass_names{"depth", "normal", "object", "scalar"};
+
+struct Picture {
+  std::variant<render::Image8, render::Raster8, render::Raster16> frame;
+  std::map<std::string, std::variant<render::Raster8, render::Raster16>> passes;  // docs/files.md
+};
+
 class Shot {
  public:
   // The folder's plan and bodies as they are; `scene` with the film and the cameras wanted. Throws InputError
-  // naming the cameras there are, when `camera` is none of them.
+  // naming the cameras there are, when `camera` is none of them; or saying what cannot be drawn together.
   Shot(const scenes::Scene& scene, const std::string& camera, const plan::Plan&, const fem::World&,
-       const std::vector<PreparedBody>&, const std::vector<SurfaceMesh>& scenery,
-       std::pair<int, int> size_px);
+       const std::vector<PreparedBody>&, const std::vector<SurfaceMesh>& scenery, std::pair<int, int> size_px,
+       const Output& = {});
 
   int frames() const;
+  // {"depth_m": [near, far], "objects": ["", NAME…], "scalar": {…}}: what the levels of the passes mean.
+  Json key_of_passes() const;
   // Of all that the picture depends on.
   std::string hash_of(int frame) const;
 
@@ -30,10 +46,11 @@ class Shot {
    public:
     explicit Painter(const Shot&);
     ~Painter();
-    render::Image8 paint(int frame);
+    Picture paint(int frame);
 
    private:
     struct View;
+    render::Image8 annotated(render::Image8, int frame) const;
     const Shot& shot_;
     std::vector<std::unique_ptr<View>> views_;  // from left to right
   };
@@ -46,6 +63,8 @@ class Shot {
   render::Camera camera_of(int frame) const;
   Box box_of_motion() const;
   void lay_out_camera(double aspect);
+  void check() const;
+  void measure_depths();
   void measure_colors();
   void measure_forces();
   void find_tree();
@@ -60,11 +79,13 @@ class Shot {
   const fem::World& world_;
   const std::vector<PreparedBody>& bodies_;
   const std::vector<SurfaceMesh>& scenery_;
+  Output output_;
   render::Look look_;                    // of one view
   std::vector<render::CameraKey> path_;  // over the share of the film
   Points followed_m_;                    // (frames × 3) the way of the body that the camera follows, or none
   double low_ = 0, high_ = 1;            // of the bar of colours
-  double arrow_m_per_n_ = 0, arrow_radius_m_ = 0;
+  double near_m_ = 0, far_m_ = 1;        // depths of all that is ever seen
+  double strongest_push_n_ = 0, arrow_m_per_n_ = 0, arrow_radius_m_ = 0;
   std::vector<Push> pushes_;
   Points way_m_, tree_m_;  // ends of lines
   std::uint64_t look_hash_ = 0;

@@ -555,7 +555,7 @@ constexpr Key all_keys[] = {
      {},
      0,
      "false",
-     "no ground and no background: PNG with alpha; no film is made of it",
+     "no ground and no background: frames with alpha, shadows in it; the film is over white",
      "",
      ""},
     {"film.caption",
@@ -586,7 +586,8 @@ constexpr Key all_keys[] = {
      {},
      0,
      "false",
-     "arrows: the force that drives the robot, and each pair's contact",
+     "arrows where they leave the robot: the push that drives it, orange, as long as the robot where it is "
+     "strongest; what each body and the walls do to it, blue, at most twice as long",
      "",
      ""},
     {"film.path", Type::boolean, {}, 0, "false", "draw the way of the robot's centre of mass", "", ""},

@@ -1,0 +1,320 @@
+#include <fmt/format.h>
+
+#include <set>
+
+#include "app/node_values.h"
+#include "app/shot.h"
+#include "fem/observe.h"
+#include "render/annotate.h"
+#include "render/arrow.h"
+#include "render/color_map.h"
+#include "render/occlusion.h"
+
+namespace limber::app {
+
+namespace {
+
+const Vec3 push_color(0.93, 0.52, 0.10), contact_color(0.16, 0.42, 0.62);
+const render::LineLook cage_lines{.color_srgb = {0.12, 0.14, 0.18}, .width_px = 1.2, .opacity = 0.55};
+const render::LineLook way_lines{.color_srgb = {0.85, 0.35, 0.05}, .width_px = 3, .opacity = 0.9};
+const render::LineLook tree_lines{.color_srgb = {0.25, 0.28, 0.36}, .width_px = 1, .opacity = 0.45};
+// Above this the cage casts the shadow of the surface: a shadow map of so many triangles costs as much as all
+// the rest of the picture.
+constexpr int most_triangles_that_cast = 60'000;
+
+using Edges = Eigen::Matrix<int, Eigen::Dynamic, 2, Eigen::RowMajor>;
+
+// Each edge of the triangles once, (E × 2).
+Edges edges_of(const Triangles& triangles) {
+  std::set<std::pair<int, int>> edges;
+  for (Eigen::Index t = 0; t < triangles.rows(); ++t)
+    for (int i = 0; i < 3; ++i) edges.insert(std::minmax({triangles(t, i), triangles(t, (i + 1) % 3)}));
+  Edges rows(Eigen::Index(edges.size()), 2);
+  Eigen::Index row = 0;
+  for (const auto& [a, b] : edges) rows.row(row++) << a, b;
+  return rows;
+}
+
+// (2E × 3)
+Points ends_of(const Edges& edges, const Points& positions) {
+  Points ends(2 * edges.rows(), 3);
+  for (Eigen::Index e = 0; e < edges.rows(); ++e)
+    for (int i = 0; i < 2; ++i) ends.row(2 * e + i) = positions.row(edges(e, i));
+  return ends;
+}
+
+render::Image8 beside(const render::Image8& left, const render::Image8& right) {
+  const int width = left.width + right.width;
+  render::Image8 both{width, left.height, {}};
+  both.rgb.resize(std::size_t(3) * width * left.height);
+  for (int y = 0; y < left.height; ++y) {
+    std::uint8_t* row = &both.rgb[std::size_t(3) * y * width];
+    std::copy_n(&left.rgb[std::size_t(3) * y * left.width], 3 * left.width, row);
+    std::copy_n(&right.rgb[std::size_t(3) * y * right.width], 3 * right.width, row + 3 * left.width);
+  }
+  return both;
+}
+
+// Levels of a grey picture; 0 … 1 beyond the ends is cut off.
+template <class Level>
+Level level_of(double share) {
+  return Level(std::lround(std::clamp(share, 0.0, 1.0) * std::numeric_limits<Level>::max()));
+}
+
+// The passes as PNG hold them: docs/files.md.
+template <class Level>
+render::Raster<Level> encoded(const render::Passes& passes, const std::string& name, double low,
+                              double high) {
+  render::Raster<Level> raster{passes.width,
+                               passes.height,
+                               name == "normal"   ? 3
+                               : name == "scalar" ? 2
+                                                  : 1,
+                               {}};
+  const std::size_t pixels = std::size_t(passes.width) * std::size_t(passes.height);
+  raster.levels.reserve(pixels * std::size_t(raster.channels));
+  constexpr Level most = std::numeric_limits<Level>::max();
+  for (std::size_t i = 0; i < pixels; ++i) {
+    const bool there = passes.object[i] >= 0;
+    if (name == "depth") {
+      raster.levels.push_back(there ? level_of<Level>((double(passes.depth_m[i]) - low) / (high - low))
+                                    : most);
+    } else if (name == "object") {
+      raster.levels.push_back(Level(passes.object[i] + 1));
+    } else if (name == "normal") {
+      for (std::size_t c = 0; c < 3; ++c)
+        raster.levels.push_back(level_of<Level>(0.5 + 0.5 * double(passes.normal[3 * i + c])));
+    } else {
+      raster.levels.push_back(there ? level_of<Level>((double(passes.scalar[i]) - low) / (high - low))
+                                    : Level(0));
+      raster.levels.push_back(there ? most : Level(0));
+    }
+  }
+  return raster;
+}
+
+}  // namespace
+
+// One picture, or one half of it: the fine surfaces, or the cages.
+struct Shot::Painter::View {
+  View(const Shot& from, bool of_cages) : shot(from), cages(of_cages), renderer(from.look_) {
+    for (std::size_t b = 0; b < shot.bodies_.size(); ++b) add_body(b);
+    for (std::size_t s = 0; s < shot.scenery_.size(); ++s)
+      renderer.add_mesh(shot.scenery_[s].triangles, shot.scenery_[s].positions,
+                        look_of(shot.scene_.scenery[s]));
+    for (std::size_t b = 0; b < shot.bodies_.size(); ++b) add_caster(b);
+    const scenes::FilmSpec& film = shot.scene_.film;
+    if (film.bounds_lines) renderer.add_lines(render::edges_of(shot.scene_.bounds_m), {});
+    if (shot.way_m_.rows() > 0) renderer.add_lines(shot.way_m_, way_lines);
+    if (shot.tree_m_.rows() > 0) renderer.add_lines(shot.tree_m_, tree_lines);
+    if (film.forces)
+      for (std::size_t i = 0; i <= shot.bodies_.size(); ++i) {
+        const Vec3 nowhere = shot.look_.stage.center();
+        arrows.push_back(renderer.add_mesh(
+            render::arrow_triangles(), render::arrow(nowhere, nowhere + Vec3::UnitX(), shot.arrow_radius_m_),
+            {.name = "arrow", .color_srgb = i == 0 ? push_color : contact_color, .roughness = 0.6}));
+      }
+  }
+
+  static render::MeshLook look_of(const scenes::BodySpec& body) {
+    return {.name = body.name,
+            .color_srgb = body.color_srgb,
+            .roughness = body.roughness,
+            .metallic = body.metallic,
+            .opacity = body.opacity};
+  }
+
+  bool cage_casts(std::size_t b) const {
+    return !cages && shot.bodies_[b].surface.triangles.rows() > most_triangles_that_cast;
+  }
+
+  void add_body(std::size_t b) {
+    const PreparedBody& prepared = shot.bodies_[b];
+    const Triangles& hull = shot.world_.bodies[b].surface;
+    render::MeshLook look = look_of(shot.scene_.bodies[b]);
+    look.casts_shadow = !cage_casts(b);
+    if (cages) look.crease_angle_deg = 0;
+    meshes.push_back(cages ? renderer.add_mesh(hull, prepared.cage.positions, look)
+                           : renderer.add_mesh(prepared.surface.triangles, prepared.surface.positions, look));
+    rest_normals.push_back(vertex_normals(prepared.surface.positions, prepared.surface.triangles));
+    hulls.push_back(prepared.cage.positions);
+    if (!cages && !shot.scene_.film.cages) return;
+    cage_edges.push_back(edges_of(hull));
+    cage_lines_of.push_back(renderer.add_lines(ends_of(cage_edges[b], prepared.cage.positions), cage_lines));
+  }
+
+  // After all that is seen, so that the numbers of meshes are those of bodies and scenery.
+  void add_caster(std::size_t b) {
+    render::MeshLook look = look_of(shot.scene_.bodies[b]);
+    look.seen = false;
+    casters.push_back(
+        cage_casts(b) ? renderer.add_mesh(shot.world_.bodies[b].surface, shot.bodies_[b].cage.positions, look)
+                      : -1);
+  }
+
+  // From the nodes of a body's cage to the rows of its mesh, by the weights of the binding. Where only some
+  // nodes have a value, by the weights of those.
+  Eigen::VectorXd on_mesh(std::size_t b, const Eigen::VectorXd& of_node,
+                          const std::vector<bool>& has_value = {}) const {
+    if (cages) return of_node;
+    const PreparedBody& prepared = shot.bodies_[b];
+    Eigen::VectorXd values(prepared.surface.positions.rows());
+    for (Eigen::Index v = 0; v < values.rows(); ++v) {
+      double sum = 0, weights = 0;
+      for (int i = 0; i < 4; ++i) {
+        const int node = prepared.cage.tets(prepared.binding.tet_from_vertex[v], i);
+        if (!has_value.empty() && !has_value[std::size_t(node)]) continue;
+        const double weight = has_value.empty() ? prepared.binding.weights(v, i)
+                                                : std::max(prepared.binding.weights(v, i), 1e-3);
+        sum += weight * of_node[node], weights += weight;
+      }
+      values[v] = weights > 0 ? sum / weights : 0;
+    }
+    return values;
+  }
+
+  Points colors_of(const Eigen::VectorXd& values) const {  // (rows × 3) sRGB
+    Points colors(values.rows(), 3);
+    for (Eigen::Index v = 0; v < values.rows(); ++v) {
+      const double share = (values[v] - shot.low_) / (shot.high_ - shot.low_);
+      colors.row(v) = (shot.scene_.film.color_by == scenes::ColorBy::volume ? render::diverging_srgb(share)
+                                                                            : render::sequential_srgb(share))
+                          .transpose();
+    }
+    return colors;
+  }
+
+  // What bodies hide of one another's sky, found between the cages.
+  void occlude() {
+    std::vector<render::Occluder> occluders;
+    for (std::size_t b = 0; b < hulls.size(); ++b)
+      if (shot.scene_.bodies[b].opacity == 1) occluders.push_back({hulls[b], shot.world_.bodies[b].surface});
+    for (std::size_t b = 0; b < hulls.size(); ++b) {
+      const fem::Body& body = shot.world_.bodies[b];
+      const Points hull_normals = vertex_normals(hulls[b], body.surface);
+      Points points(Eigen::Index(body.surface_nodes.size()), 3), outward(points.rows(), 3);
+      for (Eigen::Index i = 0; i < points.rows(); ++i) {
+        points.row(i) = hulls[b].row(body.surface_nodes[std::size_t(i)]);
+        outward.row(i) = hull_normals.row(body.surface_nodes[std::size_t(i)]);
+      }
+      const Eigen::VectorXd hidden = render::sky_occlusion(points, outward, occluders);
+      Eigen::VectorXd of_node = Eigen::VectorXd::Zero(hulls[b].rows());
+      std::vector<bool> on_surface(std::size_t(hulls[b].rows()), false);
+      for (Eigen::Index i = 0; i < points.rows(); ++i) {
+        of_node[body.surface_nodes[std::size_t(i)]] = hidden[i];
+        on_surface[std::size_t(body.surface_nodes[std::size_t(i)])] = true;
+      }
+      renderer.set_occlusion(meshes[b], on_mesh(b, of_node, on_surface));
+    }
+  }
+
+  void move_body(std::size_t b) {
+    const PreparedBody& prepared = shot.bodies_[b];
+    const Points& hull = hulls[b];
+    if (casters[b] >= 0) renderer.set_positions(casters[b], hull);
+    if (!cage_lines_of.empty()) renderer.set_lines(cage_lines_of[b], ends_of(cage_edges[b], hull));
+    if (cages) {
+      renderer.set_positions(meshes[b], hull);
+      return;
+    }
+    surface.resize(prepared.surface.positions.rows(), 3);
+    normals.resize(surface.rows(), 3);
+    ffd::deform(prepared.binding, prepared.cage.tets, hull, surface);
+    ffd::deform_normals(prepared.binding, prepared.cage, hull, rest_normals[b], normals);
+    renderer.set_positions(meshes[b], surface, normals);
+  }
+
+  void show(int frame) {
+    const scenes::ColorBy by = shot.scene_.film.color_by;
+    const State& state = shot.plan_.trajectory.frames[std::size_t(frame)];
+    std::vector<double> values;
+    if (by != scenes::ColorBy::body) values = node_values(shot.world_, state, by);
+    for (std::size_t b = 0; b < meshes.size(); ++b) {
+      const fem::Body& body = shot.world_.bodies[b];
+      if (!values.empty() && body.kind == fem::BodyKind::deformable) {
+        const Eigen::VectorXd of_vertex = on_mesh(
+            b, Eigen::Map<const Eigen::VectorXd>(&values[std::size_t(body.first_node)], body.node_count()));
+        renderer.set_colors(meshes[b], colors_of(of_vertex));
+        renderer.set_scalars(meshes[b], of_vertex);
+      }
+      if (!body.moving) continue;
+      hulls[b] = fem::body_positions(shot.world_, state, int(b));
+      move_body(b);
+    }
+    occlude();
+    if (arrows.empty()) return;
+    const Points ends = shot.arrows_at(frame);
+    for (std::size_t i = 0; i < arrows.size(); ++i) {
+      const Eigen::Index row = 2 * Eigen::Index(i);
+      renderer.set_positions(arrows[i],
+                             render::arrow(ends.row(row), ends.row(row + 1), shot.arrow_radius_m_));
+    }
+  }
+
+  const Shot& shot;
+  bool cages;
+  render::Renderer renderer;
+  std::vector<int> meshes, casters, cage_lines_of, arrows;
+  std::vector<Points> hulls, rest_normals;  // a body; the cage's nodes as they are now
+  std::vector<Edges> cage_edges;
+  Points surface, normals;
+};
+
+Shot::Painter::Painter(const Shot& shot) : shot_(shot) {
+  views_.push_back(std::make_unique<View>(shot, false));
+  if (shot.scene_.film.side_by_side) views_.push_back(std::make_unique<View>(shot, true));
+}
+Shot::Painter::~Painter() = default;
+
+// In 8 bit and with a background, so words and bars can be drawn on it.
+render::Image8 Shot::Painter::annotated(render::Image8 image, int frame) const {
+  const scenes::FilmSpec& film = shot_.scene_.film;
+  if (film.color_by != scenes::ColorBy::body)
+    render::draw_color_bar(
+        image, {.label = caption_of(film.color_by),
+                .low = shot_.low_,
+                .high = shot_.high_,
+                .color_srgb = film.color_by == scenes::ColorBy::volume ? render::diverging_srgb
+                                                                       : render::sequential_srgb});
+  std::string clock;
+  if (film.clock) {
+    clock = fmt::format("{:.2f} s", double(frame) / shot_.plan_.trajectory.frames_per_second);
+    if (film.speed != 1) clock += fmt::format("   speed {:g}", film.speed);
+    clock += fmt::format("   {}/{}", frame + 1, shot_.frames());
+  }
+  if (!film.caption.empty() || !clock.empty()) render::draw_caption(image, film.caption, clock);
+  return image;
+}
+
+Picture Shot::Painter::paint(int frame) {
+  const render::Camera camera = shot_.camera_of(frame);
+  const Output& output = shot_.output_;
+  views_[0]->show(frame);
+  render::Passes passes;
+  const render::Image image =
+      output.passes.empty() ? views_[0]->renderer.draw(camera) : views_[0]->renderer.draw(camera, passes);
+  Picture picture;
+  for (const std::string& name : output.passes) {
+    const bool depth = name == "depth";
+    const double low = depth ? shot_.near_m_ : shot_.low_, high = depth ? shot_.far_m_ : shot_.high_;
+    if (name == "object" || output.bits == 8)
+      picture.passes[name] = encoded<std::uint8_t>(passes, name, low, high);
+    else
+      picture.passes[name] = encoded<std::uint16_t>(passes, name, low, high);
+  }
+  const bool transparent = shot_.scene_.film.transparent;
+  if (output.bits == 16)
+    picture.frame = transparent ? render::tone_mapped_alpha_16(image) : render::tone_mapped_16(image);
+  else if (transparent)
+    picture.frame = render::tone_mapped_alpha(image);
+  else if (views_.size() == 1)
+    picture.frame = annotated(render::tone_mapped(image), frame);
+  else {
+    views_[1]->show(frame);
+    picture.frame = annotated(
+        beside(render::tone_mapped(image), render::tone_mapped(views_[1]->renderer.draw(camera))), frame);
+  }
+  return picture;
+}
+
+}  // namespace limber::app

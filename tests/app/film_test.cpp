@@ -1,0 +1,153 @@
+// What the keys of film and cameras, and the flags of `limber render`, do to the pictures.
+#include <gmock/gmock.h>
+
+#include <cmath>
+#include <set>
+
+#include "render/png_file.h"
+#include "tests/app/program.h"
+
+namespace limber::app {
+namespace {
+
+using testing::HasSubstr;
+
+// One plan for all of them.
+class Filmed : public Program {
+ protected:
+  void SetUp() override {
+    const Result planned = limber_program({"plan", scene(text()), "-o", out(), "--json"});
+    ASSERT_EQ(planned.code, exit_done) << planned.err;
+    frames = planned.json().at("frames");
+  }
+  virtual std::string text() const { return small_scene; }
+  // Frame 3 under these flags.
+  render::Image8 frame_3(std::vector<std::string> flags) const {
+    std::vector<std::string> words{"render", out(), "--frames", "3", "--as", "try"};
+    words.insert(words.end(), flags.begin(), flags.end());
+    const Result result = limber_program(words);
+    EXPECT_EQ(result.code, exit_done) << result.err;
+    return render::read_png(picture("0003.png"));
+  }
+  fs::path picture(const std::string& name) const { return fs::path(out()) / "frames-try" / name; }
+  int frames = 0;
+};
+
+TEST_F(Filmed, EveryKeyOfTheFilmChangesThePicture) {
+  const render::Image8 plain = frame_3({});
+  for (const char* set :
+       {"film.color_by=strain",     "film.color_by=volume",       "film.color_by=speed",
+        "film.cages=true",          "film.forces=true",           "film.path=true",
+        "film.tree=true",           "film.side_by_side=true",     "film.clock=true",
+        "film.caption=Hello",       "film.bounds_lines=false",    "film.background=#102030",
+        "film.transparent=true",    "camera.turn_deg=90",         "camera.follow=robot",
+        "camera.direction=[1,0,0]", "bodies.robot.color=#00ff00", "bodies.robot.opacity=0.5",
+        "bodies.robot.metallic=1",  "bodies.robot.roughness=0.1"})
+    EXPECT_NE(frame_3({"--set", set}), plain) << set;
+  EXPECT_EQ(frame_3({}), plain);
+}
+
+TEST_F(Filmed, WhatWouldChangeTheMotionIsRefused) {
+  for (const char* set : {"film.frames_per_second=10", "film.speed=0.5", "planner.seed=3", "goal.radius_m=1",
+                          "bodies.robot.material.density_kg_m3=7"}) {
+    const Result refused = limber_program({"render", out(), "--set", set});
+    EXPECT_EQ(refused.code, exit_bad_input);
+    EXPECT_THAT(refused.err, HasSubstr("the motion is planned already")) << set;
+  }
+  EXPECT_THAT(limber_program({"render", out(), "--camera", "left"}).err, HasSubstr("there are: main"));
+  EXPECT_THAT(limber_program({"render", out(), "--as", "../x"}).err, HasSubstr("letters, digits"));
+  EXPECT_THAT(limber_program({"render", out(), "--passes", "scalar"}).err, HasSubstr("film.color_by=strain"));
+  EXPECT_THAT(limber_program({"render", out(), "--bits", "16", "--set", "film.clock=true"}).err,
+              HasSubstr("film.clock=false"));
+}
+
+// The range of colours is that of the whole motion, so a part of the frames, or a chunk, has the same.
+TEST_F(Filmed, AFrameIsTheSameByItself) {
+  const render::Image8 alone = frame_3({"--set", "film.color_by=strain"});
+  ASSERT_EQ(limber_program({"render", out(), "--as", "whole", "--set", "film.color_by=strain"}).code,
+            exit_done);
+  EXPECT_EQ(render::read_png(fs::path(out()) / "frames-whole" / "0003.png"), alone);
+  EXPECT_TRUE(fs::exists(fs::path(out()) / "film-whole.mp4"));
+  EXPECT_TRUE(fs::exists(fs::path(out()) / "sheet-whole.png"));
+  EXPECT_FALSE(fs::exists(fs::path(out()) / "film.mp4"));
+}
+
+TEST_F(Filmed, PassesAgreeWithOneAnother) {
+  frame_3({"--passes", "depth,normal,object,scalar", "--bits", "16", "--set", "film.color_by=volume"});
+  const render::Raster16 depth = render::read_png_16(picture("0003.depth.png")),
+                         normal = render::read_png_16(picture("0003.normal.png")),
+                         object = render::read_png_16(picture("0003.object.png")),
+                         scalar = render::read_png_16(picture("0003.scalar.png"));
+  ASSERT_EQ(depth.channels, 1);
+  ASSERT_EQ(normal.channels, 3);
+  ASSERT_EQ(object.channels, 1);
+  ASSERT_EQ(scalar.channels, 2);
+  std::set<int> seen;
+  for (std::size_t i = 0; i < depth.levels.size(); ++i) {
+    const int number = object.levels[i] / 257;  // 8 bit
+    seen.insert(number);
+    EXPECT_EQ(depth.levels[i] == 65535, number == 0) << i;
+    EXPECT_EQ(scalar.levels[2 * i + 1], number == 0 ? 0 : 65535);
+    double length = 0;
+    for (std::size_t c = 0; c < 3; ++c) length += std::pow(normal.levels[3 * i + c] / 32767.5 - 1, 2);
+    EXPECT_NEAR(length, number == 0 ? 0 : 1, 0.01);
+  }
+  EXPECT_EQ(seen, (std::set<int>{0, 1, 2}));
+  const Json key = read_json(picture("passes.json"));
+  EXPECT_EQ(key.at("objects"), Json({"", "robot", "block"}));
+  const double low = key.at("scalar").at("range").at(0), high = key.at("scalar").at("range").at(1);
+  EXPECT_EQ(low, -high);
+  EXPECT_GT(high, 0);
+}
+
+TEST_F(Filmed, AFrameWithoutItsPassIsNotWhole) {
+  const std::vector<std::string> words{"render", out(), "--resume", "--json", "--passes", "depth"};
+  ASSERT_EQ(limber_program(words).json().at("painted"), frames);
+  EXPECT_EQ(limber_program(words).json().at("painted"), 0);
+  fs::remove(fs::path(out()) / "frames" / "0002.depth.png");
+  EXPECT_EQ(limber_program(words).json().at("painted"), 1);
+}
+
+class FilmedSlowly : public Filmed {
+  std::string text() const override {
+    std::string edited = replaced("frames_per_second = 5\n", "frames_per_second = 5\nspeed = 0.5\n");
+    return edited +
+           "[[cameras]]\nname = \"above\"\ndirection = [0, 0, 1]\n"
+           "[[bodies]]\nname = \"veil\"\nrole = \"scenery\"\nopacity = 0.4\n"
+           "model = { sphere = { diameter_m = 1.5 } }\npose = { position_m = [2, 1, 1] }\n";
+  }
+};
+
+TEST_F(FilmedSlowly, HasTwiceTheFramesOfTheSameMotion) {
+  const Result normal = limber_program({"plan", scene(), "-o", out("normal"), "--json"});
+  const int usual = normal.json().at("frames");
+  EXPECT_NEAR(frames, 2 * usual, 1);
+}
+
+TEST_F(FilmedSlowly, SceneryIsSeenAndOtherCamerasHaveTheirOwnFilm) {
+  const render::Image8 seen = frame_3({});
+  EXPECT_NE(frame_3({"--set", "bodies.veil.color=#00ff00"}), seen);
+  const Result above = limber_program({"render", out(), "--camera", "above", "--frames", "3"});
+  ASSERT_EQ(above.code, exit_done) << above.err;
+  EXPECT_NE(render::read_png(fs::path(out()) / "frames-above" / "0003.png"), seen);
+  fs::remove(fs::path(out()) / "scenery" / "veil.ply");
+  const Result broken = limber_program({"render", out()});
+  EXPECT_EQ(broken.code, exit_bad_input);
+  EXPECT_THAT(broken.err, HasSubstr("limber plan"));
+}
+
+// A scene whose film changed is filmed anew, not planned anew.
+TEST_F(Program, RunFilmsAnewWhatIsFilmedOtherwise) {
+  ASSERT_EQ(limber_program({"run", scene(), "-o", out()}).code, exit_done);
+  const std::string plan = limber_program({"info", out(), "--json"}).out;
+  const auto before = render::read_png(fs::path(out()) / "frames" / "0003.png");
+  const Result again = limber_program({"run", scene(replaced("#c0392b", "#00ff00")), "-o", out(), "--json"});
+  ASSERT_EQ(again.code, exit_done) << again.err;
+  EXPECT_GT(again.json().at("render").at("painted"), 0);
+  EXPECT_NE(render::read_png(fs::path(out()) / "frames" / "0003.png"), before);
+  EXPECT_EQ(Json::parse(plan).at("tree_hash"),
+            Json::parse(limber_program({"info", out(), "--json"}).out).at("tree_hash"));
+}
+
+}  // namespace
+}  // namespace limber::app
