@@ -363,6 +363,51 @@ int run_command_line(int argc, const char* const* argv) {
   add_global(info_command, global);
   info_command.callback([&] { chosen = [&] { return info(folder); }; });
 
+  NewSceneOptions new_options;
+  CLI::App& scene_command = *program.add_subcommand("scene", "makes scene files");
+  scene_command.require_subcommand(1);
+  CLI::App& new_command =
+      *scene_command.add_subcommand("new", "a scene to begin with, from a folder of models in one frame");
+  new_command
+      .add_option("--from", new_options.from, "folder of models, as heart.obj, lung_left.obj, skin.obj")
+      ->required()
+      ->type_name("DIR")
+      ->check(CLI::ExistingDirectory);
+  new_command.add_option("-o,--out", new_options.out, "scene file to write")->required()->type_name("FILE");
+  new_command.add_option("--robot", new_options.robot, "the model that is to move")
+      ->required()
+      ->type_name("NAME");
+  const auto names = [&](const char* flag, std::vector<std::string>& list, const char* meaning) {
+    new_command.add_option(flag, list, meaning)
+        ->type_name("NAME[,NAME…]")
+        ->delimiter(',')
+        ->allow_extra_args(false);
+  };
+  names("--only", new_options.only, "take these models alone; default: all of the folder");
+  names("--see-through", new_options.see_through,
+        "only seen, and seen through, besides those called skin, body, ribcage");
+  names("--rigid", new_options.rigid,
+        "bones, besides those called spine, rib, skull, pelvis, bone, vertebra, sternum, femur");
+  new_command.add_option("--scale", new_options.scale, "metres a file unit, 1e-9 … 1e9")
+      ->check(CLI::Range(1e-9, 1e9))
+      ->capture_default_str();
+  new_command
+      .add_option("--shrink", new_options.shrink,
+                  "of every organ's true size, 0.1 … 1, since cages need room")
+      ->check(CLI::Range(0.1, 1.0))
+      ->capture_default_str();
+  new_command.add_option("--tets", new_options.tets, "of each soft cage, about; 60 … 20000")
+      ->check(CLI::Range(60, 20000))
+      ->capture_default_str();
+  for (const auto& [flag, axis, meaning] :
+       {std::tuple("--up", &new_options.up, "the models' axis that points up"),
+        {"--front", &new_options.front, "and to the front"}})
+    new_command.add_option(flag, *axis, meaning)
+        ->check(CLI::IsMember({"+x", "-x", "+y", "-y", "+z", "-z"}))
+        ->capture_default_str();
+  add_global(new_command, global);
+  new_command.callback([&] { chosen = [&] { return new_scene(new_options); }; });
+
   CLI::App& scenes_command = *program.add_subcommand("scenes", "the scenes that come with limber");
   add_global(scenes_command, global);
   scenes_command.callback([&] { chosen = [] { return list_scenes(); }; });

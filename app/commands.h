@@ -128,6 +128,18 @@ struct RefineOptions {
 // Carries a plan to finer cages of the same bodies, in another work folder.
 Outcome refine(const RefineOptions&);
 
+struct NewSceneOptions {
+  fs::path from, out;  // a folder of models in one frame; the scene file to write
+  std::string robot;
+  std::vector<std::string> only;                // names without ending; empty: all models of the folder
+  std::vector<std::string> see_through, rigid;  // besides those whose names say so
+  double scale = 0.001;                         // metres a file unit
+  double shrink = 0.8;                          // of every organ's true size
+  int tets = 80;                                // of a soft cage
+  std::string up = "+z", front = "-y";
+};
+Outcome new_scene(const NewSceneOptions&);
+
 Outcome info(const fs::path& path);
 Outcome list_scenes();
 

@@ -100,8 +100,9 @@ struct Shot::Painter::View {
   View(const Shot& from, bool of_cages) : shot(from), cages(of_cages), renderer(from.look_) {
     for (std::size_t b = 0; b < shot.bodies_.size(); ++b) add_body(b);
     for (std::size_t s = 0; s < shot.scenery_.size(); ++s)
-      renderer.add_mesh(shot.scenery_[s].triangles, shot.scenery_[s].positions,
-                        look_of(shot.scene_.scenery[s]));
+      if (shot.scenery_[s].triangles.rows() > 0)
+        renderer.add_mesh(shot.scenery_[s].triangles, shot.scenery_[s].positions,
+                          look_of(shot.scene_.scenery[s]));
     for (std::size_t b = 0; b < shot.bodies_.size(); ++b) add_caster(b);
     const scenes::FilmSpec& film = shot.scene_.film;
     if (film.bounds_lines) renderer.add_lines(render::edges_of(shot.scene_.bounds_m), {});

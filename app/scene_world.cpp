@@ -82,8 +82,18 @@ fs::path scenery_file(const fs::path& work_folder, const scenes::BodySpec& body,
   return work_folder / "scenery" / (body.name + extension);
 }
 
-// NAME.ply, and beside it NAME.json, which says where it comes from.
-void prepare_scenery(const BodySource& source, const scenes::BodySpec& body, const fs::path& work_folder) {
+// NAME.ply, and beside it NAME.json, which says where it comes from. A model that is not found leaves an
+// empty mesh: without scenery a scene is still what it is.
+void prepare_scenery(const scenes::Scene& scene, const scenes::BodySpec& body,
+                     const std::vector<fs::path>& data, const fs::path& work_folder) {
+  BodySource source;
+  try {
+    source = source_of(scene, body, data);
+  } catch (const InputError& error) {
+    log::warn("{}. It is left out of the pictures.", error.what());
+    source.model = "nothing";
+    source.load = [] { return meshing::ImportedModel{}; };
+  }
   const fs::path mesh = scenery_file(work_folder, body, ".ply"),
                  origin = scenery_file(work_folder, body, ".json");
   try {
@@ -96,7 +106,6 @@ void prepare_scenery(const BodySource& source, const scenes::BodySpec& body, con
   }
   log::info("{}: reading {}", mesh.string(), source.model);
   const meshing::ImportedModel model = source.load();
-  validate(model.surface, source.model);
   make_folder(mesh.parent_path());
   write_ply(mesh, model.surface);
   write_json(origin, {{"version", version},
@@ -120,7 +129,7 @@ std::vector<PreparedBody> prepare_bodies(const scenes::Scene& scene, const std::
   }
   for (const scenes::BodySpec& body : scene.scenery) {
     throw_if_stopped();
-    prepare_scenery(source_of(scene, body, data), body, work_folder);
+    prepare_scenery(scene, body, data, work_folder);
   }
   return read_bodies(scene, work_folder);
 }

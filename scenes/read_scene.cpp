@@ -63,7 +63,6 @@ Vec3 direction(const Node& table, std::string_view key, const char* what) {
              fmt::format("{} is [0, 0, 0], which points nowhere; write a direction", what));
   return v.normalized();
 }
-Vec3 axis_named(const std::string& name) { return (name[0] == '-' ? -1.0 : 1.0) * Vec3::Unit(name[1] - 'x'); }
 
 // ---- edits: --set a.b.c=value ----
 
@@ -661,6 +660,8 @@ FilmSpec read_film(const Node& table) {
 }
 
 }  // namespace
+
+Vec3 axis_named(const std::string& name) { return (name[0] == '-' ? -1.0 : 1.0) * Vec3::Unit(name[1] - 'x'); }
 
 Scene read_scene(const std::string& toml, const std::string& name_for_messages,
                  const std::vector<std::string>& sets) {

@@ -212,6 +212,9 @@ Scene read_scene(const std::string& text, const std::string& name_for_messages,
                  const std::vector<std::string>& sets = {});
 Scene read_scene_file(const fs::path&, const std::vector<std::string>& sets = {});
 
+// "+x" … "-z" as a unit vector.
+Vec3 axis_named(const std::string&);
+
 // The reference of all keys, in Markdown: what docs/scene.md holds.
 std::string scene_reference();
 
