@@ -7,9 +7,10 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
-#include <span>
+#include <utility>
 
 #include "core/error.h"
+#include "core/progress.h"
 #include "render/detail/gl_context.h"
 #include "render/detail/ground_shade.h"
 #include "render/detail/line_quads.h"
@@ -130,7 +131,7 @@ SampleGrid sample_grid(const Look& look) {
 struct Renderer::Impl {
   explicit Impl(const Look& l);
 
-  Image draw(const Camera&, Passes*);
+  Image draw(const Camera&, Passes*, StageTimes*);
 
   // The stages of a picture.
   Box shown() const;
@@ -661,23 +662,38 @@ void Renderer::set_lines(int number, const Points& ends) {
   impl_->lines[std::size_t(number)].ends = ends;
 }
 
-Image Renderer::Impl::draw(const Camera& from, Passes* passes) {
+Image Renderer::Impl::draw(const Camera& from, Passes* passes, StageTimes* times) {
   render::validate(from);
   context.make_current();
+  double before = times ? cpu_seconds() : 0;
+  const auto done = [&](double StageTimes::*stage) {
+    if (!times) return;
+    glFinish();  // or the next stage would pay
+    const double now = cpu_seconds();
+    times->*stage += now - std::exchange(before, now);
+  };
   look_through(from);
   draw_shadow_map();
+  done(&StageTimes::shadow_map_s);
   shade_ground_maps();
+  done(&StageTimes::ground_s);
   draw_opaque(passes != nullptr);
+  done(&StageTimes::opaque_s);
   draw_lines(false);
+  done(&StageTimes::lines_s);
   if (has_veils()) {
     draw_veils();
     draw_lines(true);
+    done(&StageTimes::veils_s);
   }
   if (passes) *passes = finish_passes();
-  return finish();
+  const Image image = finish();
+  done(&StageTimes::finish_s);
+  return image;
 }
 
-Image Renderer::draw(const Camera& camera) { return impl_->draw(camera, nullptr); }
-Image Renderer::draw(const Camera& camera, Passes& passes) { return impl_->draw(camera, &passes); }
+Image Renderer::draw(const Camera& camera, Passes* passes, StageTimes* times) {
+  return impl_->draw(camera, passes, times);
+}
 
 }  // namespace limber::render

@@ -536,7 +536,7 @@ TEST(Renderer, PassesTellDepthNormalObjectAndScalarOfASphere) {
     const int mesh = renderer.add_mesh(ball.triangles, ball.positions, {"ball"});
     renderer.set_scalars(mesh, ball.positions.col(2));
     Passes passes;
-    const Image image = renderer.draw(camera, passes);
+    const Image image = renderer.draw(camera, &passes);
     EXPECT_EQ(image.rgba, renderer.draw(camera).rgba);
     int on_ball = 0, on_quad = 0, nowhere = 0;
     for (int y = 0; y < look.height; ++y)
