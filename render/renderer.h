@@ -81,8 +81,7 @@ struct StageTimes {
   double shadow_map_s = 0, ground_s = 0, opaque_s = 0, lines_s = 0, veils_s = 0, finish_s = 0;
 };
 
-// One drawing context. A renderer may move between threads but serves one at a time; several work in several
-// threads.
+// One drawing context. A renderer stays in the thread that makes it; several work in several threads.
 class Renderer {
  public:
   // Throws InputError when a field of Look is out of its range.
