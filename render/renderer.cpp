@@ -82,6 +82,16 @@ void validate(const MeshLook& look) {
   for (int c = 0; c < 3; ++c) in(look.color_srgb[c], 0, 1, "a channel of its colour");
 }
 
+// The key light's direction turned by 110° about up, 25° above the horizon.
+Vec3 toward_soft_box(const Look& look) {
+  const Vec3 level = look.toward_key - look.toward_key.dot(look.up) * look.up;
+  const Vec3 turned = level.norm() > 1e-6
+                          ? Eigen::AngleAxisd(110 * std::numbers::pi / 180, look.up) * level.normalized()
+                          : look.up.unitOrthogonal();
+  const double height = 25 * std::numbers::pi / 180;
+  return std::cos(height) * turned + std::sin(height) * look.up;
+}
+
 template <class Visit>
 void for_corners(const Box& box, const Visit& visit) {
   for (int i = 0; i < 8; ++i)
@@ -351,6 +361,7 @@ void Renderer::Impl::use_mesh(const Mesh& mesh, const std::string& defines) {
   p.set("eye", camera.eye);
   p.set("up", look.up);
   p.set("toward_key", look.toward_key);
+  p.set("toward_box", toward_soft_box(look));
   p.set("key_light", key_light);
   p.set("sky_light", sky_light);
   p.set("ground_color", look.ground_height_m ? linear_from_srgb(look.ground_srgb) : Vec3(Vec3::Zero()));
@@ -416,9 +427,9 @@ struct Renderer::Impl::Chunk {
   }
 };
 
-// Depth peeling, front to back: of all veils the layer behind the last one is found by depth alone, then shaded and put
-// under what is there. A chunk all of whose samples have been shown is not drawn any more: most are done after two or three
-// layers.
+// Depth peeling, front to back: of all veils the layer behind the last one is found by depth alone, then
+// shaded and put under what is there. A chunk all of whose samples have been shown is not drawn any more:
+// most are done after two or three layers.
 void Renderer::Impl::draw_veils() {
   const Targets::Veils& veils = targets.veils();
   const SampleGrid grid = sample_grid(look);
