@@ -17,6 +17,8 @@
 
 #include "core/error.h"
 #include "core/hash.h"
+#include "core/json.h"
+#include "core/mesh_files.h"
 #include "core/progress.h"
 #include "render/occlusion.h"
 #include "render/png_file.h"
@@ -179,6 +181,8 @@ Prolongation prolongation(const Points& fine, const Points& coarse) {
   return result;
 }
 
+const Vec3 toward_eye(-0.35, -1, 0.45);
+
 // Leans over a little more with each frame.
 Eigen::Matrix3d lean(int frame) {
   Eigen::Matrix3d m = Eigen::Matrix3d::Identity();
@@ -194,7 +198,7 @@ class Stage {
         coarse_(coarse),
         box_(box_mesh({0.62, -0.3, 0}, {1.12, 0.3, 0.7})),
         renderer_(look),
-        camera_(frame_automatically(look.stage, {-0.35, -1, 0.45}, double(look.width) / look.height)),
+        camera_(frame_automatically(look.stage, toward_eye, double(look.width) / look.height)),
         normals_(vertex_normals(body.positions, body.triangles)),
         coarse_normals_(vertex_normals(coarse.positions, coarse.triangles)),
         prolong_(prolongation(body.positions, coarse.positions)) {
@@ -263,7 +267,8 @@ double resident_mb() {
   return resident * 4096 / 1e6;
 }
 
-void run(const std::string& model, int frames, int repeat, const fs::path& out) {
+void run(const std::string& model, const std::vector<int>& sizes, int frames, int repeat,
+         const fs::path& out) {
   SurfaceMesh source = model.empty() ? sphere_mesh({0, 0, 0}, 1, 160) : read_off(model);
   set_up(source);
   const double read_s = cpu_seconds();
@@ -283,8 +288,16 @@ void run(const std::string& model, int frames, int repeat, const fs::path& out) 
   fmt::print("\nms CPU a frame, {} frames, without the first; coarse level: {} triangles\n", frames,
              coarse.triangles.rows());
   SurfaceMesh body = coarsened(source, 35000);
-  for (const int triangles : {35000, 350000, 1400000}) {
+  if (!out.empty()) {
+    const Camera camera = frame_automatically(look_of(1920, 1080, false).stage, toward_eye, 16.0 / 9);
+    const auto numbers = [](const Vec3& p) { return Json{p.x(), p.y(), p.z()}; };
+    write_json(
+        out / "camera.json",
+        {{"eye", numbers(camera.eye)}, {"target", numbers(camera.target)}, {"fov_deg", camera.fov_deg}});
+  }
+  for (const int triangles : sizes) {
     body = refined(body, triangles);
+    if (!out.empty()) write_obj(out / fmt::format("{}k.obj", triangles / 1000), body);
     for (const bool multisampling : {false, true}) {
       Stage stage(body, coarse, look_of(1920, 1080, multisampling));
       stage.png(0, none, unused);  // shaders are compiled
@@ -323,13 +336,15 @@ void run(const std::string& model, int frames, int repeat, const fs::path& out) 
 int main(int argc, char** argv) try {
   CLI::App app("what a frame costs");
   std::string model, out;
+  std::vector<int> triangles{35000, 350000, 1400000};
   int frames = 10, repeat = 0;
   app.add_option("model", model);
+  app.add_option("--triangles", triangles, "ascending")->delimiter(',');
   app.add_option("--frames", frames);
   app.add_option("--repeat", repeat);
   app.add_option("--out", out);
   CLI11_PARSE(app, argc, argv);
-  limber::render::run(model, frames, repeat, out);
+  limber::render::run(model, triangles, frames, repeat, out);
 } catch (const limber::InputError& e) {
   fmt::print(stderr, "{}\n", e.what());
   return 2;
