@@ -7,9 +7,10 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
-#include <span>
+#include <utility>
 
 #include "core/error.h"
+#include "core/progress.h"
 #include "render/detail/gl_context.h"
 #include "render/detail/ground_shade.h"
 #include "render/detail/line_quads.h"
@@ -81,6 +82,16 @@ void validate(const MeshLook& look) {
   for (int c = 0; c < 3; ++c) in(look.color_srgb[c], 0, 1, "a channel of its colour");
 }
 
+// The key light's direction turned by 110° about up, 25° above the horizon.
+Vec3 toward_soft_box(const Look& look) {
+  const Vec3 level = look.toward_key - look.toward_key.dot(look.up) * look.up;
+  const Vec3 turned = level.norm() > 1e-6
+                          ? Eigen::AngleAxisd(110 * std::numbers::pi / 180, look.up) * level.normalized()
+                          : look.up.unitOrthogonal();
+  const double height = 25 * std::numbers::pi / 180;
+  return std::cos(height) * turned + std::sin(height) * look.up;
+}
+
 template <class Visit>
 void for_corners(const Box& box, const Visit& visit) {
   for (int i = 0; i < 8; ++i)
@@ -128,9 +139,10 @@ SampleGrid sample_grid(const Look& look) {
 }  // namespace
 
 struct Renderer::Impl {
+  struct Chunk;
   explicit Impl(const Look& l);
 
-  Image draw(const Camera&, Passes*);
+  Image draw(const Camera&, Passes*, StageTimes*);
 
   // The stages of a picture.
   Box shown() const;
@@ -145,8 +157,9 @@ struct Renderer::Impl {
   Passes finish_passes();
 
   std::vector<Plane> planes_of(const Mesh&) const;
-  void draw_mesh(Mesh&, const std::string& defines);
-  void draw_depth(Mesh&, const Mat4& clip_from, const std::vector<Plane>&, const std::string& defines);
+  // Programs for what is drawn next, with all their uniforms.
+  void use_mesh(const Mesh&, const std::string& defines);
+  void use_depth(const Mat4& clip_from, const std::vector<Plane>&, const std::string& defines);
   bool has_veils() const;
   // Checks the number, and that there is a value for each of its vertices.
   Mesh& mesh_with(int number, Eigen::Index values, bool may_be_empty);
@@ -160,7 +173,8 @@ struct Renderer::Impl {
   Variants passes_programs{picture_vertex_shader, passes_fragment_shader};
   std::string samples;  // defines
   Targets targets;
-  GLuint empty_array, line_array, line_buffer, query;
+  GLuint empty_array, line_array, line_buffer;
+  std::vector<GLuint> queries;  // one a chunk of veils
   std::vector<Mesh> meshes;
   std::vector<Lines> lines;
   std::vector<Plane> clip_planes;
@@ -183,7 +197,6 @@ Renderer::Impl::Impl(const Look& l)
   look.toward_key.normalize();
   ground = ground_frame(look.up, look.ground_height_m.value_or(0));
   ground_plane << ground.up, -ground.height_m;
-  glGenQueries(1, &query);
   glGenVertexArrays(1, &empty_array);
   glGenVertexArrays(1, &line_array);
   glGenBuffers(1, &line_buffer);
@@ -273,7 +286,8 @@ void Renderer::Impl::draw_shadow_map() {
   for (Mesh& mesh : meshes) {
     if (!mesh.casts()) continue;
     (mesh.look.seen ? glDisable : glEnable)(GL_CULL_FACE);
-    draw_depth(mesh, clip_from, clip_planes, "");
+    use_depth(clip_from, clip_planes, "");
+    mesh.card.draw();
   }
   glDisable(GL_CULL_FACE);
   glDisable(GL_POLYGON_OFFSET_FILL);
@@ -318,17 +332,16 @@ void set_planes(const Program& program, const std::vector<Plane>& planes) {
 
 }  // namespace
 
-void Renderer::Impl::draw_depth(Mesh& mesh, const Mat4& clip_from, const std::vector<Plane>& planes,
-                                const std::string& defines) {
+void Renderer::Impl::use_depth(const Mat4& clip_from, const std::vector<Plane>& planes,
+                               const std::string& defines) {
   const Program& p = depth_programs.with(plane_defines(planes) + defines);
   p.use();
   p.set("clip_from_world", clip_from);
   p.set("nearer", 0);
   set_planes(p, planes);
-  mesh.card.draw();
 }
 
-void Renderer::Impl::draw_mesh(Mesh& mesh, const std::string& defines) {
+void Renderer::Impl::use_mesh(const Mesh& mesh, const std::string& defines) {
   const std::vector<Plane> planes = planes_of(mesh);
   std::string all = plane_defines(planes) + defines;
   if (mesh.card.tinted()) all += "#define TINTED\n";
@@ -348,6 +361,7 @@ void Renderer::Impl::draw_mesh(Mesh& mesh, const std::string& defines) {
   p.set("eye", camera.eye);
   p.set("up", look.up);
   p.set("toward_key", look.toward_key);
+  p.set("toward_box", toward_soft_box(look));
   p.set("key_light", key_light);
   p.set("sky_light", sky_light);
   p.set("ground_color", look.ground_height_m ? linear_from_srgb(look.ground_srgb) : Vec3(Vec3::Zero()));
@@ -364,7 +378,6 @@ void Renderer::Impl::draw_mesh(Mesh& mesh, const std::string& defines) {
   p.set("metallic", mesh.look.metallic);
   p.set("opacity", mesh.look.opacity);
   p.set("object", int(&mesh - meshes.data()));
-  mesh.card.draw();
 }
 
 // Drawn with its edges over it, a surface stands back by as much as its depth changes over half the width of
@@ -393,21 +406,79 @@ void Renderer::Impl::draw_opaque(bool passes) {
   for (Mesh& mesh : meshes) {
     if (!mesh.look.seen || mesh.transparent()) continue;
     stand_back_for_edges(mesh, look.multisampling ? 1 : look.supersampling);
-    draw_mesh(mesh, passes ? "#define PASSES\n" : "");
+    use_mesh(mesh, passes ? "#define PASSES\n" : "");
+    mesh.card.draw();
   }
   glDisable(GL_POLYGON_OFFSET_FILL);
   plane_defines({});
 }
 
+// A piece of a veil, drawn by itself: neighbours along the Morton curve.
+struct Renderer::Impl::Chunk {
+  Mesh* mesh;
+  std::size_t first, count;  // corners
+  GLuint query;
+  GLuint left = 0, seen = 0;  // samples no layer has shown yet; samples this layer may show
+
+  GLuint counted() const {
+    GLuint samples = 0;
+    glGetQueryObjectuiv(query, GL_QUERY_RESULT, &samples);
+    return samples;
+  }
+};
+
 // Depth peeling, front to back: of all veils the layer behind the last one is found by depth alone, then
-// shaded and put under what is there.
+// shaded and put under what is there. A chunk all of whose samples have been shown is not drawn any more:
+// most are done after two or three layers.
 void Renderer::Impl::draw_veils() {
   const Targets::Veils& veils = targets.veils();
   const SampleGrid grid = sample_grid(look);
+  constexpr std::size_t chunk_corners = 3 * 512;
+  std::vector<Chunk> chunks;
+  for (Mesh& mesh : meshes)
+    if (mesh.look.seen && mesh.transparent())
+      for (std::size_t first = 0, all = mesh.card.drawn().corners.size(); first < all; first += chunk_corners)
+        chunks.push_back({&mesh, first, std::min(chunk_corners, all - first), 0});
+  if (queries.size() < chunks.size()) {
+    glDeleteQueries(GLsizei(queries.size()), queries.data());
+    queries.resize(chunks.size());
+    glGenQueries(GLsizei(queries.size()), queries.data());
+  }
+  for (std::size_t c = 0; c < chunks.size(); ++c) chunks[c].query = queries[c];
+
+  // Draws the chunks that `wanted` names, mesh by mesh, and counts the samples of each that pass.
+  const auto draw = [&](const auto& wanted, const auto& prepare) {
+    const Mesh* prepared = nullptr;
+    for (Chunk& chunk : chunks) {
+      if (!wanted(chunk)) continue;
+      if (chunk.mesh != prepared) {
+        stand_back_for_edges(*chunk.mesh, look.multisampling ? 1 : look.supersampling);
+        prepare(*chunk.mesh);
+        prepared = chunk.mesh;
+      }
+      glBeginQuery(GL_SAMPLES_PASSED, chunk.query);
+      chunk.mesh->card.draw(chunk.first, chunk.count);
+      glEndQuery(GL_SAMPLES_PASSED);
+    }
+  };
+  const auto draw_depths = [&](bool behind, const auto& wanted) {
+    glColorMask(GL_FALSE, GL_FALSE, GL_FALSE, GL_FALSE);
+    draw(wanted, [&](Mesh& mesh) {
+      use_depth(clip_from_world, planes_of(mesh), behind ? samples + "#define BEHIND\n" : "");
+    });
+    glColorMask(GL_TRUE, GL_TRUE, GL_TRUE, GL_TRUE);
+  };
+
   const float nothing[4] = {0, 0, 0, 0};
   glBindFramebuffer(GL_FRAMEBUFFER, veils.frame[0]);
   glClearBufferfv(GL_COLOR, 0, nothing);
+  glBindFramebuffer(GL_FRAMEBUFFER, targets.samples_frame);
+  glDepthMask(GL_FALSE);
+  draw_depths(false, [](const Chunk&) { return true; });
+  for (Chunk& chunk : chunks) chunk.left = chunk.counted();
+
   for (int layer = 0; layer < most_veil_layers; ++layer) {
+    if (std::none_of(chunks.begin(), chunks.end(), [](const Chunk& c) { return c.left > 0; })) break;
     // The first layer's depth is kept: lines before it are drawn over it.
     const auto place = [](int l) { return std::size_t(l == 0 ? 0 : 1 + l % 2); };
     const unsigned frame = veils.frame[place(layer)];
@@ -416,35 +487,23 @@ void Renderer::Impl::draw_veils() {
     glBlitFramebuffer(0, 0, grid.width, grid.height, 0, 0, grid.width, grid.height, GL_DEPTH_BUFFER_BIT,
                       GL_NEAREST);
     glBindFramebuffer(GL_FRAMEBUFFER, frame);
-    const auto draw_all = [&](const auto& draw) {
-      for (Mesh& mesh : meshes) {
-        if (!mesh.look.seen || !mesh.transparent()) continue;
-        stand_back_for_edges(mesh, look.multisampling ? 1 : look.supersampling);
-        draw(mesh);
-      }
-    };
-    glColorMask(GL_FALSE, GL_FALSE, GL_FALSE, GL_FALSE);
     glDepthMask(GL_TRUE);
-    glDisable(GL_BLEND);
     if (layer > 0) veils.depth[place(layer - 1)].bind(0);
-    glBeginQuery(GL_ANY_SAMPLES_PASSED, query);
-    draw_all([&](Mesh& mesh) {
-      draw_depth(mesh, clip_from_world, planes_of(mesh), layer > 0 ? samples + "#define BEHIND\n" : "");
-    });
-    glEndQuery(GL_ANY_SAMPLES_PASSED);
-    glColorMask(GL_TRUE, GL_TRUE, GL_TRUE, GL_TRUE);
-    GLuint any = 0;
-    glGetQueryObjectuiv(query, GL_QUERY_RESULT, &any);
-    if (!any) break;
+    draw_depths(layer > 0, [](const Chunk& c) { return c.left > 0; });
+    for (Chunk& chunk : chunks) chunk.seen = chunk.left > 0 ? chunk.counted() : 0;
 
     glDepthMask(GL_FALSE);
     glDepthFunc(GL_EQUAL);
     glEnable(GL_BLEND);
     glBlendFunc(GL_ONE_MINUS_DST_ALPHA, GL_ONE);
-    draw_all([&](Mesh& mesh) { draw_mesh(mesh, ""); });
+    const auto may_be_seen = [](const Chunk& c) { return c.seen > 0; };
+    draw(may_be_seen, [&](Mesh& mesh) { use_mesh(mesh, ""); });
     glDepthFunc(GL_LESS);
+    glDisable(GL_BLEND);
+    for (Chunk& chunk : chunks)
+      if (may_be_seen(chunk)) chunk.left -= std::min(chunk.left, chunk.counted());
   }
-  glDisable(GL_BLEND);
+  glDepthMask(GL_TRUE);
   glDisable(GL_POLYGON_OFFSET_FILL);
   plane_defines({});
 }
@@ -661,23 +720,38 @@ void Renderer::set_lines(int number, const Points& ends) {
   impl_->lines[std::size_t(number)].ends = ends;
 }
 
-Image Renderer::Impl::draw(const Camera& from, Passes* passes) {
+Image Renderer::Impl::draw(const Camera& from, Passes* passes, StageTimes* times) {
   render::validate(from);
   context.make_current();
+  double before = times ? cpu_seconds() : 0;
+  const auto done = [&](double StageTimes::*stage) {
+    if (!times) return;
+    glFinish();  // or the next stage would pay
+    const double now = cpu_seconds();
+    times->*stage += now - std::exchange(before, now);
+  };
   look_through(from);
   draw_shadow_map();
+  done(&StageTimes::shadow_map_s);
   shade_ground_maps();
+  done(&StageTimes::ground_s);
   draw_opaque(passes != nullptr);
+  done(&StageTimes::opaque_s);
   draw_lines(false);
+  done(&StageTimes::lines_s);
   if (has_veils()) {
     draw_veils();
     draw_lines(true);
+    done(&StageTimes::veils_s);
   }
   if (passes) *passes = finish_passes();
-  return finish();
+  const Image image = finish();
+  done(&StageTimes::finish_s);
+  return image;
 }
 
-Image Renderer::draw(const Camera& camera) { return impl_->draw(camera, nullptr); }
-Image Renderer::draw(const Camera& camera, Passes& passes) { return impl_->draw(camera, &passes); }
+Image Renderer::draw(const Camera& camera, Passes* passes, StageTimes* times) {
+  return impl_->draw(camera, passes, times);
+}
 
 }  // namespace limber::render

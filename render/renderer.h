@@ -16,7 +16,8 @@ namespace limber::render {
 struct Look {
   int width = 1920, height = 1080;  // pixels, 1 … 8192
   int supersampling = 2;            // samples a pixel are this squared; 1 … 4
-  // The fast mode: 4 samples a pixel that share one shading (MSAA); supersampling then counts for nothing.
+  // 4 samples a pixel that share one shading (MSAA); supersampling then counts for nothing. Not faster where
+  // triangles are about as small as pixels: see docs/rendering.md.
   bool multisampling = false;
   Vec3 background_top_srgb = {0.80, 0.84, 0.88};
   Vec3 background_bottom_srgb = {0.93, 0.94, 0.95};
@@ -75,8 +76,12 @@ struct Passes {
 // The 12 edges, (24 × 3): edge i runs from row 2i to row 2i + 1.
 Points edges_of(const Box&);
 
-// One drawing context. A renderer may move between threads but serves one at a time; several work in several
-// threads.
+// CPU seconds of the process, stage by stage.
+struct StageTimes {
+  double shadow_map_s = 0, ground_s = 0, opaque_s = 0, lines_s = 0, veils_s = 0, finish_s = 0;
+};
+
+// One drawing context. A renderer stays in the thread that makes it; several work in several threads.
 class Renderer {
  public:
   // Throws InputError when a field of Look is out of its range.
@@ -107,9 +112,8 @@ class Renderer {
   int add_lines(const Points& ends, const LineLook&);
   void set_lines(int lines, const Points& ends);
 
-  Image draw(const Camera&);
-  // The passes of the same drawing as well. Costs about as much again.
-  Image draw(const Camera&, Passes&);
+  // Where they are asked for, passes come from the same drawing; times are added up.
+  Image draw(const Camera&, Passes* = nullptr, StageTimes* = nullptr);
 
  private:
   struct Impl;

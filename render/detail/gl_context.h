@@ -1,21 +1,23 @@
-// The only place that knows where OpenGL comes from: OSMesa, in memory, without a window system. Mesa 25.1
-// dropped OSMesa; an EGL surfaceless context would take its place here.
+// The only place that knows where OpenGL comes from: three functions, by OSMesa (gl_context_osmesa.cpp) or,
+// with the CMake option LIMBER_EGL, by EGL without a surface (gl_context_egl.cpp), as Mesa 25.1 dropped
+// OSMesa. Neither needs a window system.
 #pragma once
+
+#include <memory>
 
 namespace limber::render::detail {
 
 class GlContext {
  public:
-  GlContext();  // OpenGL 3.3 core; throws InputError when the library refuses
+  GlContext();  // OpenGL 3.3 core, current; throws InputError when the library refuses
   ~GlContext();
   GlContext(const GlContext&) = delete;
   GlContext& operator=(const GlContext&) = delete;
-  void make_current();  // for the calling thread; cheap when it already is
+  void make_current();  // in the thread that made it; cheap when it already is
 
  private:
-  void* context_;
-  unsigned char
-      unused_pixels_[4 * 16 * 16];  // OSMesa insists on a buffer; all drawing goes to framebuffer objects
+  struct Backend;
+  std::unique_ptr<Backend> backend_;
 };
 
 }  // namespace limber::render::detail

@@ -68,10 +68,11 @@ void MeshOnCard::set_scalars(const Eigen::VectorXd& values) {
   upload(scalar_buffer_, drawn);
 }
 
-void MeshOnCard::draw() const {
+void MeshOnCard::draw(std::size_t first_corner, std::size_t corners) const {
   glBindVertexArray(array_);
   if (scalar_buffer_ == 0) glVertexAttrib1f(at_scalar, 0);
-  glDrawElements(GL_TRIANGLES, GLsizei(drawn_.corners.size()), GL_UNSIGNED_INT, nullptr);
+  glDrawElements(GL_TRIANGLES, GLsizei(corners), GL_UNSIGNED_INT,
+                 reinterpret_cast<void*>(first_corner * sizeof(std::uint32_t)));
 }
 
 Points MeshOnCard::edge_ends() {

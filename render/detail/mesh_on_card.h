@@ -18,7 +18,8 @@ class MeshOnCard {
   // Linear colour and the share of the sky that is open, per row of the positions, (V × 4).
   void set_tints(const Eigen::Matrix<float, Eigen::Dynamic, 4, Eigen::RowMajor>&);
   void set_scalars(const Eigen::VectorXd&);
-  void draw() const;
+  void draw() const { draw(0, drawn_.corners.size()); }
+  void draw(std::size_t first_corner, std::size_t corners) const;
   Points edge_ends();  // each edge once, row 2i to row 2i + 1
 
   const DrawnMesh& drawn() const { return drawn_; }

@@ -58,7 +58,7 @@ uniform int object;
 layout(location = 1) out vec4 normal_scalar;
 layout(location = 2) out int object_seen;
 #endif
-uniform vec3 eye, up, toward_key;
+uniform vec3 eye, up, toward_key, toward_box;
 uniform vec3 key_light, sky_light, ground_color;  // ground_color is black without a ground
 uniform float ground_key;        // share of the key light that a level surface gets
 uniform vec3 ground_x, ground_y;
@@ -108,12 +108,16 @@ void main() {
   float open = 1.0 - nearness * texture(ground_sky_map, ground_place).r;
   vec3 bounce = ground_color * (0.6 * ground_key * key_light + 0.6 * sky_light) * open;
   vec3 ambient = diffuse * mix(bounce, sky_light, 0.5 + 0.5 * n_up);
-  float r_up = 2.0 * dot(n, v) * n_up - dot(v, up);
-  vec3 mirrored = mix(bounce, 1.3 * sky_light, smoothstep(-0.35, 0.6, r_up));
+  // What is mirrored: ground, a sky that is brighter towards the horizon, and a soft box opposite the key light; the rougher, the
+  // more blurred.
+  vec3 r = 2.0 * dot(n, v) * n - v;
+  float r_up = dot(r, up), blur = 0.1 + 0.7 * roughness;
+  vec3 mirrored = mix(bounce, sky_light * (1.6 - 0.6 * max(r_up, 0.0)), smoothstep(-blur, blur, r_up));
+  mirrored += sky_light * (2.0 / (1.0 + 4.0 * roughness)) * smoothstep(0.88 - 0.8 * blur, 0.92 + 0.08 * blur, dot(r, toward_box));
   // Split sum of the environment's reflection, fitted by Karis (Physically based shading on mobile, 2014).
-  vec4 r = roughness * vec4(-1.0, -0.0275, -0.572, 0.022) + vec4(1.0, 0.0425, 1.04, -0.04);
-  float a = min(r.x * r.x, exp2(-9.28 * n_v)) * r.x + r.y;
-  vec2 ab = vec2(-1.04, 1.04) * a + r.zw;
+  vec4 k4 = roughness * vec4(-1.0, -0.0275, -0.572, 0.022) + vec4(1.0, 0.0425, 1.04, -0.04);
+  float a = min(k4.x * k4.x, exp2(-9.28 * n_v)) * k4.x + k4.y;
+  vec2 ab = vec2(-1.04, 1.04) * a + k4.zw;
   ambient += mirrored * (f0 * ab.x + ab.y);
 
   float edge = 1.0 - n_v;

@@ -37,6 +37,33 @@ TEST(Image, TheTableIsWithinOneLevelOfTheFormula) {
     }
 }
 
+TEST(Image, SixteenBitsAreTheFormulaAndAlphaIsStraight) {
+  Rng rng(2, 0);
+  Image image{60, 40, {}}, premultiplied = image;
+  for (int p = 0; p < 60 * 40; ++p) {
+    const float cover = float(rng.uniform(0.05, 1));
+    for (int c = 0; c < 3; ++c) {
+      image.rgba.push_back(float(std::exp(rng.uniform(-8, 2))));
+      premultiplied.rgba.push_back(image.rgba.back() * cover);
+    }
+    image.rgba.push_back(1);
+    premultiplied.rgba.push_back(cover);
+  }
+  const Raster16 shown = tone_mapped_16(image), wide = tone_mapped_alpha_16(premultiplied);
+  const Raster8 narrow = tone_mapped_alpha(premultiplied);
+  for (std::size_t p = 0; p < 60 * 40; ++p) {
+    for (std::size_t c = 0; c < 3; ++c) {
+      const double exact = srgb_from_linear(tone_mapped(double(image.rgba[4 * p + c])));
+      EXPECT_NEAR(shown.levels[3 * p + c], 65535 * exact, 0.51);
+      EXPECT_NEAR(wide.levels[4 * p + c], 65535 * exact, 1.01);
+      EXPECT_NEAR(narrow.levels[4 * p + c], 255 * exact, 0.51);
+    }
+    EXPECT_NEAR(wide.levels[4 * p + 3], 65535 * premultiplied.rgba[4 * p + 3], 0.51);
+  }
+  const Image nothing{1, 1, {0, 0, 0, 0}};
+  EXPECT_EQ(tone_mapped_alpha(nothing).levels, std::vector<std::uint8_t>(4, 0));
+}
+
 TEST(Image, WhatIsNoNumberComesOutBlack) {
   const Image image{1, 1, {std::nanf(""), -1.0f, INFINITY, 1.0f}};
   EXPECT_EQ(tone_mapped(image).rgb, (std::vector<std::uint8_t>{0, 0, 255}));

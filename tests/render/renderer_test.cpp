@@ -287,6 +287,8 @@ TEST(Renderer, AVeilShowsItsFrontAndItsBackLayer) {
     look.multisampling = multisampling;
     const Image image = picture_of(ball, look, camera_from({0, -4, 0}), {"veil", {1, 1, 1}, 0.5, 0, 0.25});
     EXPECT_NEAR(alpha(image, 160, 120), 1 - 0.75 * 0.75, 1e-3);
+    const Image solid = picture_of(ball, look, camera_from({0, -4, 0}));
+    EXPECT_NEAR(covered_pixels(image) / covered_pixels(solid), 1 - 0.75 * 0.75, 1e-3);
   }
 }
 
@@ -495,6 +497,28 @@ TEST(Renderer, EdgesAreDrawnOverTheSurfaceThatHidesTheOthers) {
   }
   EXPECT_EQ(seen, 9);
   EXPECT_EQ(hidden, 3);
+
+  // Cut with the box: nothing is left of the edge x = 0.5, y = −0.5.
+  renderer.set_clip_planes({Plane(-1, 0, 0, 0.1)});
+  const Vec3 gone = pixel_from_world(camera, {0.5, -0.5, 0.2}, look.width, look.height);
+  EXPECT_EQ(alpha(renderer.draw(camera), int(gone.x()), int(gone.y())), 0);
+}
+
+TEST(Renderer, WhatIsCutOffCastsNothing) {
+  const Camera camera = camera_from({0, -5, 3});
+  const SurfaceMesh floor = quad_mesh({-4, -4, 0}, {4, -4, 0}, {4, 4, 0}, {-4, 4, 0});
+  for (const bool on_body : {false, true}) {
+    Look look = small_look();
+    if (!on_body) look.ground_height_m = 0;
+    look.stage.include(Vec3(-2, -2, 0)), look.stage.include(Vec3(2, 2, 2));
+    Renderer renderer(look);
+    if (on_body) add(renderer, floor, {"floor"});
+    const Image without = renderer.draw(camera);
+    add(renderer, box_mesh({-0.5, -0.5, 0.5}, {0.5, 0.5, 1}), {"box"});
+    EXPECT_GT(difference(renderer.draw(camera), without).mean, 1);
+    renderer.set_clip_planes({Plane(0, 0, -1, 0.4)});  // z < 0.4
+    EXPECT_LE(difference(renderer.draw(camera), without).largest, 2);
+  }
 }
 
 TEST(Renderer, ATransparentPictureOverABackgroundIsThePictureWithIt) {
@@ -536,7 +560,7 @@ TEST(Renderer, PassesTellDepthNormalObjectAndScalarOfASphere) {
     const int mesh = renderer.add_mesh(ball.triangles, ball.positions, {"ball"});
     renderer.set_scalars(mesh, ball.positions.col(2));
     Passes passes;
-    const Image image = renderer.draw(camera, passes);
+    const Image image = renderer.draw(camera, &passes);
     EXPECT_EQ(image.rgba, renderer.draw(camera).rgba);
     int on_ball = 0, on_quad = 0, nowhere = 0;
     for (int y = 0; y < look.height; ++y)

@@ -24,7 +24,13 @@ void prepare_environment() {
 
 }  // namespace
 
-GlContext::GlContext() {
+struct GlContext::Backend {
+  OSMesaContext context;
+  unsigned char
+      unused_pixels[4 * 16 * 16];  // OSMesa insists on a buffer; all drawing goes to framebuffer objects
+};
+
+GlContext::GlContext() : backend_(std::make_unique<Backend>()) {
   prepare_environment();
   const int attributes[] = {OSMESA_FORMAT,
                             OSMESA_RGBA,
@@ -39,17 +45,17 @@ GlContext::GlContext() {
                             OSMESA_CONTEXT_MINOR_VERSION,
                             3,
                             0};
-  context_ = OSMesaCreateContextAttribs(attributes, nullptr);
-  if (!context_) throw InputError("OSMesa gives no OpenGL 3.3 context; is libosmesa6 of Mesa 22 installed?");
+  backend_->context = OSMesaCreateContextAttribs(attributes, nullptr);
+  if (!backend_->context)
+    throw InputError("OSMesa gives no OpenGL 3.3 context; is libosmesa6 of Mesa 22 installed?");
   make_current();
 }
 
-GlContext::~GlContext() { OSMesaDestroyContext(static_cast<OSMesaContext>(context_)); }
+GlContext::~GlContext() { OSMesaDestroyContext(backend_->context); }
 
 void GlContext::make_current() {
-  const auto context = static_cast<OSMesaContext>(context_);
-  if (OSMesaGetCurrentContext() == context) return;
-  if (!OSMesaMakeCurrent(context, unused_pixels_, GL_UNSIGNED_BYTE, 16, 16))
+  if (OSMesaGetCurrentContext() == backend_->context) return;
+  if (!OSMesaMakeCurrent(backend_->context, backend_->unused_pixels, GL_UNSIGNED_BYTE, 16, 16))
     throw InputError("OSMesa refuses to make its context current; is libosmesa6 of Mesa 22 installed?");
 }
 
