@@ -89,6 +89,18 @@ Json volume_figures(const fem::World& world, const MotionFigures& figures) {
   return bodies;
 }
 
+// Every tenth of a second, to the millimetre: enough to see which way the robot went.
+Json robot_path(const Setup& setup, const plan::Trajectory& path) {
+  Json places = Json::array();
+  const double millimetre = 1000;
+  for (double f = 0; f < double(path.frames.size()); f += std::max(1.0, path.frames_per_second / 10)) {
+    const Vec3 place = setup.system->robot_center(path.frames[std::size_t(f)]);
+    Json& list = places.emplace_back(Json::array());
+    for (const double x : place) list.push_back(std::round(millimetre * x) / millimetre);
+  }
+  return places;
+}
+
 Json record_of(const Setup& setup, const plan::Plan& plan, const Json& identity) {
   const MotionFigures figures = measure_motion(*setup.world, plan.trajectory);
   std::string explanation = plan::explain(plan);
@@ -102,6 +114,7 @@ Json record_of(const Setup& setup, const plan::Plan& plan, const Json& identity)
   record.update(plan::json_of(plan.statistics));
   record.update(
       {{"motion_s", double(plan.trajectory.end.step) * setup.world->dt_s},
+       {"robot_path_m", robot_path(setup, plan.trajectory)},
        {"volume", volume_figures(*setup.world, figures)},
        {"deepest_penetration_percent", 100 * figures.deepest_penetration_m / figures.robot_size_m}});
   record.update(json_of(figures));

@@ -32,8 +32,9 @@ Block block_at(const fem::World& world, const State& state, const Vec3& way) {
 Diagnosis diagnose(const fem::World& world, const FemSystem& system, const plan::Plan& plan) {
   Diagnosis d;
   const State state = plan.tree.states[std::size_t(plan.best_node)];
-  const plan::Goal& goal = plan.settings.goal;
-  const Vec3 to_goal = goal.center_of_mass_m + system.goal_shift(state) - system.robot_center(state);
+  const plan::Goal goal = plan::settings_of_leg(plan.settings, plan.leg()).goal;
+  const Vec3 shift = system.on_leg(plan.leg()).goal_shift(state);
+  const Vec3 to_goal = goal.center_of_mass_m + shift - system.robot_center(state);
   const Block block = block_at(world, state, to_goal.normalized());
   if (block.body == -2) {
     d.json["blocked_by"] = nullptr;
@@ -48,7 +49,8 @@ Diagnosis diagnose(const fem::World& world, const FemSystem& system, const plan:
   }
 
   const plan::Workspace space = system.workspace();
-  const double passage = plan::widest_passage_m(space, system.robot_center(system.start()), goal);
+  const State from = plan.tree.states[std::size_t(plan.legs.back().root)];
+  const double passage = plan::widest_passage_m(space, system.robot_center(from), goal);
   d.json["widest_rigid_passage_m"] = passage;
   d.json["robot_inner_radius_m"] = space.robot_radius_m;
   if (passage < 0)

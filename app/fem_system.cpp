@@ -126,10 +126,12 @@ class FemSystem::Propagator final : public plan::Propagator {
   }
 
   plan::Look look(const fem::Batch& batch, int lane, int steps) const {
-    const auto [center, velocity] = batch.motion(lane, system_.world_.robot);
-    plan::Look look{steps, center, velocity};
+    const fem::Batch::Motion robot = batch.motion(lane, system_.world_.robot);
+    plan::Look look{steps, robot.center_m, robot.velocity_m_s};
     if (system_.goal_.body >= 0)
       look.goal_shift = batch.motion(lane, system_.goal_.body).center_m - system_.goal_body_start_m_;
+    if (const GoalRules& last = system_.last_->goal_; last.lost_below_m)
+      look.lost = batch.motion(lane, last.body).lowest_m < *last.lost_below_m;
     return look;
   }
 
@@ -146,6 +148,11 @@ FemSystem::FemSystem(const fem::World& world, const GoalRules& goal)
   for (const int body : {goal.body, goal.above, goal.below, goal.clear_of}) hasher.value(body);
   for (const auto& rule : {goal.lost_below_m, goal.turn_tolerance_deg, goal.shape_tolerance_m})
     hasher.value(int(rule.has_value())).value(rule.value_or(0));
+  for (const GoalRules& rules : goal.via) {
+    via_.push_back(std::make_unique<FemSystem>(world, rules));
+    via_.back()->last_ = this;
+    hasher.value(via_.back()->hash());
+  }
   hash_ = hasher.digest();
 }
 
@@ -165,12 +172,15 @@ Box FemSystem::sample_bounds() const { return world_.bounds_m; }
 double FemSystem::dt_s() const { return world_.dt_s; }
 std::uint64_t FemSystem::hash() const { return hash_; }
 bool FemSystem::acceptable(const State& state) const {
-  if (goal_.lost_below_m) {
-    const fem::Body& body = world_.bodies[std::size_t(goal_.body)];
+  if (const GoalRules& last = last_->goal_; last.lost_below_m) {
+    const fem::Body& body = world_.bodies[std::size_t(last.body)];
     for (int n = body.first_node; body.moving && n < body.first_node + body.node_count(); ++n)
-      if (double(state.positions[std::size_t(3 * n + 2)]) < *goal_.lost_below_m) return false;
+      if (double(state.positions[std::size_t(3 * n + 2)]) < *last.lost_below_m) return false;
   }
   return fem::inverted_tets(world_, state) == 0;
+}
+const plan::System& FemSystem::on_leg(int leg) const {
+  return leg < int(via_.size()) ? static_cast<const plan::System&>(*via_[std::size_t(leg)]) : *this;
 }
 bool FemSystem::goal_holds(const State& state) const {
   if (goal_.turn_tolerance_deg && fem::turn_from_goal_shape_deg(world_, state) > *goal_.turn_tolerance_deg)
@@ -206,8 +216,11 @@ std::unique_ptr<plan::Propagator> FemSystem::make_propagator() const {
   return std::make_unique<Propagator>(*this);
 }
 fem::Cost FemSystem::cost() const {
+  fem::Cost sum;
+  for (const auto& via : via_) sum += via->cost();
   const std::lock_guard lock(mutex_);
-  return cost_;
+  sum += cost_;
+  return sum;
 }
 
 }  // namespace limber::app

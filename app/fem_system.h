@@ -1,8 +1,10 @@
 // What the planner may ask of the soft bodies: the adapter from fem::World to plan::System.
 #pragma once
 
+#include <memory>
 #include <mutex>
 #include <optional>
+#include <vector>
 
 #include "fem/cost.h"
 #include "fem/world.h"
@@ -18,6 +20,7 @@ struct GoalRules {
   std::optional<double> shape_tolerance_m;   // no node is farther from its place in that shape
   int above = -1, below = -1;                // the whole robot is higher, lower than all of this body
   int clear_of = -1;                         // no contact with this body pushes the robot
+  std::vector<GoalRules> via;                // of the goals before it, likewise; lost_below_m is of the last
 };
 
 class FemSystem final : public plan::System {
@@ -35,6 +38,7 @@ class FemSystem final : public plan::System {
   std::uint64_t hash() const override;
   bool acceptable(const State&) const override;  // no tet is inverted, and the goal is not lost
   bool goal_holds(const State&) const override;
+  const System& on_leg(int) const override;
   Vec3 goal_shift(const State&) const override;
   plan::Measures measures(const State&) const override;
   Vec3 goal_velocity(const State&) const override;
@@ -47,6 +51,8 @@ class FemSystem final : public plan::System {
   class Propagator;
   const fem::World& world_;
   GoalRules goal_;
+  std::vector<std::unique_ptr<FemSystem>> via_;
+  const FemSystem* last_ = this;  // on the leg to the last goal: what is lost to it is lost
   Vec3 goal_body_start_m_;
   std::uint64_t hash_;
   mutable std::mutex mutex_;

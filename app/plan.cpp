@@ -33,6 +33,20 @@ Json json_of(const fem::Cost& cost) {
           {"store_us", per(cost.store_s, cost.stores)}};
 }
 
+// Of several goals in a row: how far each leg of the search got.
+Json legs_of(const plan::Plan& plan) {
+  Json legs = Json::array();
+  for (std::size_t leg = 0; leg < plan.legs.size(); ++leg) {
+    const bool last = leg + 1 == plan.legs.size();
+    const std::int64_t end = last ? plan.statistics.iterations : plan.legs[leg + 1].first_iteration;
+    legs.push_back({{"goal", plan::name_of_goal(plan.settings, int(leg))},
+                    {"reached", !last || plan.solved()},
+                    {"root", plan.legs[leg].root},
+                    {"iterations", end - plan.legs[leg].first_iteration}});
+  }
+  return legs;
+}
+
 Json summary_of(const plan::Plan& plan, const fem::World& world, const fem::Cost& cost,
                 const MotionFigures& figures) {
   Json volumes;
@@ -53,6 +67,7 @@ Json summary_of(const plan::Plan& plan, const fem::World& world, const fem::Cost
             {"largest_volume_change_percent", volumes},
             {"tree_hash", hex(plan::hash_of(plan.tree))},
             {"trajectory_hash", hex(plan::hash_of(plan.trajectory))}};
+  if (!plan.settings.via.empty()) json["legs"] = legs_of(plan);
   json.update(json_of(figures));
   return json;
 }
@@ -84,6 +99,16 @@ std::string text_of_improvements(const plan::AnytimeReport& report) {
   return text;
 }
 
+std::string text_of_legs(const Json& legs) {
+  std::string text;
+  for (const Json& leg : legs)
+    text += fmt::format("{}{} {} after {} iterations", text.empty() ? "  legs         " : ", ",
+                        leg.at("goal").get<std::string>(),
+                        leg.at("reached").get<bool>() ? "reached" : "not reached",
+                        leg.at("iterations").get<std::int64_t>());
+  return text + "\n";
+}
+
 std::string text_of(const Json& s, const std::string& extra, const fs::path& file) {
   std::string volumes;
   for (const auto& [name, percent] : s.at("largest_volume_change_percent").items())
@@ -91,6 +116,7 @@ std::string text_of(const Json& s, const std::string& extra, const fs::path& fil
   const Json &t = s.at("statistics"), &d = s.at("dynamics");
   return fmt::format(
       "{}\n"
+      "{}"
       "  search       {} iterations, {} nodes, {} diverged, {} rejected; {:.2f} CPU s, {:.2f} s\n"
       "  memory       {:.1f} kB a node, {:.1f} where nothing is shared with the parent\n"
       "  dynamics     contact {:.2f} × the force step; a lane takes {:.1f} µs to load, {:.1f} µs to store\n"
@@ -102,13 +128,13 @@ std::string text_of(const Json& s, const std::string& extra, const fs::path& fil
       "{}"
       "  hashes       tree {}, trajectory {}\n"
       "  file         {}\n",
-      s.at("explanation").get<std::string>(), t.at("iterations").get<std::int64_t>(),
-      s.at("nodes").get<int>(), t.at("diverged").get<std::int64_t>(), t.at("rejected").get<std::int64_t>(),
-      t.at("cpu_s").get<double>(), t.at("wall_s").get<double>(), 1e-3 * s.at("node_bytes").get<double>(),
-      1e-3 * s.at("node_bytes_unshared").get<double>(), d.at("contact_of_force_step").get<double>(),
-      d.at("load_us").get<double>(), d.at("store_us").get<double>(), s.at("motion_s").get<double>(),
-      s.at("frames").get<int>(), 1e3 * s.at("dt_s").get<double>(), volumes,
-      s.at("deepest_penetration_m").get<double>(),
+      s.at("explanation").get<std::string>(), s.contains("legs") ? text_of_legs(s.at("legs")) : "",
+      t.at("iterations").get<std::int64_t>(), s.at("nodes").get<int>(), t.at("diverged").get<std::int64_t>(),
+      t.at("rejected").get<std::int64_t>(), t.at("cpu_s").get<double>(), t.at("wall_s").get<double>(),
+      1e-3 * s.at("node_bytes").get<double>(), 1e-3 * s.at("node_bytes_unshared").get<double>(),
+      d.at("contact_of_force_step").get<double>(), d.at("load_us").get<double>(),
+      d.at("store_us").get<double>(), s.at("motion_s").get<double>(), s.at("frames").get<int>(),
+      1e3 * s.at("dt_s").get<double>(), volumes, s.at("deepest_penetration_m").get<double>(),
       100 * s.at("deepest_penetration_of_robot_size").get<double>(),
       s.at("penetration_between").get<std::string>(), s.at("largest_strain").get<double>(),
       s.at("largest_strain_of").get<std::string>(), s.at("largest_contact_force_n").get<double>(),
@@ -144,7 +170,11 @@ plan::Settings settings_of(const scenes::Scene& scene, const PlanOptions& option
   plan::Settings s;
   s.seed = std::uint64_t(options.seed.value_or(p.seed));
   s.max_iterations = options.iterations.value_or(p.iterations);
-  s.goal = {scene.goal.center_of_mass_m, scene.goal.radius_m, scene.goal.box_m};
+  const auto goal_of = [](const scenes::Goal& goal) {
+    return plan::Goal{goal.center_of_mass_m, goal.radius_m, goal.box_m};
+  };
+  s.goal = goal_of(scene.goal);
+  for (const scenes::Via& via : scene.via) s.via.push_back({goal_of(via.goal), via.rest});
   s.goal_bias = p.goal_bias;
   s.weights = {p.weight_body, p.weight_control_point, p.weight_interpolation};
   s.max_force_n = p.max_force_n;

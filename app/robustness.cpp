@@ -11,6 +11,7 @@
 #include "core/random.h"
 #include "plan/course.h"
 #include "plan/refine.h"
+#include "plan/shortcut.h"
 
 namespace limber::app {
 
@@ -75,6 +76,19 @@ const char* name_of(plan::Course::Result result) {
   }
 }
 
+// Whether each leg ended in its goal; how fast the robot was there is not asked.
+bool reaches_all_via(const plan::Plan& plan, const FemSystem& system, const plan::Course& course,
+                     const std::vector<int>& before_legs) {
+  for (std::size_t leg = 1; leg < before_legs.size(); ++leg) {
+    const auto count = std::size_t(before_legs[leg]);
+    if (count > course.states.size()) return false;
+    const State& state = count == 0 ? course.from : course.states[count - 1];
+    const Vec3 shift = system.on_leg(int(leg) - 1).goal_shift(state);
+    if (!plan::holds(plan.settings.via[leg - 1].goal, system.robot_center(state) - shift)) return false;
+  }
+  return true;
+}
+
 // The perturbations [first, last) in one world, in lanes.
 std::vector<Fate> replay(const plan::Plan& plan, const plan::Reference& reference,
                          const RobustOptions& options, const scenes::Scene& scene,
@@ -90,14 +104,16 @@ std::vector<Fate> replay(const plan::Plan& plan, const plan::Reference& referenc
   }
   plan::run(system, plan.settings, courses,
             {.settle = plan::CourseOptions::anywhere, .keep_frames = true, .ask_acceptable = false});
+  const std::vector<int> before_legs = plan::controls_before_legs(plan);
   std::vector<Fate> fates;
   for (plan::Course& course : courses) {
+    const bool goes_by = reaches_all_via(plan, system, course, before_legs);
     const plan::Trajectory path{{}, 0, plan.settings.frames_per_second, std::move(course.frames), course.end};
     const MotionFigures figures = measure_motion(world, path);
     Fate& fate = fates.emplace_back();
     fate.world = world_number;
-    fate.reaches = course.result == plan::Course::rests_in_goal;
-    fate.end = name_of(course.result);
+    fate.reaches = course.result == plan::Course::rests_in_goal && goes_by;
+    fate.end = goes_by ? name_of(course.result) : "a via is missed";
     fate.end_center_m = system.robot_center(course.end);
     fate.distance_m =
         (fate.end_center_m - system.goal_shift(course.end) - plan.settings.goal.center_of_mass_m).norm();

@@ -199,13 +199,17 @@ void set_parts(const scenes::BodySpec& body, const PreparedBody& prepared, fem::
 }  // namespace
 
 GoalRules goal_rules_of(const scenes::Scene& scene) {
-  const scenes::Goal& goal = scene.goal;
-  GoalRules rules;
-  rules.body = goal.moves_with, rules.lost_below_m = goal.lost_below_m;
-  if (goal.shape)
-    rules.turn_tolerance_deg = goal.shape->turn_tolerance_deg,
-    rules.shape_tolerance_m = goal.shape->tolerance_m;
-  rules.above = goal.above, rules.below = goal.below, rules.clear_of = goal.clear_of;
+  const auto rules_of = [](const scenes::Goal& goal) {
+    GoalRules rules;
+    rules.body = goal.moves_with, rules.lost_below_m = goal.lost_below_m;
+    if (goal.shape)
+      rules.turn_tolerance_deg = goal.shape->turn_tolerance_deg,
+      rules.shape_tolerance_m = goal.shape->tolerance_m;
+    rules.above = goal.above, rules.below = goal.below, rules.clear_of = goal.clear_of;
+    return rules;
+  };
+  GoalRules rules = rules_of(scene.goal);
+  for (const scenes::Via& via : scene.via) rules.via.push_back(rules_of(via.goal));
   return rules;
 }
 

@@ -12,8 +12,10 @@ constexpr std::int64_t iterations_a_line = 10;
 constexpr double seconds_between_writes = 0.5;
 
 std::string line_of(const plan::Moment& m) {
-  Json json{
-      {"iteration", m.statistics.iterations}, {"nodes", m.nodes}, {"best_distance_m", m.best_distance_m}};
+  Json json{{"iteration", m.statistics.iterations},
+            {"leg", m.leg},
+            {"nodes", m.nodes},
+            {"best_distance_m", m.best_distance_m}};
   json.update(plan::json_of(m.statistics));
   json.erase("iterations");
   return json.dump() + "\n";

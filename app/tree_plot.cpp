@@ -58,6 +58,11 @@ void draw(const View& view, const scenes::Scene& scene, const fem::World& world,
                        silhouette(view, world.bodies[b]), color_of(scene.bodies[b].color_srgb),
                        robot ? 0.25 : 0.45);
   }
+  for (const plan::Via& via : plan.settings.via)
+    svg += fmt::format(
+        "<circle class=\"via\" cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"{:.1f}\" fill=\"#2a2\" fill-opacity=\"0.15\" "
+        "stroke=\"#2a2\" stroke-dasharray=\"3 3\"/>\n",
+        view.x(via.goal.center_of_mass_m), view.y(via.goal.center_of_mass_m), view.scale * via.goal.radius_m);
   const Vec3& goal = plan.settings.goal.center_of_mass_m;
   svg += fmt::format(
       "<circle class=\"goal\" cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"{:.1f}\" fill=\"#2a2\" fill-opacity=\"0.3\" "

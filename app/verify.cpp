@@ -63,6 +63,25 @@ void check_body(const std::string& name, const PreparedBody& body, Table& table)
             fmt::format("dihedrals {:.1f} … {:.1f} degrees", c.min_dihedral_deg, c.max_dihedral_deg));
 }
 
+// Each leg begins where the one before has reached its goal; the replay is of the controls up to there.
+void check_via(const plan::Plan& plan, const FemSystem& system, Table& table) {
+  for (std::size_t leg = 1; leg < plan.legs.size(); ++leg) {
+    std::vector<Control> controls = plan.trajectory.controls;
+    controls.resize(std::min(controls.size(), plan::path_to(plan.tree, plan.legs[leg].root).size() - 1));
+    const plan::Trajectory replay = plan::simulate(system, controls, plan.settings.frames_per_second);
+    const plan::System& on_leg = system.on_leg(int(leg) - 1);
+    const plan::Via& via = plan.settings.via[leg - 1];
+    const Vec3 place = system.robot_center(replay.end) - on_leg.goal_shift(replay.end);
+    const double speed = system.mean_speed(replay.end);
+    table.row(
+        fmt::format("{} is reached{}", plan::name_of_goal(plan.settings, int(leg) - 1),
+                    via.rest ? ", and the robot rests" : ""),
+        plan::holds(via.goal, place) && on_leg.goal_holds(replay.end) &&
+            (!via.rest || speed <= plan.settings.settle.mean_speed_m_s),
+        fmt::format("{:.3f} m from it at {:.4f} m/s", (place - via.goal.center_of_mass_m).norm(), speed));
+  }
+}
+
 MotionFigures check_plan(const PlanFolder& planned, const fem::World& world, Table& table) {
   const plan::Plan& plan = planned.plan;
   const plan::Trajectory& path = plan.trajectory;
@@ -75,6 +94,7 @@ MotionFigures check_plan(const PlanFolder& planned, const fem::World& world, Tab
             fmt::format("{} frames, end {}", replay.frames.size(), hex(hash_of(replay.end))));
 
   const MotionFigures figures = measure_motion(world, replay);
+  check_via(plan, system, table);
   const auto distance_in = [&](const State& state) {
     return (system.robot_center(state) - system.goal_shift(state) - plan.settings.goal.center_of_mass_m)
         .norm();

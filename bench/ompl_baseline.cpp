@@ -437,8 +437,8 @@ int compare(int argc, char** argv) {
   plan_settings("paper", 1, &scene);
   const std::vector<PreparedBody> bodies = prepare_bodies(scene, {}, options.out);
   const fem::World world = build_world(scene, bodies);
-  if (goal_rules_of(scene).body >= 0)
-    throw InputError("ompl_bench: OMPL knows no goal that moves; take another scene");
+  if (goal_rules_of(scene).body >= 0 || !scene.via.empty())
+    throw InputError("ompl_bench: OMPL knows no goal that moves and no goals on the way; take another scene");
   const FemSystem system(world);
 
   struct Row {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 #include "core/error.h"
@@ -120,13 +121,14 @@ int Batch::steps_left(int lane) const { return impl_->lanes.at(std::size_t(lane)
 
 Batch::Motion Batch::motion(int lane, int index) const {
   const Body& body = impl_->world.bodies.at(std::size_t(index));
-  Motion sum{Vec3::Zero(), Vec3::Zero()};
+  Motion sum{Vec3::Zero(), Vec3::Zero(), std::numeric_limits<double>::infinity()};
   for (int n = 0; n < body.node_count(); ++n) {
     const auto [place, velocity] = impl_->stepper.node(lane, body.first_node + n);
     sum.center_m += body.node_mass_kg[std::size_t(n)] * place;
     sum.velocity_m_s += body.node_mass_kg[std::size_t(n)] * velocity;
+    sum.lowest_m = std::min(sum.lowest_m, double(place.z()));
   }
-  return {sum.center_m / body.mass_kg, sum.velocity_m_s / body.mass_kg};
+  return {sum.center_m / body.mass_kg, sum.velocity_m_s / body.mass_kg, sum.lowest_m};
 }
 
 void Batch::stop(int lane) {

@@ -38,9 +38,11 @@ class Batch {
   // taken, 0 when no lane has any left.
   int advance(int most_steps = 1 << 30);
   int steps_left(int lane) const;
-  // Of one body as it is now, in a lane that was loaded: centre of mass and its velocity.
+  // Of one body as it is now, in a lane that was loaded: centre of mass and its velocity, height of the
+  // lowest node.
   struct Motion {
     Vec3 center_m, velocity_m_s;
+    double lowest_m;
   };
   Motion motion(int lane, int body) const;
   // The lane takes no further steps: as if its control had had only those that it took.

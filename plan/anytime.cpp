@@ -18,7 +18,10 @@ constexpr std::int64_t fewest_iterations = 200;  // of a search
 class Bounded final : public System {
  public:
   Bounded(const System& system, const Settings& settings, double bound_s)
-      : system_(system), settings_(settings), bound_s_(bound_s), first_step_(system.start().step) {}
+      : Bounded(system, system, settings, bound_s) {
+    for (int leg = 0; leg < int(settings.via.size()); ++leg)
+      legs_.push_back(std::unique_ptr<Bounded>(new Bounded(system.on_leg(leg), system, settings, bound_s)));
+  }
 
   State start() const override { return system_.start(); }
   Vec3 robot_center(const State& s) const override { return system_.robot_center(s); }
@@ -35,6 +38,9 @@ class Bounded final : public System {
   }
   bool goal_holds(const State& s) const override { return system_.goal_holds(s); }
   Vec3 goal_shift(const State& s) const override { return system_.goal_shift(s); }
+  const System& on_leg(int leg) const override {
+    return leg < int(legs_.size()) ? static_cast<const System&>(*legs_[std::size_t(leg)]) : *this;
+  }
   Measures measures(const State& s) const override { return system_.measures(s); }
   Vec3 goal_velocity(const State& s) const override { return system_.goal_velocity(s); }
   Workspace workspace() const override { return system_.workspace(); }
@@ -42,20 +48,28 @@ class Bounded final : public System {
   std::unique_ptr<Propagator> make_propagator() const override { return system_.make_propagator(); }
 
  private:
-  // Of a mass that flies at the goal under the largest force and need not stop: v t + a t²/2 = d.
+  Bounded(const System& system, const System& last, const Settings& settings, double bound_s)
+      : system_(system),
+        last_(last),
+        settings_(settings),
+        bound_s_(bound_s),
+        first_step_(system.start().step) {}
+
+  // Of a mass that flies at the last goal under the largest force and need not stop: v t + a t²/2 = d.
   double least_to_go_s(const State& s) const {
-    const Vec3 way = settings_.goal.center_of_mass_m + system_.goal_shift(s) - system_.robot_center(s);
+    const Vec3 way = settings_.goal.center_of_mass_m + last_.goal_shift(s) - system_.robot_center(s);
     const double d = way.norm() - settings_.goal.radius_m,
                  a = settings_.max_force_n / system_.robot_mass_kg();
     if (d <= 0 || a == 0) return 0;
-    const double v = (system_.robot_velocity(s) - system_.goal_velocity(s)).dot(way) / way.norm();
+    const double v = (system_.robot_velocity(s) - last_.goal_velocity(s)).dot(way) / way.norm();
     return (std::sqrt(v * v + 2 * a * d) - v) / a;
   }
 
-  const System& system_;
+  const System &system_, &last_;  // on its leg, and on the last
   const Settings& settings_;
   double bound_s_;
   std::int64_t first_step_;
+  std::vector<std::unique_ptr<Bounded>> legs_;
 };
 
 }  // namespace
@@ -86,6 +100,7 @@ AnytimeReport improve(const System& system, Plan& plan, const AnytimeSettings& a
   std::vector<Control> controls = plan.trajectory.controls;
   if (plan.trajectory.settle_steps > 0) controls.pop_back();
   Course best = path_of(system, plan.settings, controls);
+  std::vector<int> before_legs = controls_before_legs(plan);
 
   AnytimeReport report;
   report.settings = anytime, report.first = best.costs;
@@ -115,12 +130,13 @@ AnytimeReport improve(const System& system, Plan& plan, const AnytimeSettings& a
         cost_in(path.costs, anytime.cost) >= cost_in(best.costs, anytime.cost))
       continue;
     best = std::move(path);
+    before_legs = controls_before_legs(found);
     report.improvements.push_back({wall_s(), report.iterations, report.searches, best.costs});
   }
   report.ending = stop_signal() != 0                                 ? Ending::stopped
                   : report.iterations < plan.settings.max_iterations ? Ending::time
                                                                      : Ending::iterations;
-  if (!report.improvements.empty()) adopt(system, plan, best);
+  if (!report.improvements.empty()) adopt(system, plan, best, before_legs);
   report.cpu_s = cpu_seconds() - cpu_before;
   report.wall_s = wall_s();
   return report;

@@ -19,8 +19,8 @@ constexpr int raises_a_renewal = 4;
 
 }  // namespace
 
-Chooser::Chooser(const System& system, const Settings& settings, const Guidance* guidance)
-    : system_(system), settings_(settings) {
+Chooser::Chooser(const System& system, const Settings& settings, const Guidance* guidance, int root)
+    : system_(system), settings_(settings), root_(root) {
   if (guidance) guidance_ = *guidance;
 }
 
@@ -28,25 +28,27 @@ double Chooser::strongest() const {
   return std::max(1e-9, settings_.max_force_n * settings_.max_force_share / system_.robot_mass_kg());
 }
 
-void Chooser::add(const Tree& tree, int node) {
+void Chooser::add(const Tree& tree, int of_tree) {
+  const int node = of_tree - root_;
   LIMBER_CHECK(node == centers_.size(), node, centers_.size());
-  const State state = tree.states[std::size_t(node)];
+  const State state = tree.states[std::size_t(of_tree)];
+  const Vec3f center = tree.centers[of_tree];
   const Vec3 shift = system_.goal_shift(state);
-  departures_.push_back({tree.centers[node].cast<double>(), system_.robot_velocity(state), shift,
-                         system_.goal_velocity(state)});
-  centers_.push_back(tree.centers[node]);
-  centers_from_goal_.push_back(tree.centers[node] - shift.cast<float>());
+  departures_.push_back(
+      {center.cast<double>(), system_.robot_velocity(state), shift, system_.goal_velocity(state)});
+  centers_.push_back(center);
+  centers_from_goal_.push_back(center - shift.cast<float>());
   times_s_.push_back(double(state.step) * system_.dt_s());
   children_.push_back(0);
   if (!guidance_) return;
-  const int parent = tree.parents[std::size_t(node)];
+  const int parent = tree.parents[std::size_t(of_tree)] - root_;  // < 0: of the root
   if (parent >= 0) {
     ranking_.erase(std::lower_bound(ranking_.begin(), ranking_.end(), std::pair(promise(parent), parent)));
     ++children_[std::size_t(parent)];
     rank(parent);
   }
   rank(node);
-  if (parent >= 0 && settings_.laws.learn_prices) learn(tree, node);
+  if (parent >= 0 && settings_.laws.learn_prices) learn(tree.controls[std::size_t(of_tree)], parent, node);
 }
 
 void Chooser::rank(int node) {
@@ -73,10 +75,9 @@ double Chooser::promise(int node) const {
 }
 
 // Where a strong push from parent to node got less far than it should have, going on that way gets dearer.
-void Chooser::learn(const Tree& tree, int node) {
-  const Control& control = tree.controls[std::size_t(node)];
+void Chooser::learn(const Control& control, int parent, int node) {
   if (control.manipulation != Manipulation::body) return;
-  const Departure& from = departures_[std::size_t(tree.parents[std::size_t(node)])];
+  const Departure& from = departures_[std::size_t(parent)];
   const Departure& to = departures_[std::size_t(node)];
   const double t = control.steps * system_.dt_s(), radius = guidance_->workspace().robot_radius_m;
   const Vec3 push = control.force_n.cast<double>() / system_.robot_mass_kg();
@@ -91,7 +92,9 @@ void Chooser::learn(const Tree& tree, int node) {
   rank_all();
 }
 
-double Chooser::cost(const Draw& d, int node) const {
+double Chooser::cost(const Draw& d, int of_tree) const { return cost_of(d, of_tree - root_); }
+
+double Chooser::cost_of(const Draw& d, int node) const {
   if (settings_.laws.metric == Metric::distance)
     return double(
         squared_distance(d.towards_goal ? centers_from_goal_[node] : centers_[node], d.point.cast<float>()));
@@ -103,13 +106,13 @@ double Chooser::cost(const Draw& d, int node) const {
 
 int Chooser::nearest_in_time(const Draw& d) const {
   int best = 0;
-  double least = cost(d, 0);
+  double least = cost_of(d, 0);
   for (int node = 1; node < centers_.size(); ++node) {
     const Departure& at = departures_[std::size_t(node)];
     const Vec3 way = d.point + (d.towards_goal ? at.goal_shift : Vec3::Zero()) - at.center;
     const Vec3 velocity = at.velocity - (d.towards_goal ? at.goal_velocity : Vec3::Zero());
     if (least_time_to_go(way.norm(), velocity.norm(), strongest()) >= least) continue;
-    if (const double c = cost(d, node); c < least) best = node, least = c;
+    if (const double c = cost_of(d, node); c < least) best = node, least = c;
   }
   return best;
 }
@@ -121,14 +124,16 @@ Aim Chooser::choose(const Draw& d) const {
     const double n = double(ranking_.size());
     const auto rank = std::min(ranking_.size() - 1, std::size_t(std::pow(n + 1, d.rank)) - 1);
     const int node = ranking_[rank].second;
-    return {node, 0, control(d, node)};
+    return {root_ + node, 0, control(d, node)};
   }
-  return aim(d, settings_.laws.metric == Metric::distance
-                    ? nearest(d.towards_goal ? centers_from_goal_ : centers_, d.point.cast<float>())
-                    : nearest_in_time(d));
+  return aim(d, root_ + (settings_.laws.metric == Metric::distance
+                             ? nearest(d.towards_goal ? centers_from_goal_ : centers_, d.point.cast<float>())
+                             : nearest_in_time(d)));
 }
 
-Aim Chooser::aim(const Draw& d, int node) const { return {node, cost(d, node), control(d, node)}; }
+Aim Chooser::aim(const Draw& d, int of_tree) const {
+  return {of_tree, cost(d, of_tree), control(d, of_tree - root_)};
+}
 
 Control Chooser::control(const Draw& d, int node) const {
   const Departure& at = departures_[std::size_t(node)];

@@ -18,25 +18,29 @@ struct Aim {
 
 class Chooser {
  public:
-  // All must outlive it; guidance as the search begins, nullptr where the laws want none.
-  Chooser(const System&, const Settings&, const Guidance*);
+  // All must outlive it; guidance as the search begins, nullptr where the laws want none. Nodes of the tree
+  // before `root` do not count.
+  Chooser(const System&, const Settings&, const Guidance*, int root);
 
-  void add(const Tree&, int node);  // nodes in order
+  void add(const Tree&, int node);  // nodes in order, the root first
   Aim choose(const Draw&) const;    // there is a node
   Aim aim(const Draw&, int node) const;
   double cost(const Draw&, int node) const;
 
  private:
+  // Below, nodes are counted from the root.
+  double cost_of(const Draw&, int node) const;
   int nearest_in_time(const Draw&) const;
   Control control(const Draw&, int node) const;
   double promise(int node) const;  // seconds to the goal; less is better
   void rank(int node);
   void rank_all();
-  void learn(const Tree&, int node);
+  void learn(const Control&, int parent, int node);
   double strongest() const;  // metres a second squared
 
   const System& system_;
   const Settings& settings_;
+  const int root_;
   std::optional<Guidance> guidance_;
   Centers centers_, centers_from_goal_;
   std::vector<Departure> departures_;

@@ -1,5 +1,7 @@
 #include "plan/plan_file.h"
 
+#include <algorithm>
+
 #include "core/error.h"
 #include "core/hash.h"
 #include "core/npz.h"
@@ -196,6 +198,24 @@ class Reader {
     refuse("its ending is " + name.dump() + ", which is none");
   }
 
+  // Each leg begins at a node on the path, none before the one ahead of it.
+  std::vector<Leg> legs(const Json& list, const Plan& plan) const {
+    const std::vector<int> path = path_to(plan.tree, plan.best_node);
+    std::vector<Leg> legs;
+    for (const Json& leg : list) {
+      legs.push_back({leg.at("root").get<int>(), leg.at("first_iteration").get<std::int64_t>()});
+      const Leg before = legs.size() == 1 ? Leg{} : legs[legs.size() - 2], now = legs.back();
+      require(std::count(path.begin(), path.end(), now.root) == 1 && now.root >= before.root &&
+                  now.first_iteration >= before.first_iteration &&
+                  now.first_iteration <= plan.statistics.iterations && (legs.size() > 1 || now.root == 0),
+              fmt::format("leg {} begins where none can", legs.size()));
+    }
+    const std::size_t goals = plan.settings.via.size() + 1;
+    require(!legs.empty() && legs.size() <= goals && (!plan.solved() || legs.size() == goals),
+            fmt::format("it has {} legs to {} goals", legs.size(), goals));
+    return legs;
+  }
+
   Json meta() const { return parse_json(file_.text("meta.json"), path_.string() + ": meta.json"); }
 
  private:
@@ -252,6 +272,9 @@ void write_plan(const fs::path& path, const Plan& plan, const Json& given) {
   meta["goal_node"] = plan.goal_node;
   meta["best_node"] = plan.best_node;
   meta["best_distance_m"] = plan.best_distance_m;
+  for (std::size_t leg = 0; leg < plan.legs.size() && !plan.settings.via.empty(); ++leg)
+    meta["legs"].push_back(
+        {{"root", plan.legs[leg].root}, {"first_iteration", plan.legs[leg].first_iteration}});
   meta["settings"] = json_of(plan.settings);
   meta["statistics"] = json_of(plan.statistics);
   meta["settle_steps"] = plan.trajectory.settle_steps;
@@ -282,6 +305,7 @@ PlanFile read_plan(const fs::path& path) {
     const int nodes = plan.tree.size();
     reader.require(plan.best_node >= 0 && plan.best_node < nodes, "best_node is not a node of the tree");
     reader.require(plan.goal_node == -1 || plan.goal_node == plan.best_node, "goal_node is not best_node");
+    if (!plan.settings.via.empty()) plan.legs = reader.legs(meta.at("legs"), plan);
 
     Trajectory& t = plan.trajectory;
     t.controls = reader.controls("path", -1);

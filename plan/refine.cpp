@@ -50,7 +50,7 @@ Plan chain(const System& system, const Settings& settings, const std::vector<Con
 Plan solved_by(const System& system, const Settings& settings, const Course& path) {
   Plan plan = chain(system, settings, path.controls, path.states);
   plan.best_node = plan.tree.size() - 1;
-  adopt(system, plan, path);
+  adopt(system, plan, path, {0});
   return plan;
 }
 
@@ -194,6 +194,10 @@ Plan refine(const System& system, const Settings& settings, const Reference& ref
             RefineReport& report) {
   LIMBER_CHECK(!reference.centers.empty(), reference.centers.size());
   validate(settings, system);
+  if (!settings.via.empty())
+    throw InputError(
+        "a path by way of via points is not carried to finer cages; plan in the finer cages at once, with "
+        "limber plan and --set bodies.NAME.cage.…");
   double before = cpu_seconds();
   const auto spent = [&before] {
     const double now = cpu_seconds();

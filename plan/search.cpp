@@ -15,6 +15,7 @@
 #include "core/progress.h"
 #include "core/threads.h"
 #include "plan/chooser.h"
+#include "plan/course.h"
 
 namespace limber::plan {
 
@@ -74,15 +75,20 @@ std::optional<Guidance> guidance_of(const System& system, const Settings& settin
 // have started it.
 class Search {
  public:
-  Search(const System& system, const Settings& settings, Plan& plan, const Watch& watch)
+  // `system` and `settings` are those of the plan's last leg; time counts from `started`.
+  Search(const System& system, const Settings& settings, Plan& plan, const Watch& watch,
+         Clock::time_point started)
       : system_(system),
         settings_(settings),
         laws_(settings.laws),
         plan_(plan),
         watch_(watch),
         progress_("plan", settings.max_iterations),
+        started_(started),
         guidance_(guidance_of(system, settings)),
-        chooser_(system, settings, guidance_ ? &*guidance_ : nullptr) {
+        chooser_(system, settings, guidance_ ? &*guidance_ : nullptr, plan.legs.back().root),
+        next_iteration_(plan.legs.back().first_iteration),
+        committed_(next_iteration_) {
     const int lanes = std::max(1, system.lanes()), threads = std::max(1, thread_count());
     // With single lanes a thread that waits to be committed needs a second expansion; a batch holds enough.
     const int automatic = threads == 1 ? lanes : threads * std::max(lanes, 2);
@@ -192,7 +198,7 @@ class Search {
 
   // A function of the rollout and of what was seen of it, save when nobody wants the result any more.
   bool goes_on(Expansion& e, const Look& look) const {
-    if (ended_) return false;
+    if (ended_ || look.lost) return false;
     if (look_every_ == 0) return true;
     const Vec3 place = look.center - look.goal_shift;
     if (laws_.stop_in_goal && holds(settings_.goal, place)) return false;
@@ -224,7 +230,7 @@ class Search {
   // Goes through the earlier plan's commits again, so that each expansion that was on its way is drawn as it
   // was.
   void restore() {
-    int node = 0;
+    int node = plan_.legs.back().root;
     for (chooser_.add(plan_.tree, node++);; ++committed_) {
       if (laws_.lag > 0) draw_ahead();
       if (committed_ == plan_.statistics.iterations) break;
@@ -267,14 +273,14 @@ class Search {
     progress_.update(statistics.iterations, fmt::format("{} nodes, {:.3g} m from the goal, {:.0f} a second",
                                                         plan_.tree.size(), plan_.best_distance_m,
                                                         double(statistics.iterations - iterations_before_) /
-                                                            seconds_since(started_)));
-    if (watch_) watch_({statistics_now(), plan_.tree.size(), plan_.best_distance_m});
+                                                            seconds_since(leg_started_)));
+    if (watch_) watch_({statistics_now(), plan_.leg(), plan_.tree.size(), plan_.best_distance_m});
   }
 
   Statistics statistics_now() const {
     Statistics now = plan_.statistics;
     now.cpu_s += cpu_seconds() - cpu_before_;
-    now.wall_s += seconds_since(started_);
+    now.wall_s += seconds_since(leg_started_);
     return now;
   }
 
@@ -319,7 +325,7 @@ class Search {
   Progress progress_;
   int window_, threads_, share_;  // expansions in flight, threads, expansions a thread has in its lanes
   int look_every_;                // steps; 0: laws do not look
-  const Clock::time_point started_ = Clock::now();
+  const Clock::time_point started_, leg_started_ = Clock::now();
   const double cpu_before_ = cpu_seconds();
   const std::int64_t iterations_before_ = plan_.statistics.iterations;
 
@@ -331,9 +337,20 @@ class Search {
   Chooser chooser_;
   std::deque<Expansion>
       queue_;  // in order of iteration; a deque, so that pointers to the taken ones stay good
-  std::int64_t next_iteration_ = 0, committed_ = 0;
+  std::int64_t next_iteration_, committed_;
   std::exception_ptr failure_;  // the first
 };
+
+// At the root of a leg, with the system and settings of that leg.
+void begin_leg(const System& system, const Settings& settings, Plan& plan) {
+  const int root = plan.legs.back().root;
+  const State state = plan.tree.states[std::size_t(root)];
+  const Vec3 center = system.robot_center(state) - system.goal_shift(state);
+  plan.best_node = root;
+  plan.best_distance_m = (center - settings.goal.center_of_mass_m).norm();
+  const bool solves = holds(settings.goal, center) && comes_to_rest(system, settings, state);
+  plan.goal_node = solves ? root : -1;
+}
 
 Plan begin(const System& system, const Settings& settings) {
   Plan plan;
@@ -342,9 +359,18 @@ Plan begin(const System& system, const Settings& settings) {
   const Vec3 center = system.robot_center(start);
   LIMBER_CHECK(center.allFinite(), center.x(), center.y(), center.z());
   plan.tree.add(start, -1, Control{}, -1, center.cast<float>());
-  plan.best_distance_m = (center - settings.goal.center_of_mass_m).norm();
-  if (holds(settings.goal, center) && comes_to_rest(system, settings, start)) plan.goal_node = 0;
+  begin_leg(system.on_leg(0), settings_of_leg(settings, 0), plan);
   return plan;
+}
+
+// Where the next leg begins: the goal's node, or a node behind it in which the robot has come to rest.
+int reached(const System& system, const Settings& settings, Plan& plan) {
+  Course settle;
+  settle.from = plan.tree.states[std::size_t(plan.goal_node)];
+  run(system, settings, {&settle, 1}, {.ask_acceptable = false});
+  if (settle.settle_steps == 0) return plan.goal_node;
+  return plan.tree.add(settle.end, plan.goal_node, settle_control(settings, settle.settle_steps), -1,
+                       system.robot_center(settle.end).cast<float>());
 }
 
 void require_same_search(const System& system, const Settings& settings, const Plan& earlier) {
@@ -365,27 +391,49 @@ Plan plan(const System& system, const Settings& settings, std::optional<Plan> ea
   if (earlier) require_same_search(system, settings, *earlier);
   Plan plan = earlier ? std::move(*earlier) : begin(system, settings);
   plan.settings = settings;
-  Search(system, plan.settings, plan, watch).run();
-  plan.trajectory = trajectory_to(system, settings, plan.tree, plan.best_node, plan.solved());
-  return plan;
+  const Clock::time_point started = Clock::now();
+  while (true) {
+    const int leg = plan.leg();
+    const System& on_leg = system.on_leg(leg);
+    const Settings of_leg = settings_of_leg(settings, leg);
+    Search(on_leg, of_leg, plan, watch, started).run();
+    if (plan.solved() && leg < int(settings.via.size())) {
+      plan.legs.push_back({reached(on_leg, of_leg, plan), plan.statistics.iterations});
+      begin_leg(system.on_leg(leg + 1), settings_of_leg(settings, leg + 1), plan);
+      continue;
+    }
+    plan.trajectory = trajectory_to(on_leg, of_leg, plan.tree, plan.best_node, plan.solved());
+    return plan;
+  }
+}
+
+std::string name_of_goal(const Settings& settings, int leg) {
+  return leg < int(settings.via.size()) ? fmt::format("via {} of {}", leg + 1, settings.via.size())
+                                        : "the goal";
 }
 
 std::string explain(const Plan& plan) {
-  const Settings& s = plan.settings;
+  const Settings s = settings_of_leg(plan.settings, plan.leg());
   const Statistics& statistics = plan.statistics;
-  const std::string where =
-      fmt::format("node {} of {}, {:.3g} m from the goal (radius {:.3g} m)", plan.best_node, plan.tree.size(),
-                  plan.best_distance_m, s.goal.radius_m);
+  const std::string goal = name_of_goal(plan.settings, plan.leg());
+  const std::string where = fmt::format("node {} of {}, {:.3g} m from {} (radius {:.3g} m)", plan.best_node,
+                                        plan.tree.size(), plan.best_distance_m, goal, s.goal.radius_m);
   if (plan.solved())
-    return fmt::format("reached the goal after {} iterations: {}", statistics.iterations, where);
-  std::string text =
-      plan.best_distance_m <= s.goal.radius_m
-          ? fmt::format(
-                "the robot got into the goal, but did not come to rest there within {:g} s, or not as the "
-                "goal asks (turn, shape, above, below or clear of a body): ",
-                s.settle.max_duration_s) +
-                where + ". "
-          : "no node reached the goal; the nearest is " + where + ". ";
+    return fmt::format(
+        "reached {}{} after {} iterations: {}", goal,
+        s.via.empty() ? ""
+                      : fmt::format(" by way of {} via point{}", s.via.size(), s.via.size() == 1 ? "" : "s"),
+        statistics.iterations, where);
+  std::string text;
+  if (plan.leg() > 0)
+    text = fmt::format("{} of {} goals are reached; from there ", plan.leg(), s.via.size() + 1);
+  text += plan.best_distance_m <= s.goal.radius_m
+              ? fmt::format(
+                    "the robot got into {}, but did not come to rest there within {:g} s, or not as the "
+                    "goal asks (turn, shape, above, below or clear of a body): ",
+                    goal, s.settle.max_duration_s) +
+                    where + ". "
+              : fmt::format("no node reached {}; the nearest is {}. ", goal, where);
   switch (plan.ending) {
     case Ending::goal:
       break;

@@ -27,34 +27,47 @@ Json json_of(const Statistics&);
 
 enum class Ending { goal, iterations, time, stopped };
 
+// One goal of several: a search of its own, from the state in which the goal before was reached.
+struct Leg {
+  int root = 0;                      // node it starts from; those after it, up to the next root, are its own
+  std::int64_t first_iteration = 0;  // of all that the search counts
+};
+
 struct Plan {
   Settings settings;
   std::uint64_t system_hash = 0;
   Tree tree;
-  int goal_node = -1;          // in the goal, and comes to rest there; −1: none
-  int best_node = 0;           // nearest to the goal, the first of equals; goal_node when there is one
+  std::vector<Leg> legs = {Leg{}};  // as far as the search got
+  int goal_node = -1;               // in the last goal, and comes to rest there; −1: none
+  int best_node = 0;           // of the last leg the nearest to its goal, the first of equals, or goal_node
   double best_distance_m = 0;  // of its centre of mass from the goal's
   Ending ending = Ending::iterations;
   Statistics statistics;
   Trajectory trajectory;  // to best_node, and with a settle when that is goal_node
   bool solved() const { return goal_node >= 0; }
+  int leg() const { return int(legs.size()) - 1; }  // the last that began; its goal is the one sought
 };
 
 // Where a search stands after an iteration; times include those of an earlier plan that it goes on from.
 struct Moment {
   Statistics statistics;
+  int leg = 0;
   int nodes = 0;
-  double best_distance_m = 0;
+  double best_distance_m = 0;  // from the leg's goal
 };
 // Called after every iteration, in their order, by one thread at a time.
 using Watch = std::function<void(const Moment&)>;
 
-// Searches until a node lies in the goal and comes to rest there, or a limit ends it; SIGINT and SIGTERM
+// Searches until a node lies in the goal and comes to rest there (one goal after the other where there are
+// several), or a limit ends it; SIGINT and SIGTERM
 // (core/progress.h) end it too, and what was found is kept. Tree and trajectory depend on system and settings
 // alone; in_flight and threads are free. With `earlier` (the plan of a search that was cut short, of the same
 // system and settings save for limits) goes on from there, to the bytes that one uninterrupted search gives.
 // Throws InputError when settings are out of range or `earlier` is not of this system and these settings.
 Plan plan(const System&, const Settings&, std::optional<Plan> earlier = std::nullopt, const Watch& = {});
+
+// "via 1 of 2", or "the goal".
+std::string name_of_goal(const Settings&, int leg);
 
 // A sentence or two for the user: reached or not, how near, which limit ended it, what to try.
 std::string explain(const Plan&);

@@ -30,6 +30,36 @@ void validate_laws(const Laws& l) {
     throw InputError("planner: guidance needs a lag of at least 1; set lag, or guidance to 0");
 }
 
+void validate_goal(const Goal& goal, const std::string& name) {
+  if (!goal.center_of_mass_m.allFinite())
+    throw InputError(fmt::format("planner: {}'s center_of_mass_m is not finite", name));
+  require(std::isfinite(goal.radius_m) && goal.radius_m > 0, (name + "'s radius_m").c_str(), goal.radius_m,
+          "above 0");
+  if (goal.box_m && !holds(goal, goal.center_of_mass_m))
+    throw InputError(fmt::format("planner: {}'s center_of_mass_m is not in its box_m", name));
+}
+
+Json json_of(const Goal& goal) {
+  const auto list = [](const Vec3& v) { return Json{v.x(), v.y(), v.z()}; };
+  Json json{{"center_of_mass_m", list(goal.center_of_mass_m)}, {"radius_m", goal.radius_m}};
+  if (const auto& box = goal.box_m) json["box_m"] = {list(box->lower), list(box->upper)};
+  return json;
+}
+
+Goal goal_from_json(const Json& json) {
+  const auto read = [](const Json& list, Vec3& v) {
+    for (int axis = 0; axis < 3; ++axis) list.at(std::size_t(axis)).get_to(v[axis]);
+  };
+  Goal goal;
+  read(json.at("center_of_mass_m"), goal.center_of_mass_m);
+  json.at("radius_m").get_to(goal.radius_m);
+  if (json.contains("box_m")) {
+    Box& box = goal.box_m.emplace();
+    read(json.at("box_m").at(0), box.lower), read(json.at("box_m").at(1), box.upper);
+  }
+  return goal;
+}
+
 bool is_weight(double w) { return std::isfinite(w) && w >= 0; }
 
 void validate_weights(const Settings& s) {
@@ -55,14 +85,19 @@ bool holds(const Goal& goal, const Vec3& center) {
                     : (center - goal.center_of_mass_m).norm() <= goal.radius_m;
 }
 
+Settings settings_of_leg(const Settings& settings, int leg) {
+  Settings s = settings;
+  if (leg == int(s.via.size())) return s;
+  const Via& via = settings.via.at(std::size_t(leg));
+  s.goal = via.goal;
+  if (!via.rest) s.settle.max_duration_s = 0;
+  return s;
+}
+
 void validate(const Settings& s, const System& system) {
   require(s.max_iterations >= 0, "max_iterations", double(s.max_iterations), "at least 0");
-  if (!s.goal.center_of_mass_m.allFinite())
-    throw InputError("planner: the goal's center_of_mass_m is not finite");
-  require(std::isfinite(s.goal.radius_m) && s.goal.radius_m > 0, "the goal's radius_m", s.goal.radius_m,
-          "above 0");
-  if (s.goal.box_m && !holds(s.goal, s.goal.center_of_mass_m))
-    throw InputError("planner: the goal's center_of_mass_m is not in its box_m");
+  validate_goal(s.goal, "the goal");
+  for (std::size_t i = 0; i < s.via.size(); ++i) validate_goal(s.via[i].goal, fmt::format("via {}", i + 1));
   require_within(s.goal_bias, 0, 1, "goal_bias");
   validate_weights(s);
   require(std::isfinite(s.max_force_n) && s.max_force_n >= 0, "max_force_n", s.max_force_n, "at least 0");
@@ -82,14 +117,14 @@ void validate(const Settings& s, const System& system) {
 }
 
 Json json_of(const Settings& s) {
-  const Vec3& goal = s.goal.center_of_mass_m;
   Json json;
   json["seed"] = s.seed;
   json["max_iterations"] = s.max_iterations;
-  json["goal"] = {{"center_of_mass_m", {goal.x(), goal.y(), goal.z()}}, {"radius_m", s.goal.radius_m}};
-  if (const auto& box = s.goal.box_m)
-    json["goal"]["box_m"] = {{box->lower.x(), box->lower.y(), box->lower.z()},
-                             {box->upper.x(), box->upper.y(), box->upper.z()}};
+  json["goal"] = json_of(s.goal);
+  for (const Via& via : s.via) {
+    json["via"].push_back(json_of(via.goal));
+    json["via"].back()["rest"] = via.rest;
+  }
   json["goal_bias"] = s.goal_bias;
   json["weights"] = {{"body", s.weights.body},
                      {"control_point", s.weights.control_point},
@@ -125,16 +160,9 @@ Settings settings_from_json(const Json& json, const std::string& what) try {
   Settings s;
   json.at("seed").get_to(s.seed);
   json.at("max_iterations").get_to(s.max_iterations);
-  for (int axis = 0; axis < 3; ++axis)
-    json.at("goal").at("center_of_mass_m").at(std::size_t(axis)).get_to(s.goal.center_of_mass_m[axis]);
-  json.at("goal").at("radius_m").get_to(s.goal.radius_m);
-  if (const Json& goal = json.at("goal"); goal.contains("box_m")) {
-    Box& box = s.goal.box_m.emplace();
-    for (int axis = 0; axis < 3; ++axis) {
-      goal.at("box_m").at(0).at(std::size_t(axis)).get_to(box.lower[axis]);
-      goal.at("box_m").at(1).at(std::size_t(axis)).get_to(box.upper[axis]);
-    }
-  }
+  s.goal = goal_from_json(json.at("goal"));
+  if (json.contains("via"))
+    for (const Json& via : json.at("via")) s.via.push_back({goal_from_json(via), via.at("rest").get<bool>()});
   json.at("goal_bias").get_to(s.goal_bias);
   json.at("weights").at("body").get_to(s.weights.body);
   json.at("weights").at("control_point").get_to(s.weights.control_point);
@@ -164,6 +192,11 @@ Settings settings_from_json(const Json& json, const std::string& what) try {
   json.at("in_flight").get_to(s.in_flight);
   if (const Json& limit = json.at("time_limit_s"); !limit.is_null()) limit.get_to(s.time_limit_s);
   return s;
+} catch (const Json::out_of_range& lacking) {
+  throw InputError(fmt::format(
+      "{}: the plan was made by an older limber, whose planner had fewer settings ({}); plan anew "
+      "with limber plan, without --resume",
+      what, lacking.what()));
 } catch (const Json::exception& trouble) {
   throw InputError(fmt::format("{}: planner settings: {}", what, trouble.what()));
 }
@@ -171,9 +204,9 @@ Settings settings_from_json(const Json& json, const std::string& what) try {
 std::string first_difference(const Settings& a, const Settings& b) {
   const Json in_a = json_of(a), in_b = json_of(b);
   for (const char* key :
-       {"seed", "goal", "goal_bias", "weights", "max_force_n", "min_force_share", "max_force_share",
+       {"seed", "via", "goal", "goal_bias", "weights", "max_force_n", "min_force_share", "max_force_share",
         "min_duration_s", "max_duration_s", "control_point_radius_m", "settle", "laws"})
-    if (in_a.at(key) != in_b.at(key)) return key;
+    if (in_a.value(key, Json()) != in_b.value(key, Json())) return key;  // no goals on the way, no via
   return "";
 }
 

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <limits>
 #include <optional>
+#include <vector>
 
 #include "core/json.h"
 #include "plan/system.h"
@@ -27,6 +28,12 @@ struct Goal {
 };
 // `center`: the robot's, less the goal's shift. What else the system asks for is not looked at.
 bool holds(const Goal&, const Vec3& center);
+
+// A goal on the way to the last one.
+struct Via {
+  Goal goal;
+  bool rest = false;  // the robot comes to rest in it, as in the last, before it goes on
+};
 
 // At the end of a path that reached the goal, interpolation holds the robot there until it rests.
 struct Settle {
@@ -56,6 +63,7 @@ struct Laws {
 struct Settings {
   std::uint64_t seed = 1;
   std::int64_t max_iterations = 1000;  // in total, those of an earlier plan included
+  std::vector<Via> via;  // reached before `goal`, in this order; each begins a leg of the search
   Goal goal;
   double goal_bias = 0.1;  // share of expansions drawn towards the goal, in [0, 1]
   ManipulationWeights weights;
@@ -72,6 +80,9 @@ struct Settings {
   int in_flight = 0;  // expansions computed ahead; 0: chosen from the threads and the lanes
   double time_limit_s = std::numeric_limits<double>::infinity();  // wall
 };
+
+// Those of the search to the goal with this number: `goal` is via[leg]'s, or the last one.
+Settings settings_of_leg(const Settings&, int leg);
 
 // Throws InputError naming the setting, its value and its range.
 void validate(const Settings&, const System&);

@@ -25,8 +25,9 @@ struct Change {
 
 class Changes {
  public:
-  Changes(const System& system, const Settings& settings, CostKind cost, const Course& path)
-      : system_(system), settings_(settings), cost_(cost), path_(path) {}
+  Changes(const System& system, const Settings& settings, const ShortcutSettings& shortcuts,
+          const Course& path)
+      : system_(system), settings_(settings), cost_(shortcuts.cost), keep_(shortcuts.keep), path_(path) {}
 
   Change draw(int round, int number) const {
     Rng rng(settings_.seed, first_stream + std::uint64_t(round) * changes_a_round + std::uint64_t(number));
@@ -34,15 +35,16 @@ class Changes {
     Change c;
     // Haste costs nothing where only time counts.
     c.reach_force_n = cost_ == CostKind::duration ? largest : largest * rng.uniform(0.2, 1);
-    const int n = int(path_.controls.size());
+    const int n = int(path_.controls.size()), free = n - keep_;
     // The first round looks at every part of the path from where the goal might be reached directly.
-    const int cuts = std::min(n, changes_a_round);
+    const int cuts = std::min(free, changes_a_round);
+    c.first = keep_;
     if (round == 0 && number < cuts) {
-      c.first = number * n / cuts;
+      c.first = keep_ + number * free / cuts;
       return c;
     }
-    if (n == 0) return c;
-    const int i = rng.below(n), j = i + 1 + rng.below(n - i);  // a stretch [i, j)
+    if (free == 0) return c;
+    const int i = keep_ + rng.below(free), j = i + 1 + rng.below(n - i);  // a stretch [i, j)
     c.first = i;
     switch (rng.below(8)) {
       case 0:  // straight to the goal
@@ -151,6 +153,7 @@ class Changes {
   const System& system_;
   const Settings& settings_;
   CostKind cost_;
+  int keep_;
   const Course& path_;
 };
 
@@ -199,7 +202,7 @@ Course shortcut(const System& system, const Settings& settings, const ShortcutSe
   report.before = path.costs;
   Progress progress("shortcut", shortcuts.rounds);
   for (int& round = report.settings.rounds_done; round < shortcuts.rounds && stop_signal() == 0; ++round) {
-    const Changes changes(system, settings, shortcuts.cost, path);
+    const Changes changes(system, settings, shortcuts, path);
     const double now = cost_in(path.costs, shortcuts.cost);
     std::vector<Course> courses(changes_a_round);
     std::vector<int> first(courses.size());
@@ -234,18 +237,32 @@ Course shortcut(const System& system, const Settings& settings, const ShortcutSe
   return path;
 }
 
-void adopt(const System& system, Plan& plan, const Course& path) {
+std::vector<int> controls_before_legs(const Plan& plan) {
+  const std::vector<int> path = path_to(plan.tree, plan.best_node);
+  std::vector<int> counts;
+  for (const Leg& leg : plan.legs)
+    counts.push_back(int(std::find(path.begin(), path.end(), leg.root) - path.begin()));
+  return counts;
+}
+
+void adopt(const System& system, Plan& plan, const Course& path,
+           const std::vector<int>& controls_before_legs) {
   const std::vector<int> old = path_to(plan.tree, plan.best_node);
   LIMBER_CHECK(path.from == plan.tree.states[0] && path.states.size() == path.controls.size(),
                path.states.size(), path.controls.size());
+  LIMBER_CHECK(controls_before_legs.size() == plan.legs.size(), controls_before_legs.size());
   int node = 0;
   bool shared = true;
+  std::vector<int> nodes{node};
   for (std::size_t i = 0; i < path.controls.size(); ++i) {
     shared = shared && i + 1 < old.size() && plan.tree.controls[std::size_t(old[i + 1])] == path.controls[i];
     node = shared ? old[i + 1]
                   : plan.tree.add(path.states[i], node, path.controls[i], -1,
                                   system.robot_center(path.states[i]).cast<float>());
+    nodes.push_back(node);
   }
+  for (std::size_t leg = 0; leg < plan.legs.size(); ++leg)
+    plan.legs[leg].root = nodes.at(std::size_t(controls_before_legs[leg]));
   const State end = plan.tree.states[std::size_t(node)];
   const Vec3 center = system.robot_center(end) - system.goal_shift(end);
   plan.goal_node = plan.best_node = node;
@@ -258,10 +275,13 @@ ShortcutReport shorten(const System& system, Plan& plan, const ShortcutSettings&
   LIMBER_CHECK(plan.solved(), plan.best_node);
   std::vector<Control> controls = plan.trajectory.controls;
   if (plan.trajectory.settle_steps > 0) controls.pop_back();
+  const std::vector<int> before_legs = controls_before_legs(plan);
+  ShortcutSettings of_last_leg = shortcuts;
+  of_last_leg.keep = before_legs.back();
   ShortcutReport report;
   const Course path =
-      shortcut(system, plan.settings, shortcuts, path_of(system, plan.settings, controls), report);
-  if (report.accepted > 0) adopt(system, plan, path);
+      shortcut(system, plan.settings, of_last_leg, path_of(system, plan.settings, controls), report);
+  if (report.accepted > 0) adopt(system, plan, path, before_legs);
   return report;
 }
 

@@ -10,6 +10,7 @@ namespace limber::plan {
 struct ShortcutSettings {
   int rounds = 0;       // of sixteen changes each, side by side
   int rounds_done = 0;  // of an earlier call, from whose path this one goes on
+  int keep = 0;         // so many controls at the beginning stay as they are
   CostKind cost = CostKind::duration;
 };
 
@@ -30,12 +31,15 @@ Course path_of(const System&, const Settings&, const std::vector<Control>&);
 // number of threads. A signal (core/progress.h) ends it between rounds.
 Course shortcut(const System&, const Settings&, const ShortcutSettings&, Course path, ShortcutReport&);
 
-// The same for a solved plan: the new path becomes a branch of its tree (iteration −1), the new goal_node its
-// end. Nothing happens where there are no rounds to do.
+// The same for a solved plan, on the last of its legs: the new path becomes a branch of its tree (iteration
+// −1), the new goal_node its end. Nothing happens where there are no rounds to do.
 ShortcutReport shorten(const System&, Plan&, const ShortcutSettings&);
 
-// Makes a path from the tree's start that rests in the goal the plan's own; nodes that it shares with the
-// path to best_node are shared.
-void adopt(const System&, Plan&, const Course&);
+// How many controls of the path to best_node come before each leg.
+std::vector<int> controls_before_legs(const Plan&);
+
+// Makes a path from the tree's start that rests in the goal the plan's own, its legs beginning after so many
+// controls; nodes that it shares with the path to best_node are shared.
+void adopt(const System&, Plan&, const Course&, const std::vector<int>& controls_before_legs);
 
 }  // namespace limber::plan

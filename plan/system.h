@@ -25,6 +25,7 @@ struct Look {
   Vec3 center = Vec3::Zero(),
        velocity = Vec3::Zero();    // of the robot: centre of mass, metres, metres a second
   Vec3 goal_shift = Vec3::Zero();  // as System::goal_shift
+  bool lost = false;               // the goal cannot be reached any more, and the state is not acceptable
 };
 
 // Hands rollouts to whoever has a lane free.
@@ -87,6 +88,9 @@ class System {
   virtual bool goal_holds(const State&) const { return true; }
   // How far the goal has moved since the start: it may hang on a body that moves by itself. Metres.
   virtual Vec3 goal_shift(const State&) const { return Vec3::Zero(); }
+  // The same dynamics on the leg to the goal with this number (Settings::via, then the last): acceptable and
+  // what is named after the goal may answer otherwise.
+  virtual const System& on_leg(int) const { return *this; }
   virtual Measures measures(const State&) const { return {}; }
   virtual Vec3 goal_velocity(const State&) const { return Vec3::Zero(); }  // metres a second
   virtual Workspace workspace() const = 0;

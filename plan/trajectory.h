@@ -21,8 +21,8 @@ std::uint64_t hash_of(const Trajectory&);  // of its controls, frames and end
 // Applies the controls to the system's start. Where the dynamics diverge it stops, and the frames end there.
 Trajectory simulate(const System&, const std::vector<Control>&, double frames_per_second);
 
-// Whether the settle brings the robot to rest within its time, and with its centre of mass in the goal. True
-// where no settle is asked for (its duration is 0).
+// Whether the settle brings the robot to rest within its time, with its centre of mass in the goal and as the
+// goal asks. Where no settle is asked for (its duration is 0), whether it is as the goal asks.
 bool comes_to_rest(const System&, const Settings&, const State& in_goal);
 
 // The simulated path to a node; `settle` adds interpolation towards the goal until the robot rests or the

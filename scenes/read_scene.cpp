@@ -472,13 +472,14 @@ int body_called(const Node& node, const Scene& scene, const std::string& key) {
 
 // A body other than the robot, by its name.
 int other_body(const Node& node, const Scene& scene, const std::string& key) {
-  std::vector<std::string> names;
-  for (const BodySpec& body : scene.bodies) names.push_back(body.name);
-  const auto at = std::find(names.begin(), names.end(), as_text(node));
-  if (at == names.end() || at - names.begin() == scene.robot)
-    complain(node, fmt::format("{} is \"{}\"; it must be a body other than the robot: {}", key, as_text(node),
-                               fmt::join(names, ", ")));
-  return int(at - names.begin());
+  std::vector<std::string> others;
+  for (int b = 0; b < int(scene.bodies.size()); ++b) {
+    const std::string& name = scene.bodies[std::size_t(b)].name;
+    if (b != scene.robot && name == as_text(node)) return b;
+    if (b != scene.robot) others.push_back(name);
+  }
+  complain(node, fmt::format("{} is \"{}\"; it must be a body other than the robot{}{}", key, as_text(node),
+                             others.empty() ? ", and there is none" : ": ", fmt::join(others, ", ")));
 }
 
 Goal::Shape read_goal_shape(const Node& table) {
@@ -494,22 +495,15 @@ Goal::Shape read_goal_shape(const Node& table) {
   return shape;
 }
 
-// The body that takes the goal along; settling in a goal that moves has no meaning.
-int read_moving_goal(const Node& node, const Scene& scene, double settle_time_s) {
-  const int body = other_body(node, scene, "goal.moves_with");
-  if (settle_time_s > 0)
-    complain(node, "the robot cannot come to rest in a goal that moves; write planner.settle_time_s = 0");
-  return body;
-}
-
-Goal read_goal(const Node& root, const Scene& scene) {
-  const Node& table = child(root, "goal");
+// What all goals have, those on the way too; `name` is the table's.
+Goal read_any_goal(const Node& table, const Scene& scene, const std::string& name) {
   const Box& bounds = scene.bounds_m;
   Goal goal;
   goal.center_of_mass_m = vector(table, "center_of_mass_m");
   const std::optional<double> radius = maybe_number(table, "radius_m");
   if (radius.has_value() == (table.find("box_m") != nullptr))
-    complain(table, "the goal needs either radius_m or box_m; write for example radius_m = 0.5");
+    complain(table,
+             fmt::format("the {} needs either radius_m or box_m; write for example radius_m = 0.5", name));
   if (radius) goal.radius_m = *radius;
   if (table.find("box_m")) {
     goal.box_m = box(table, "box_m");
@@ -518,26 +512,51 @@ Goal read_goal(const Node& root, const Scene& scene) {
     goal.radius_m = reach.norm();
     if ((goal.center_of_mass_m.array() < goal.box_m->lower.array()).any() ||
         (goal.center_of_mass_m.array() > goal.box_m->upper.array()).any())
-      complain(child(table, "box_m"), "goal.center_of_mass_m is not in goal.box_m; move one of them");
+      complain(child(table, "box_m"),
+               fmt::format("{0}.center_of_mass_m is not in {0}.box_m; move one of them", name));
   }
-  for (const auto& [key, index] :
-       {std::pair("above", &goal.above), {"below", &goal.below}, {"clear_of", &goal.clear_of}})
-    if (const Node* body = table.find(key)) *index = other_body(*body, scene, fmt::format("goal.{}", key));
-  if (const Node* shape = table.find("shape")) goal.shape = read_goal_shape(*shape);
-  goal.lost_below_m = maybe_number(table, "lost_below_m");
-  if (const Node* body = table.find("moves_with"))
-    goal.moves_with = read_moving_goal(*body, scene, number(child(root, "planner"), "settle_time_s"));
-  else if (goal.lost_below_m)
-    complain(child(table, "lost_below_m"), "goal.lost_below_m goes with goal.moves_with only; remove it");
+  for (const auto& [key, index] : {std::pair("above", &goal.above),
+                                   {"below", &goal.below},
+                                   {"clear_of", &goal.clear_of},
+                                   {"moves_with", &goal.moves_with}})
+    if (const Node* body = table.find(key))
+      *index = other_body(*body, scene, fmt::format("{}.{}", name, key));
   for (int i = 0; i < 3; ++i)
     if (goal.center_of_mass_m[i] < bounds.lower[i] || goal.center_of_mass_m[i] > bounds.upper[i])
-      complain(
-          child(table, "center_of_mass_m"),
-          fmt::format(
-              "the goal is outside the bounds: {} = {} is not between {} and {}; move the goal or enlarge "
-              "world.bounds_m",
-              "xyz"[i], goal.center_of_mass_m[i], bounds.lower[i], bounds.upper[i]));
+      complain(child(table, "center_of_mass_m"),
+               fmt::format(
+                   "the {} is outside the bounds: {} = {} is not between {} and {}; move the {} or enlarge "
+                   "world.bounds_m",
+                   name, "xyz"[i], goal.center_of_mass_m[i], bounds.lower[i], bounds.upper[i], name));
   return goal;
+}
+
+Goal read_goal(const Node& root, const Scene& scene) {
+  const Node& table = child(root, "goal");
+  Goal goal = read_any_goal(table, scene, "goal");
+  if (const Node* shape = table.find("shape")) goal.shape = read_goal_shape(*shape);
+  goal.lost_below_m = maybe_number(table, "lost_below_m");
+  if (goal.lost_below_m && goal.moves_with < 0)
+    complain(child(table, "lost_below_m"), "goal.lost_below_m goes with goal.moves_with only; remove it");
+  if (goal.moves_with >= 0 && number(child(root, "planner"), "settle_time_s") > 0)
+    complain(child(table, "moves_with"),
+             "the robot cannot come to rest in a goal that moves; write planner.settle_time_s = 0");
+  return goal;
+}
+
+std::vector<Via> read_via(const Node& root, const Scene& scene) {
+  std::vector<Via> all;
+  for (const Node& table : list(root, "via")) {
+    const Via& via = all.emplace_back(Via{read_any_goal(table, scene, "via"), flag(table, "rest")});
+    if (!via.rest) continue;
+    if (via.goal.moves_with >= 0)
+      complain(child(table, "rest"), "the robot cannot come to rest in a via that moves; write rest = false");
+    if (number(child(root, "planner"), "settle_time_s") == 0)
+      complain(child(table, "rest"),
+               "planner.settle_time_s is 0, so the robot has no time to come to rest; raise it, or write "
+               "rest = false");
+  }
+  return all;
 }
 
 PlannerSpec read_planner(const Node& table) {
@@ -684,6 +703,7 @@ Scene read_scene(const std::string& toml, const std::string& name_for_messages,
   scene.gravity_m_s2 = vector(world, "gravity_m_s2");
   scene.max_dt_s = maybe_number(world, "max_dt_s");
   read_bodies(root, scene);
+  scene.via = read_via(root, scene);
   scene.goal = read_goal(root, scene);
   scene.planner = read_planner(child(root, "planner"));
   scene.cameras = read_cameras(root, scene);

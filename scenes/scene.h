@@ -130,6 +130,10 @@ struct Goal {
   std::optional<Shape> shape;
   int above = -1, below = -1, clear_of = -1;  // indices of bodies; −1: none
 };
+struct Via {
+  Goal goal;          // without lost_below_m and shape
+  bool rest = false;  // the robot comes to rest in it before it goes on
+};
 
 struct PlannerSpec {
   std::string preset;  // "paper" or "fast"; decides the defaults of the others
@@ -193,7 +197,8 @@ struct Scene {
   double rest_speed_m_s = 0;
   std::optional<double> max_dt_s;  // only ever lowers the automatic time step
   std::vector<BodySpec> bodies;
-  int robot = -1;  // index of the one body whose role is robot
+  int robot = -1;        // index of the one body whose role is robot
+  std::vector<Via> via;  // goals that are reached before the last, in this order
   Goal goal;
   PlannerSpec planner;
   std::vector<BodySpec> scenery;    // seen, but no part of the world; only names, models, poses and looks

@@ -317,7 +317,8 @@ constexpr Key all_keys[] = {
      {},
      0,
      required,
-     "reached when the robot's centre of mass is within radius_m",
+     "reached when the robot's centre of mass is within radius_m; of several goals in a row the last, those "
+     "before it are `[[via]]`",
      "",
      ""},
     {"goal.center_of_mass_m", Type::vector, any, 3, required, "m; within the bounds", "", ""},
@@ -374,6 +375,32 @@ constexpr Key all_keys[] = {
     {"goal.shape.tolerance_m", Type::number, positive, 0, may_lack,
      "m; how far a node may be from its place in that shape, the centres of mass laid on one another", "",
      ""},
+
+    {"via",
+     Type::tables,
+     {},
+     0,
+     "[]",
+     "one `[[via]]` for each goal that is reached before `goal`, in this order; the search to the next "
+     "begins "
+     "where the last one ended, all bodies as they are then",
+     "",
+     ""},
+    {"via[].center_of_mass_m", Type::vector, any, 3, required, "m; within the bounds", "", ""},
+    {"via[].radius_m", Type::number, positive, 0, may_lack, "m; this or box_m must be given", "", ""},
+    {"via[].box_m", Type::box, any, 0, may_lack, "m; instead of radius_m, as in goal", "", ""},
+    {"via[].rest",
+     Type::boolean,
+     {},
+     0,
+     "false",
+     "the robot comes to rest in it, as planner.settle_… say, before it goes on; else it may pass through",
+     "",
+     ""},
+    {"via[].moves_with", Type::text, {}, 0, may_lack, "as goal.moves_with; goes with rest = false", "", ""},
+    {"via[].above", Type::text, {}, 0, may_lack, "as goal.above, when it is reached", "", ""},
+    {"via[].below", Type::text, {}, 0, may_lack, "as goal.below", "", ""},
+    {"via[].clear_of", Type::text, {}, 0, may_lack, "as goal.clear_of", "", ""},
 
     {"planner", Type::table, {}, 0, required, "how the motion is searched", "", ""},
     {"planner.preset",
@@ -616,6 +643,9 @@ constexpr Key all_keys[] = {
 }
 
 [[noreturn]] void complain_of_type(const Key& key, const std::string& shown, const Node& node) {
+  if (key.path == "goal" && node.array())
+    complain(node.where,
+             "there is one goal, the last; write [goal], and [[via]] for each that comes before it");
   complain(node.where, fmt::format("{} must be {}, not {}; write for example {}", shown, key.expected(),
                                    node.type_name(), key.example()));
 }

@@ -8,6 +8,7 @@
 #include <sstream>
 
 #include "core/progress.h"
+#include "plan/plan_file.h"
 #include "tests/app/program.h"
 
 namespace limber::app {
@@ -218,6 +219,14 @@ TEST_F(Program, ChunksOfABenchmarkMergeToTheWholeAndARunIsWhatPlanPlans) {
   EXPECT_EQ(run.at("tree_hash"), planned.at("tree_hash"));
   EXPECT_EQ(run.at("trajectory_hash"), planned.at("trajectory_hash"));
   EXPECT_EQ(run.at("motion_s"), planned.at("motion_s"));
+
+  // The scene stores 5 frames a second: each is a place of the way.
+  const plan::PlanFile file = plan::read_plan(fs::path(out("plan")) / "plan.npz");
+  const Json& way = run.at("robot_path_m");
+  ASSERT_EQ(way.size(), file.plan.trajectory.frames.size());
+  EXPECT_EQ(way.front(), Json({0.6, 1.0, 1.3})) << "where the scene puts it";
+  for (int axis = 0; axis < 3; ++axis)
+    EXPECT_NEAR(way.back()[std::size_t(axis)].get<double>(), (Vec3(3.2, 1, 1))[axis], 0.3 + 1e-3);
 }
 
 TEST_F(Program, ABenchmarkStartedAgainRunsOnlyWhatIsMissing) {

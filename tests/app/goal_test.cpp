@@ -123,6 +123,89 @@ TEST(Goal, RolloutsThatDivergeOnTheirWayAreOnlyCounted) {
   EXPECT_GT(p.statistics.diverged, 10);
 }
 
+// Where no rest is asked for, what else the goal asks still counts.
+TEST(Goal, WithoutASettleTheGoalIsStillAsked) {
+  const fem::World world = fem::build_world(brick_over_slab());
+  plan::Settings s;
+  s.goal.center_of_mass_m = Vec3(0.3, 0.2, 1.1), s.goal.radius_m = 0.1;  // where it starts
+  s.max_iterations = 0, s.settle.max_duration_s = 0;
+  GoalRules above, below;
+  above.above = 1, below.below = 1;
+  EXPECT_TRUE(plan::plan(FemSystem(world, above), s).solved());
+  EXPECT_FALSE(plan::plan(FemSystem(world, below), s).solved());
+}
+
+// Goals in a row have rules of their own; the dynamics are the same.
+TEST(Goal, EachLegAsksWhatItsGoalAsks) {
+  const fem::World world = fem::build_world(brick_over_slab());
+  GoalRules above, above_then_below;
+  above.above = 1;
+  above_then_below.via = {above};
+  above_then_below.below = 1;
+  const FemSystem system(world, above_then_below), last_alone(world, [] {
+    GoalRules below;
+    below.below = 1;
+    return below;
+  }());
+  Points p = world.bodies[0].cage.positions;
+  const State high = with_robot_at(world, p);
+  p.col(2).array() -= 1.3;
+  const State low = with_robot_at(world, p);
+  EXPECT_TRUE(system.on_leg(0).goal_holds(high));
+  EXPECT_FALSE(system.on_leg(0).goal_holds(low));
+  EXPECT_FALSE(system.on_leg(1).goal_holds(high));
+  EXPECT_TRUE(system.on_leg(1).goal_holds(low));
+  EXPECT_EQ(&system.on_leg(1), &system);
+  EXPECT_NE(system.hash(), last_alone.hash()) << "other goals on the way are another search";
+}
+
+// A block falls onto the floor and bounces back: who looks only at the end of a push does not see that the
+// goal was lost on the way.
+TEST(Goal, ALookSeesThatTheGoalIsLost) {
+  fem::WorldSpec spec =
+      alone({"robot", grid({0, 0, 3}, {0.6, 0.4, 0.2}, 3, 2, 1), {}, {}, fem::BodyKind::deformable});
+  fem::Material springy;
+  springy.damping_ratio = 0;
+  spec.bodies.push_back(
+      {"block", grid({2, 2, 0.5}, {1, 1, 1}, 2, 2, 2), springy, {}, fem::BodyKind::deformable});
+  spec.bounds_m = {Vec3(-4, -4, 0), Vec3(8, 8, 8)}, spec.walls = true;
+  spec.gravity_m_s2 = Vec3(0, 0, -1);
+  const fem::World world = fem::build_world(spec);
+  const auto lowest = [&](const State& s) { return fem::body_positions(world, s, 1).col(2).minCoeff(); };
+
+  // Step by step: it lands, and rises again.
+  const FemSystem free(world);
+  const int piece = plan::steps_of(0.01, free.dt_s());
+  State state = free.start();
+  const auto propagator = free.make_propagator();
+  double least = lowest(state);
+  while (lowest(state) < least + 0.1) {
+    plan::Rollout rollout{&state, {}, {}, false};
+    rollout.control.steps = piece;
+    propagator->propagate({&rollout, 1});
+    ASSERT_TRUE(rollout.ok);
+    ASSERT_LT(rollout.to.step, 5000 * piece) << "it does not bounce";
+    const State next = rollout.to;
+    state = next;
+    least = std::min(least, lowest(state));
+  }
+  GoalRules rules;
+  rules.body = 1, rules.lost_below_m = least + 0.05;
+  const FemSystem system(world, rules);
+  ASSERT_TRUE(system.acceptable(state)) << "after the bounce";
+
+  plan::Settings s;
+  s.goal.center_of_mass_m = Vec3(0.3, 0.2, 7), s.goal.radius_m = 0.01;
+  s.max_force_n = 1, s.max_iterations = 3, s.settle.max_duration_s = 0;
+  s.min_duration_s = s.max_duration_s = double(state.step) * system.dt_s();
+  s.laws.look_s = 0.02;
+  const plan::Plan p = plan::plan(system, s);
+  EXPECT_EQ(p.statistics.rejected, 3);
+  EXPECT_EQ(p.tree.size(), 1);
+  EXPECT_LT(p.statistics.rollout_steps, 3 * state.step)
+      << "it goes no further than it can be seen to be lost";
+}
+
 TEST(Goal, AShapeOfAnotherCageIsRefused) {
   fem::WorldSpec spec = brick_over_slab();
   spec.goal_shape_m = Points::Zero(3, 3);

@@ -90,7 +90,7 @@ TEST_P(InterruptedScene, CutAtThreePointsGoesOnToTheSameBytes) {
 
 INSTANTIATE_TEST_SUITE_P(Scenes, InterruptedScene,
                          ::testing::Values("barriers1", "barriers2", "windows", "falling_objects",
-                                           "body_parts"),
+                                           "body_parts", "there_and_back"),
                          [](const auto& scene) { return std::string(scene.param); });
 
 // The signal comes when the file of --stats shows so many iterations, wherever the process is then. Too weak

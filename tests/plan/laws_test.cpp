@@ -52,7 +52,7 @@ Tree lagged_tree(const System& system, const Settings& s, std::int64_t iteration
   const Guidance guidance(system.workspace(), s.goal.center_of_mass_m, s.laws.soft_price);
   const auto propagator = system.make_propagator();
   for (std::int64_t i = 0; i < iterations; ++i) {
-    Chooser chooser(system, s, s.laws.guidance > 0 ? &guidance : nullptr);
+    Chooser chooser(system, s, s.laws.guidance > 0 ? &guidance : nullptr, 0);
     for (int node = 0; node < all.size(); ++node)
       if (node == 0 || all.iterations[std::size_t(node)] < i - s.laws.lag) chooser.add(all, node);
     const Aim aim = chooser.choose(draw(s, system, i));

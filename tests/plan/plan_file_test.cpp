@@ -189,6 +189,24 @@ TEST_F(PlanFileTest, AFileOfTheFormerFormatIsStillRead) {
   expect_same(read_plan(file("former.npz")).plan, p);
 }
 
+// Settings that came later lack in files of older builds: the complaint says what the user can do.
+TEST_F(PlanFileTest, APlanOfAnOlderPlannerIsToBeMadeAnew) {
+  write_plan(file(), plan(Toy(), toy_settings()), {});
+  Npz npz = read_npz(file());
+  Json meta = parse_json(npz.text("meta.json"), "meta.json");
+  meta["settings"]["laws"].erase("hold");
+  npz.texts["meta.json"] = meta.dump();
+  write_npz(file("older.npz"), npz);
+  try {
+    read_plan(file("older.npz"));
+    FAIL();
+  } catch (const InputError& error) {
+    const std::string text = error.what();
+    for (const char* part : {"older.npz", "made by an older limber", "'hold'", "plan anew"})
+      EXPECT_NE(text.find(part), std::string::npos) << text;
+  }
+}
+
 TEST_F(PlanFileTest, AParentThatComesLaterIsAnInputError) {
   Plan p = plan(Toy(), toy_settings());
   const std::vector<int> path = path_to(p.tree, p.best_node);

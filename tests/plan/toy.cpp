@@ -72,6 +72,7 @@ class ToyPropagator final : public Propagator {
 }  // namespace
 
 State Toy::start() const {
+  if (begins_at) return *begins_at;
   State s{0, std::vector<float>(std::size_t(3 * nodes)), std::vector<float>(std::size_t(3 * nodes))};
   for (int i = 0; i < nodes; ++i) put(s.positions, i, Vec3f(1, 1.5f, 1) + rest_place(i));
   return s;
@@ -176,12 +177,12 @@ Settings toy_settings() {
   return s;
 }
 
-Tree sequential_tree(const System& system, const Settings& settings) {
+Tree sequential_tree(const System& system, const Settings& settings, std::int64_t first_iteration) {
   const auto propagator = system.make_propagator();
   Tree tree;
   const State start = system.start();
   tree.add(start, -1, Control{}, -1, system.robot_center(start).cast<float>());
-  for (std::int64_t i = 0; i < settings.max_iterations; ++i) {
+  for (std::int64_t i = first_iteration; i < settings.max_iterations; ++i) {
     const Draw d = draw(settings, system, i);
     const auto shift = [&](int node) { return system.goal_shift(tree.states[std::size_t(node)]); };
     const auto distance2 = [&](int node) {

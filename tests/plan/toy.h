@@ -4,6 +4,7 @@
 
 #include <atomic>
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -19,6 +20,7 @@ struct Toy final : System {
   bool lava = false;                // a rollout through y < 0.5 diverges
   float unacceptable_above_z = 99;  // no node may be there
   Vec3 goal_velocity_m_s = Vec3::Zero();
+  std::optional<State> begins_at;  // else at rest at (1, 1.5, 1)
   int lanes_wanted = 1;
   bool jitter = false;                        // threads finish in a scrambled order
   std::function<void()> before_each_rollout;  // called by the propagators
@@ -54,6 +56,6 @@ struct Toy final : System {
 Settings toy_settings();
 
 // The planner as the paper prints it: one expansion after the other, no speculation. The tree it grows.
-Tree sequential_tree(const System&, const Settings&);
+Tree sequential_tree(const System&, const Settings&, std::int64_t first_iteration = 0);
 
 }  // namespace limber::plan::testing

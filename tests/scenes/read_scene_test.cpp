@@ -249,7 +249,23 @@ TEST(ReadScene, ComplainsWithLineAndColumn) {
        "either radius_m or box_m"},
       {"radius_m = 0.25\n", "box_m = [[8, 1, 1], [8.9, 2, 2]]\n", "[[8, 1", "is not in goal.box_m"},
       {"radius_m = 0.25\n", "radius_m = 0.25\nabove = \"gat\"\n", "\"gat\"",
-       "a body other than the robot: robot, gate"},
+       "must be a body other than the robot: gate"},
+      {"[goal]", "[[goal]]", "[[goal]]", "write [goal], and [[via]] for each that comes before it"},
+      {"[goal]", "[[via]]\nradius_m = 1\n[goal]", "[[via]]", "lacks \"center_of_mass_m\""},
+      {"[goal]", "[[via]]\ncenter_of_mass_m = [4, 1, 1]\n[goal]", "[[via]]",
+       "the via needs either radius_m or box_m"},
+      {"[goal]", "[[via]]\ncenter_of_mass_m = [4, 1, 9]\nradius_m = 1\n[goal]", "[4, 1, 9]",
+       "the via is outside the bounds: z = 9"},
+      {"[goal]", "[[via]]\ncenter_of_mass_m = [4, 1, 1]\nradius_m = 1\nabove = \"robot\"\n[goal]",
+       "\"robot\"\n[goal]", "via.above is \"robot\"; it must be a body other than the robot: gate"},
+      {"[goal]",
+       "[[via]]\ncenter_of_mass_m = [4, 1, 1]\nradius_m = 1\nmoves_with = \"gate\"\nrest = true\n[goal]",
+       "true\n[goal]", "cannot come to rest in a via that moves"},
+      {"[planner]",
+       "[[via]]\ncenter_of_mass_m = [4, 1, 1]\nradius_m = 1\nrest = true\n[planner]\nsettle_time_s = 0",
+       "true\n[planner]", "no time to come to rest"},
+      {"[goal]", "[[via]]\ncenter_of_mass_m = [4, 1, 1]\nradius_m = 1\nlost_below_m = 1\n[goal]",
+       "lost_below_m", "unknown key"},
       {"radius_m = 0.25\n", "radius_m = 0.25\nshape = { angle_deg = 90 }\n", "{ angle_deg",
        "without a tolerance"},
       {"[goal]\ncenter_of_mass_m = [9, 1.5, 1.5]\nradius_m = 0.25\n", "", "name", "add [goal]"},
@@ -404,6 +420,12 @@ std::string another_value(const Key& key) {
       {"bodies[].model.up", "\"+y\""},
       {"bodies[].model.front", "\"-y\""},
       {"goal.moves_with", "\"gate\""},
+      {"via[].center_of_mass_m", "[8, 1, 1]"},
+      {"via[].moves_with", "\"gate\""},
+      {"via[].above", "\"gate\""},
+      {"via[].below", "\"gate\""},
+      {"via[].clear_of", "\"gate\""},
+      {"via[].box_m", "[[6, 1, 1], [7, 2, 2]]"},
       {"goal.above", "\"gate\""},
       {"goal.below", "\"gate\""},
       {"goal.clear_of", "\"gate\""},
@@ -476,6 +498,9 @@ TEST(Keys, EveryKeyChangesTheScene) {
     if (key.path == "planner.stop_in_goal" || key.path == "planner.end_hopeless")
       sets = {"planner.look_s=0.2"};
     if (key.path == "goal.moves_with") sets = {"planner.settle_time_s=0"};
+    if (key.parent() == "via[]") sets = {"via=[{ center_of_mass_m = [6.5, 1.5, 1.5], radius_m = 0.5 }]"};
+    if (key.path == "via[].box_m")
+      sets = {"via=[{ center_of_mass_m = [6.5, 1.5, 1.5], box_m = [[6, 1, 1], [7, 2, 2.5]] }]"};
     if (key.path == "goal.box_m")
       sets = {"goal={ center_of_mass_m = [9, 1.5, 1.5], box_m = [[8, 1, 1], [9.5, 2, 2]] }"};
     if (key.parent() == "goal.shape") sets = {"goal.shape.tolerance_m=0.25"};
@@ -489,6 +514,7 @@ TEST(Keys, EveryKeyChangesTheScene) {
     const std::string body = plate || fixed || key.path == "bodies[].kind" || key.path == "bodies[].role"
                                  ? "bodies.gate"
                                  : "bodies.robot";
+    if (path.starts_with("via[]")) path = replaced(path, "via[]", "via.0");
     if (path.starts_with("bodies[]")) path = replaced(path, "bodies[]", body);
     if (fixed && path.ends_with(".box_m")) path = replaced(path, "[]", ".1");
     if (path.find("parts[]") != path.npos) path = replaced(path, "parts[]", "parts.0");
@@ -585,6 +611,10 @@ std::string all_of(const Scene& s) {
                    s.goal.moves_with, s.goal.lost_below_m.value_or(-1));
   t += fmt::format("{} {} {} {}\n", s.goal.above, s.goal.below, s.goal.clear_of,
                    s.goal.box_m ? s.goal.box_m->lower.x() : 0);
+  for (const Via& via : s.via)
+    t += fmt::format("{} {} {} {} {} {} {} {}\n", v(via.goal.center_of_mass_m), via.goal.radius_m,
+                     via.goal.moves_with, via.goal.above, via.goal.below, via.goal.clear_of, via.rest,
+                     via.goal.box_m ? via.goal.box_m->lower.x() : 0);
   if (const auto& shape = s.goal.shape)
     t += fmt::format("{} {} {} {} {} {}\n", v(shape->axis), shape->angle_deg, v(shape->stretch), shape->cage,
                      shape->turn_tolerance_deg.value_or(-1), shape->tolerance_m.value_or(-1));
