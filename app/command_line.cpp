@@ -283,6 +283,29 @@ int run_command_line(int argc, const char* const* argv) {
   add_global(render_command, global), add_threads(render_command, global);
   render_command.callback([&] { chosen = [&] { return render(render_options); }; });
 
+  ExportOptions export_options;
+  CLI::App& export_command =
+      *program.add_subcommand("export", "path → files for viewers, Blender, USD programs and ParaView");
+  export_command.add_option("DIR", export_options.folder, "work folder with a plan")->required();
+  export_command
+      .add_option(
+          "--format", export_options.formats,
+          "any of gltf (motion.glb), pc2 (pc2/: OBJ and point caches for Blender), usd (motion.usda), "
+          "vtu (vtu/: cages and surfaces for ParaView)")
+      ->required()
+      ->type_name("FORMAT[,FORMAT…]")
+      ->delimiter(',')
+      ->check(CLI::IsMember(motion_formats))
+      ->allow_extra_args(false);
+  export_command
+      .add_option("-o,--out", export_options.out, "folder for them; default: export in the work folder")
+      ->type_name("DIR");
+  export_command.add_option(
+      "--frames", export_options.frames,
+      "frames to export: 0-300:2; beyond the last is left out with a warning; default: all");
+  add_global(export_command, global);
+  export_command.callback([&] { chosen = [&] { return export_motion(export_options); }; });
+
   CLI::App& run_command =
       *program.add_subcommand("run", "all of it: prepare, plan, render; what is up to date is skipped");
   add_scene(run_command, plan_options.scene), add_plan(run_command, plan_options),

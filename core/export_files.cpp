@@ -1,5 +1,7 @@
 #include "core/export_files.h"
 
+#include <zlib.h>
+
 #include <algorithm>
 #include <map>
 
@@ -18,33 +20,95 @@ void append_line(std::string& text, const Numbers&... numbers) {
 }
 
 constexpr const char* vtk_type(const std::vector<int>&) { return "Int32"; }
-constexpr const char* vtk_type(const std::vector<std::int64_t>&) { return "Int64"; }
 constexpr const char* vtk_type(const std::vector<std::uint8_t>&) { return "UInt8"; }
+constexpr const char* vtk_type(const std::vector<float>&) { return "Float32"; }
 constexpr const char* vtk_type(const std::vector<double>&) { return "Float64"; }
 
-template <class T>
-void append_data_array(std::string& xml, const std::string& name, const std::vector<T>& values,
-                       int components) {
-  fmt::format_to(std::back_inserter(xml), "<DataArray type=\"{}\" Name=\"{}\"{} format=\"ascii\">\n",
-                 vtk_type(values), name,
-                 components == 1 ? "" : fmt::format(" NumberOfComponents=\"{}\"", components));
-  for (std::size_t i = 0; i < values.size(); ++i)
-    fmt::format_to(std::back_inserter(xml), "{}{}", values[i],
-                   (i + 1) % std::size_t(components) ? ' ' : '\n');
-  xml += "</DataArray>\n";
-}
+// A .vtu in the making. Its numbers go into the XML as text, or behind it as bytes.
+class VtuFile {
+ public:
+  explicit VtuFile(bool binary) : binary_(binary) {}
 
-void append_data(std::string& xml, const char* kind, const std::vector<VtuData>& data, Eigen::Index count) {
-  fmt::format_to(std::back_inserter(xml), "<{}>\n", kind);
-  for (const VtuData& d : data)
-    std::visit(
-        [&](const auto& values) {
-          LIMBER_CHECK(values.size() == std::size_t(count) * std::size_t(d.components), d.name, values.size(),
-                       count);
-          append_data_array(xml, d.name, values, d.components);
-        },
-        d.values);
-  fmt::format_to(std::back_inserter(xml), "</{}>\n", kind);
+  template <class... Arguments>
+  void xml(fmt::format_string<Arguments...> form, Arguments&&... arguments) {
+    fmt::format_to(std::back_inserter(xml_), form, std::forward<Arguments>(arguments)...);
+  }
+  template <class T>
+  void array(const std::string& name, const std::vector<T>& values, int components) {
+    xml("<DataArray type=\"{}\" Name=\"{}\"{} ", vtk_type(values), name,
+        components == 1 ? "" : fmt::format(" NumberOfComponents=\"{}\"", components));
+    if (binary_) {
+      xml("format=\"appended\" offset=\"{}\"/>\n", bytes_.size());
+      append_compressed({reinterpret_cast<const char*>(values.data()), values.size() * sizeof(T)});
+      return;
+    }
+    xml("format=\"ascii\">\n");
+    for (std::size_t i = 0; i < values.size(); ++i)
+      xml("{}{}", values[i], (i + 1) % std::size_t(components) ? ' ' : '\n');
+    xml("</DataArray>\n");
+  }
+  void data(const char* kind, const std::vector<VtuData>& data, Eigen::Index count) {
+    xml("<{}>\n", kind);
+    for (const VtuData& d : data)
+      std::visit(
+          [&](const auto& values) {
+            LIMBER_CHECK(values.size() == std::size_t(count) * std::size_t(d.components), d.name,
+                         values.size(), count);
+            array(d.name, values, d.components);
+          },
+          d.values);
+    xml("</{}>\n", kind);
+  }
+  std::string content() const {
+    return xml_ + (binary_ ? "<AppendedData encoding=\"raw\">\n_" + bytes_ + "\n</AppendedData>\n" : "") +
+           "</VTKFile>\n";
+  }
+
+ private:
+  // As one block: how many there are, its size, that of a last incomplete one, its size compressed.
+  void append_compressed(std::string_view values) {
+    uLongf size = compressBound(values.size());
+    std::string compressed(size, '\0');
+    const int status = compress2(reinterpret_cast<Bytef*>(compressed.data()), &size,
+                                 reinterpret_cast<const Bytef*>(values.data()), values.size(), Z_BEST_SPEED);
+    LIMBER_CHECK(status == Z_OK, status);
+    const std::uint64_t head[] = {1, values.size(), 0, size};
+    bytes_.append(reinterpret_cast<const char*>(head), sizeof head).append(compressed, 0, size);
+  }
+
+  bool binary_;
+  std::string xml_, bytes_;
+};
+
+std::string vtu_content(bool binary, const Points& points, const Eigen::Ref<const Cells>& cells,
+                        const std::vector<VtuData>& point_data, const std::vector<VtuData>& cell_data) {
+  const Eigen::Index corners = cells.cols(), count = cells.rows();
+  LIMBER_CHECK(corners == 3 || corners == 4, corners);
+  VtuFile file(binary);
+  file.xml(
+      "<?xml version=\"1.0\"?>\n"
+      "<VTKFile type=\"UnstructuredGrid\" version=\"1.0\" byte_order=\"LittleEndian\"{}>\n"
+      "<UnstructuredGrid>\n<Piece NumberOfPoints=\"{}\" NumberOfCells=\"{}\">\n",
+      binary ? " header_type=\"UInt64\" compressor=\"vtkZLibDataCompressor\"" : "", points.rows(), count);
+  file.data("PointData", point_data, points.rows());
+  file.data("CellData", cell_data, count);
+  file.xml("<Points>\n");
+  if (binary)
+    file.array("Points", std::vector<float>(points.data(), points.data() + points.size()), 3);
+  else
+    file.array("Points", std::vector<double>(points.data(), points.data() + points.size()), 3);
+  file.xml("</Points>\n<Cells>\n");
+  std::vector<int> connectivity, offsets;
+  for (Eigen::Index c = 0; c < count; ++c) {
+    for (Eigen::Index k = 0; k < corners; ++k) connectivity.push_back(cells(c, k));
+    offsets.push_back(int(corners * (c + 1)));
+  }
+  constexpr std::uint8_t vtk_triangle = 5, vtk_tetra = 10;
+  file.array("connectivity", connectivity, 1);  // VTK refuses it in rows of `corners`
+  file.array("offsets", offsets, 1);
+  file.array("types", std::vector(std::size_t(count), corners == 3 ? vtk_triangle : vtk_tetra), 1);
+  file.xml("</Cells>\n</Piece>\n</UnstructuredGrid>\n");
+  return file.content();
 }
 
 void check_label(const TetMesh& mesh, const std::vector<int>& label) {
@@ -56,29 +120,25 @@ void check_label(const TetMesh& mesh, const std::vector<int>& label) {
 
 void write_vtu(const fs::path& path, const Points& points, const Eigen::Ref<const Cells>& cells,
                const std::vector<VtuData>& point_data, const std::vector<VtuData>& cell_data) {
-  const Eigen::Index corners = cells.cols(), count = cells.rows();
-  LIMBER_CHECK(corners == 3 || corners == 4, corners);
-  std::string xml = fmt::format(
-      "<?xml version=\"1.0\"?>\n"
-      "<VTKFile type=\"UnstructuredGrid\" version=\"1.0\" byte_order=\"LittleEndian\">\n"
-      "<UnstructuredGrid>\n<Piece NumberOfPoints=\"{}\" NumberOfCells=\"{}\">\n",
-      points.rows(), count);
-  append_data(xml, "PointData", point_data, points.rows());
-  append_data(xml, "CellData", cell_data, count);
-  xml += "<Points>\n";
-  append_data_array(xml, "Points", std::vector<double>(points.data(), points.data() + points.size()), 3);
-  xml += "</Points>\n<Cells>\n";
-  std::vector<std::int64_t> connectivity, offsets;
-  for (Eigen::Index c = 0; c < count; ++c) {
-    for (Eigen::Index k = 0; k < corners; ++k) connectivity.push_back(cells(c, k));
-    offsets.push_back(corners * (c + 1));
-  }
-  constexpr std::uint8_t vtk_triangle = 5, vtk_tetra = 10;
-  append_data_array(xml, "connectivity", connectivity, 1);  // VTK refuses it in rows of `corners`
-  append_data_array(xml, "offsets", offsets, 1);
-  append_data_array(xml, "types", std::vector(std::size_t(count), corners == 3 ? vtk_triangle : vtk_tetra),
-                    1);
-  write_file(path, xml + "</Cells>\n</Piece>\n</UnstructuredGrid>\n</VTKFile>\n");
+  write_file(path, vtu_content(false, points, cells, point_data, cell_data));
+}
+
+std::uintmax_t write_binary_vtu(const fs::path& path, const Points& points,
+                                const Eigen::Ref<const Cells>& cells, const std::vector<VtuData>& point_data,
+                                const std::vector<VtuData>& cell_data) {
+  const std::string content = vtu_content(true, points, cells, point_data, cell_data);
+  write_file(path, content);
+  return content.size();
+}
+
+void write_pvd(const fs::path& path, const std::vector<PvdEntry>& entries) {
+  std::string xml =
+      "<?xml version=\"1.0\"?>\n<VTKFile type=\"Collection\" version=\"0.1\" "
+      "byte_order=\"LittleEndian\">\n<Collection>\n";
+  for (const PvdEntry& entry : entries)
+    fmt::format_to(std::back_inserter(xml), "<DataSet timestep=\"{}\" file=\"{}\"/>\n", entry.time_s,
+                   entry.file);
+  write_file(path, xml + "</Collection>\n</VTKFile>\n");
 }
 
 void write_node_ele(const fs::path& node_file, const TetMesh& mesh, const std::vector<int>& label) {

@@ -1,5 +1,6 @@
-// Mesh files for other programs. limber writes them and never reads them: each number has the digits that
-// bring back the same double. Which program reads what: docs/files.md. Each throws DiskError (core/file.h).
+// Mesh files for other programs. limber writes them and never reads them; in those of text each number
+// has the digits that bring back the same double. Which program reads what: docs/files.md. Each throws
+// DiskError (core/file.h).
 #pragma once
 
 #include <string>
@@ -14,7 +15,7 @@ namespace limber {
 // An array of ParaView's: `components` numbers for each point or cell, one after the other.
 struct VtuData {
   std::string name;  // letters, digits and _
-  std::variant<std::vector<int>, std::vector<double>> values;
+  std::variant<std::vector<int>, std::vector<float>, std::vector<double>> values;
   int components = 1;
 };
 
@@ -23,6 +24,19 @@ using Cells = Eigen::Matrix<int, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor
 // VTK's XML of an unstructured grid, ASCII. cells: (n × 3) triangles or (n × 4) tets.
 void write_vtu(const fs::path&, const Points&, const Eigen::Ref<const Cells>& cells,
                const std::vector<VtuData>& point_data, const std::vector<VtuData>& cell_data);
+
+// The same with its arrays compressed behind the XML, and points as float32: a fifth of the size, for series.
+// Returns the bytes written.
+std::uintmax_t write_binary_vtu(const fs::path&, const Points&, const Eigen::Ref<const Cells>& cells,
+                                const std::vector<VtuData>& point_data,
+                                const std::vector<VtuData>& cell_data);
+
+// ParaView's list of a series: each file as it is named from the list's own folder, with its time.
+struct PvdEntry {
+  double time_s;
+  std::string file;
+};
+void write_pvd(const fs::path&, const std::vector<PvdEntry>&);
 
 // TetGen's pair, numbered from 0: `node_file` and, beside it, the same name with .ele. `label` (per tet, may
 // be empty) is the attribute of each tet.

@@ -71,18 +71,34 @@ std::string read_file(const fs::path& path) {
 }
 
 void write_file(const fs::path& path, std::string_view content) {
-  PendingFile pending(path);
-  {
-    const Descriptor fd(::open(pending.temporary().c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644));
-    if (fd < 0) throw_disk_error(path, "creating it");
-    while (!content.empty()) {
-      const ssize_t written = ::write(fd, content.data(), content.size());
-      if (written < 0 && errno == EINTR) continue;
-      if (written < 0) throw_disk_error(path, "writing it");
-      content.remove_prefix(std::size_t(written));
-    }
+  FileWriter writer(path);
+  writer.append(content);
+  writer.commit();
+}
+
+FileWriter::FileWriter(const fs::path& path) : path_(path), pending_(path) {
+  descriptor_ = ::open(pending_.temporary().c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
+  if (descriptor_ < 0) throw_disk_error(path, "creating it");
+}
+
+FileWriter::~FileWriter() {
+  if (descriptor_ >= 0) ::close(descriptor_);
+}
+
+void FileWriter::append(std::string_view content) {
+  while (!content.empty()) {
+    const ssize_t written = ::write(descriptor_, content.data(), content.size());
+    if (written < 0 && errno == EINTR) continue;
+    if (written < 0) throw_disk_error(path_, "writing it");
+    content.remove_prefix(std::size_t(written));
+    size_ += std::uintmax_t(written);
   }
-  pending.commit();
+}
+
+void FileWriter::commit() {
+  ::close(descriptor_);
+  descriptor_ = -1;
+  pending_.commit();
 }
 
 PendingFile::PendingFile(fs::path final_path)

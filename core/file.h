@@ -2,6 +2,7 @@
 // file.
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <string>
 #include <string_view>
@@ -29,6 +30,25 @@ class PendingFile {
  private:
   fs::path final_, temporary_;
   bool committed_ = false;
+};
+
+// A file too large to be held whole: written piece by piece, and nothing of it is seen before commit(). Both
+// throw DiskError.
+class FileWriter {
+ public:
+  explicit FileWriter(const fs::path&);
+  ~FileWriter();
+  FileWriter(const FileWriter&) = delete;
+  FileWriter& operator=(const FileWriter&) = delete;
+  void append(std::string_view);
+  void commit();
+  std::uintmax_t size() const { return size_; }  // bytes so far
+
+ private:
+  fs::path path_;
+  PendingFile pending_;
+  int descriptor_;
+  std::uintmax_t size_ = 0;
 };
 
 // Makes the folder and its parents; throws DiskError naming the one that failed, also when it is a file or

@@ -2,7 +2,9 @@
 #include "core/export_files.h"
 
 #include <gtest/gtest.h>
+#include <zlib.h>
 
+#include <cstring>
 #include <map>
 #include <sstream>
 
@@ -97,6 +99,41 @@ TEST(ExportFiles, VtuHoldsTriangles) {
   EXPECT_EQ(numbers<int>(vtu.text["connectivity"]),
             std::vector<int>(boundary.data(), boundary.data() + boundary.size()));
   EXPECT_EQ(numbers<int>(vtu.text["types"]), std::vector<int>(std::size_t(boundary.rows()), 5));
+}
+
+// Of an array in the bytes behind the XML: a head of four numbers, then one compressed block.
+template <class T>
+std::vector<T> appended(const std::string& file, const std::string& name) {
+  const std::size_t tag = file.find("Name=\"" + name + "\""), offset = file.find("offset=\"", tag);
+  const std::string mark = "<AppendedData encoding=\"raw\">\n_";
+  const char* at = file.data() + file.find(mark) + mark.size() + std::stoul(file.substr(offset + 8));
+  std::uint64_t head[4];
+  std::memcpy(head, at, sizeof head);
+  EXPECT_EQ(head[0], 1);
+  EXPECT_EQ(head[2], 0);
+  std::vector<T> values(head[1] / sizeof(T));
+  uLongf size = head[1];
+  EXPECT_EQ(uncompress(reinterpret_cast<Bytef*>(values.data()), &size,
+                       reinterpret_cast<const Bytef*>(at + sizeof head), head[3]),
+            Z_OK);
+  EXPECT_EQ(size, head[1]);
+  return values;
+}
+
+TEST(ExportFiles, BinaryVtuHoldsTheSameAsFloats) {
+  const TemporaryFolder folder;
+  const TetMesh mesh = two_tets();
+  const std::vector<float> speeds{1, 2, 3, 4, 0.1f};
+  const std::uintmax_t bytes = write_binary_vtu(folder / "a.vtu", mesh.positions, mesh.tets,
+                                                {{"speed", speeds}}, {{"body", std::vector<int>{7, -1}}});
+  const std::string file = read_file(folder / "a.vtu");
+  EXPECT_EQ(bytes, file.size());
+  EXPECT_EQ(appended<float>(file, "Points"),
+            std::vector<float>(mesh.positions.data(), mesh.positions.data() + mesh.positions.size()));
+  EXPECT_EQ(appended<float>(file, "speed"), speeds);
+  EXPECT_EQ(appended<int>(file, "body"), (std::vector{7, -1}));
+  EXPECT_EQ(appended<int>(file, "connectivity"), (std::vector{0, 1, 2, 3, 0, 2, 1, 4}));
+  EXPECT_EQ(appended<std::uint8_t>(file, "types"), (std::vector<std::uint8_t>{10, 10}));
 }
 
 TEST(ExportFiles, NodeAndEleCountFromZero) {

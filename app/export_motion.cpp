@@ -1,0 +1,71 @@
+#include <algorithm>
+
+#include "app/commands.h"
+#include "app/frame_list.h"
+#include "app/manifest.h"
+#include "app/motion_files.h"
+#include "app/plan_folder.h"
+#include "app/scene_world.h"
+#include "core/hash.h"
+#include "core/log.h"
+#include "fem/observe.h"
+
+namespace limber::app {
+
+namespace {
+
+// The one that may refuse the frames comes first.
+constexpr std::pair<const char*, WrittenFiles (*)(const PlannedMotion&, const fs::path&)> writers[] = {
+    {"pc2", write_point_caches}, {"gltf", write_gltf}, {"usd", write_usd}, {"vtu", write_vtu_series}};
+
+}  // namespace
+
+Points surface_at(const PlannedMotion& motion, int body, int frame) {
+  const PreparedBody& prepared = motion.bodies[std::size_t(body)];
+  if (!motion.world.bodies[std::size_t(body)].moving) return prepared.surface.positions;
+  Points surface;
+  ffd::deform(prepared.binding, prepared.cage.tets,
+              fem::body_positions(motion.world, motion.frames[std::size_t(frame)], body), surface);
+  return surface;
+}
+
+Outcome export_motion(const ExportOptions& options) {
+  const PlanFolder planned = read_plan_folder(options.folder);
+  const std::vector<PreparedBody> bodies = read_bodies_of(planned, options.folder);
+  const fem::World world = build_world(planned.scene, bodies);
+  const plan::Trajectory& path = planned.plan.trajectory;
+  const int count = int(path.frames.size());
+  int left_out = 0;
+  const PlannedMotion motion{planned.scene,
+                             bodies,
+                             world,
+                             path.frames,
+                             path.frames_per_second,
+                             parse_frames(options.frames, count, &left_out)};
+  if (left_out > 0)
+    log::warn("--frames {}: {} frames beyond the last, {}, are left out", options.frames, left_out,
+              count - 1);
+  const fs::path out = options.out.value_or(options.folder / "export");
+  make_folder(out);
+
+  Json formats;
+  std::string text;
+  for (const auto& [format, write] : writers) {
+    if (std::find(options.formats.begin(), options.formats.end(), format) == options.formats.end()) continue;
+    const WrittenFiles written = write(motion, out);
+    formats[format] = {{"open", written.open.string()}, {"files", written.files}, {"bytes", written.bytes}};
+    text += fmt::format("  {:4}  {} ({}{:.2f} MB)\n", format, written.open.string(),
+                        written.files > 1 ? fmt::format("{} files, ", written.files) : "",
+                        1e-6 * double(written.bytes));
+  }
+  const Json result{{"frames", motion.wanted.size()},
+                    {"frame_list", motion.wanted},
+                    {"trajectory_hash", hex(plan::hash_of(path))},
+                    {"folder", out.string()},
+                    {"formats", formats}};
+  update_manifest(options.folder, "export", result);
+  return {exit_done, result,
+          fmt::format("{} of {} frames, {} bodies\n{}", motion.wanted.size(), count, bodies.size(), text)};
+}
+
+}  // namespace limber::app

@@ -1,0 +1,318 @@
+#include <Eigen/SVD>
+#include <algorithm>
+#include <limits>
+
+#include "app/motion_files.h"
+#include "core/error.h"
+#include "core/json.h"
+#include "core/log.h"
+#include "core/progress.h"
+#include "core/version.h"
+#include "fem/observe.h"
+#include "render/image.h"
+#include "render/renderer.h"
+
+namespace limber::app {
+
+namespace {
+
+// Ours, z up, to glTF's, y up.
+Points y_up(const Points& p) {
+  Points turned(p.rows(), 3);
+  turned << p.col(0), p.col(2), -p.col(1);
+  return turned;
+}
+
+struct Pose {  // x ↦ turn · x + shift
+  Eigen::Quaterniond turn = Eigen::Quaterniond::Identity();
+  Vec3 shift = Vec3::Zero();
+};
+
+// Brings `from` as near to `to` as it can (Kabsch, Acta Crystallographica A32, 1976). The turn is rounded to
+// the float32 that will be stored.
+Pose best_fit(const Points& from, const Points& to) {
+  const Vec3 from_middle = from.colwise().mean(), to_middle = to.colwise().mean();
+  const Eigen::Matrix3d covariance =
+      (from.rowwise() - from_middle.transpose()).transpose() * (to.rowwise() - to_middle.transpose());
+  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(covariance, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  const bool mirrors = (svd.matrixV() * svd.matrixU().transpose()).determinant() < 0;
+  const Eigen::Matrix3d turn =
+      svd.matrixV() * Vec3(1, 1, mirrors ? -1 : 1).asDiagonal() * svd.matrixU().transpose();
+  Pose pose;
+  pose.turn = Eigen::Quaterniond(Eigen::Quaterniond(turn).cast<float>()).normalized();
+  pose.shift = to_middle - pose.turn * from_middle;
+  return pose;
+}
+
+std::vector<float> floats_of(const auto& rows) { return {rows.data(), rows.data() + rows.size()}; }
+
+// The document, and the bytes that it speaks of.
+class Gltf {
+ public:
+  enum Target { none = 0, vertex_attributes = 34962, vertex_indices = 34963 };
+
+  Json document{{"asset", {{"version", "2.0"}, {"generator", fmt::format("limber {}", version)}}}};
+
+  // Appends to a list of the document; returns the place.
+  int add(const std::string& list, Json entry) {
+    document[list].push_back(std::move(entry));
+    return int(document[list].size()) - 1;
+  }
+
+  // Accessors that follow share this view.
+  void begin_view(Target target) {
+    view_begin_ = bytes_.size();
+    Json view{{"buffer", 0}, {"byteOffset", view_begin_}, {"byteLength", 0}};
+    if (target != none) view["target"] = int(target);
+    add("bufferViews", view);
+  }
+  // `components` numbers an element: 1, 3, 4 or 16.
+  template <class T>
+  int accessor(const std::vector<T>& values, int components, bool with_bounds = false) {
+    constexpr int type_of_number = std::is_same_v<T, float>           ? 5126
+                                   : std::is_same_v<T, std::uint32_t> ? 5125
+                                                                      : 5123;  // of unsigned 16 bit
+    Json entry{{"bufferView", document.at("bufferViews").size() - 1},
+               {"byteOffset", bytes_.size() - view_begin_},
+               {"componentType", type_of_number},
+               {"count", values.size() / std::size_t(components)},
+               {"type", components == 1   ? "SCALAR"
+                        : components == 3 ? "VEC3"
+                        : components == 4 ? "VEC4"
+                                          : "MAT4"}};
+    if (with_bounds)
+      for (int c = 0; c < components; ++c) {
+        double low = values[std::size_t(c)], high = low;
+        for (std::size_t i = std::size_t(c); i < values.size(); i += std::size_t(components))
+          low = std::min(low, double(values[i])), high = std::max(high, double(values[i]));
+        entry["min"].push_back(low), entry["max"].push_back(high);
+      }
+    bytes_.append(reinterpret_cast<const char*>(values.data()), values.size() * sizeof(T));
+    document["bufferViews"].back()["byteLength"] = bytes_.size() - view_begin_;
+    return add("accessors", std::move(entry));
+  }
+  template <class T>
+  int accessor_alone(const std::vector<T>& values, int components, Target target, bool with_bounds = false) {
+    begin_view(target);
+    return accessor(values, components, with_bounds);
+  }
+
+  std::string binary() {
+    document["buffers"] = {{{"byteLength", bytes_.size()}}};
+    std::string json = document.dump();
+    json.resize((json.size() + 3) / 4 * 4, ' ');
+    const std::uint64_t size = 12 + 8 + json.size() + 8 + bytes_.size();
+    if (size > std::numeric_limits<std::uint32_t>::max())
+      throw InputError(
+          fmt::format("the motion makes {:.1f} GB of glTF, but a .glb file holds 4; choose fewer --frames",
+                      1e-9 * double(size)));
+    std::string file = "glTF";
+    const auto number = [&](std::uint64_t n) {
+      const auto narrow = std::uint32_t(n);
+      file.append(reinterpret_cast<const char*>(&narrow), sizeof narrow);
+    };
+    number(2), number(size);
+    number(json.size()), file += "JSON" + json;
+    number(bytes_.size()), file += std::string("BIN\0", 4) + bytes_;
+    return file;
+  }
+
+ private:
+  std::string
+      bytes_;  // of whole float32 and of 16 bit in fours, so that every view begins at a multiple of 4
+  std::size_t view_begin_ = 0;
+};
+
+class Writer {
+ public:
+  explicit Writer(const PlannedMotion& motion) : motion_(motion) {
+    std::vector<float> times;
+    for (const int f : motion.wanted)
+      times.push_back(float(motion.time_s(f) - motion.time_s(motion.wanted.front())));
+    times_ = gltf_.accessor_alone(times, 1, Gltf::none, true);
+    animation_ = {{"name", motion.scene.name}, {"channels", Json::array()}, {"samplers", Json::array()}};
+  }
+
+  void add(int b) {
+    const fem::Body& body = motion_.world.bodies[std::size_t(b)];
+    const Json node{{"name", body.name}, {"mesh", mesh(b)}};
+    if (!body.moving) {
+      add_root(node);
+      return;
+    }
+    const Points rest = y_up(body.cage.positions);
+    std::vector<Points> cages;
+    for (const int f : motion_.wanted) {
+      throw_if_stopped();
+      cages.push_back(y_up(fem::body_positions(motion_.world, motion_.frames[std::size_t(f)], b)));
+    }
+    std::vector<Pose> poses;
+    for (const Points& cage : cages) poses.push_back(best_fit(rest, cage));
+    for (std::size_t f = 1; f < poses.size(); ++f)  // the short way from one to the next
+      if (poses[f].turn.dot(poses[f - 1].turn) < 0) poses[f].turn.coeffs() *= -1;
+    if (body.kind == fem::BodyKind::rigid)
+      animate(add_root(node), poses);
+    else
+      add_skin(add_root(node), body.name, rest, cages, poses);
+  }
+
+  std::string binary() {
+    gltf_.document["scene"] = 0;
+    gltf_.document["scenes"] = {{{"name", motion_.scene.name}, {"nodes", roots_}}};
+    if (!animation_.at("channels").empty()) gltf_.add("animations", animation_);
+    return gltf_.binary();
+  }
+
+ private:
+  int add_root(const Json& node) {
+    roots_.push_back(gltf_.add("nodes", node));
+    return roots_.back();
+  }
+
+  int mesh(int b) {
+    const PreparedBody& prepared = motion_.bodies[std::size_t(b)];
+    const scenes::BodySpec& spec = motion_.scene.bodies[std::size_t(b)];
+    const SurfaceMesh& surface = prepared.surface;
+    const Vec3 color = render::linear_from_srgb(spec.color_srgb);
+    const render::MeshLook look;
+    const int material = gltf_.add("materials", {{"name", spec.name},
+                                                 {"doubleSided", true},
+                                                 {"pbrMetallicRoughness",
+                                                  {{"baseColorFactor", {color.x(), color.y(), color.z(), 1}},
+                                                   {"metallicFactor", look.metallic},
+                                                   {"roughnessFactor", look.roughness}}}});
+    Points normals = vertex_normals(surface.positions, surface.triangles);
+    for (Eigen::Index v = 0; v < normals.rows(); ++v)
+      if (normals.row(v).isZero()) normals.row(v) << 0, 0, 1;  // glTF wants unit vectors
+    Json attributes{{"POSITION", gltf_.accessor_alone(floats_of(y_up(surface.positions)), 3,
+                                                      Gltf::vertex_attributes, true)},
+                    {"NORMAL", gltf_.accessor_alone(floats_of(y_up(normals)), 3, Gltf::vertex_attributes)}};
+    if (motion_.world.bodies[std::size_t(b)].moving &&
+        motion_.world.bodies[std::size_t(b)].kind == fem::BodyKind::deformable)
+      add_weights(b, attributes);
+    const std::vector<std::uint32_t> corners(surface.triangles.data(),
+                                             surface.triangles.data() + surface.triangles.size());
+    return gltf_.add("meshes", {{"name", spec.name},
+                                {"primitives",
+                                 {{{"attributes", attributes},
+                                   {"indices", gltf_.accessor_alone(corners, 1, Gltf::vertex_indices)},
+                                   {"material", material}}}}});
+  }
+
+  void add_weights(int b, Json& attributes) {
+    const PreparedBody& prepared = motion_.bodies[std::size_t(b)];
+    const ffd::Binding& binding = prepared.binding;
+    const std::string& name = motion_.scene.bodies[std::size_t(b)].name;
+    const Eigen::Index nodes = prepared.cage.positions.rows(),
+                       most = std::numeric_limits<std::uint16_t>::max();
+    if (nodes > most)
+      throw InputError(
+          fmt::format("bodies.{}: its cage has {} nodes, but a skin of glTF has at most {} joints; prepare a "
+                      "coarser cage",
+                      name, nodes, most));
+    std::vector<std::uint16_t> joints;
+    std::vector<float> weights;
+    for (Eigen::Index v = 0; v < binding.weights.rows(); ++v) {
+      Eigen::RowVector4d w = binding.weights.row(v).cwiseMax(0);
+      w /= w.sum();
+      for (int k = 0; k < 4; ++k) {
+        weights.push_back(float(w[k]));
+        // A weight of 0 belongs to joint 0, says the format.
+        joints.push_back(
+            weights.back() == 0 ? 0 : std::uint16_t(prepared.cage.tets(binding.tet_from_vertex[v], k)));
+      }
+    }
+    attributes["JOINTS_0"] = gltf_.accessor_alone(joints, 4, Gltf::vertex_attributes);
+    attributes["WEIGHTS_0"] = gltf_.accessor_alone(weights, 4, Gltf::vertex_attributes);
+    if ((binding.weights.array() < 0).any()) warn_of_error(b);
+  }
+
+  void warn_of_error(int b) const {
+    const PreparedBody& prepared = motion_.bodies[std::size_t(b)];
+    const Weights kept = prepared.binding.weights.cwiseMax(0);
+    double farthest = 0;
+    for (const int f : motion_.wanted) {
+      const Points cage = fem::body_positions(motion_.world, motion_.frames[std::size_t(f)], b);
+      for (Eigen::Index v = 0; v < kept.rows(); ++v) {
+        if (prepared.binding.weights.row(v).minCoeff() >= 0) continue;
+        Vec3 error = Vec3::Zero();
+        for (int k = 0; k < 4; ++k) {
+          const int node = prepared.cage.tets(prepared.binding.tet_from_vertex[v], k);
+          error += (kept(v, k) / kept.row(v).sum() - prepared.binding.weights(v, k)) *
+                   (cage.row(node) - prepared.cage.positions.row(node)).transpose();
+        }
+        farthest = std::max(farthest, error.norm());
+      }
+    }
+    if (farthest < 1e-6 * motion_.world.bounds_m.diagonal()) return;  // float32 is no finer
+    log::warn(
+        "bodies.{}: vertices outside its cage have negative weights, which glTF does not know; in motion.glb "
+        "they are up to {:.3g} m from where limber shows them",
+        motion_.scene.bodies[std::size_t(b)].name, farthest);
+  }
+
+  // A joint for the body as a whole, which turns normals with it, and below it one for each node of the cage.
+  void add_skin(int mesh_node, const std::string& name, const Points& rest, const std::vector<Points>& cages,
+                const std::vector<Pose>& poses) {
+    const Eigen::Index count = rest.rows();
+    std::vector<int> joints;
+    for (Eigen::Index n = 0; n < count; ++n)
+      joints.push_back(gltf_.add("nodes", {{"translation", {rest(n, 0), rest(n, 1), rest(n, 2)}}}));
+    const int root = add_root({{"name", name + ".cage"}, {"children", joints}});
+    animate(root, poses);
+
+    gltf_.begin_view(Gltf::none);
+    for (Eigen::Index n = 0; n < count; ++n) {
+      std::vector<float> places;
+      for (std::size_t f = 0; f < cages.size(); ++f) {
+        const Vec3 place = poses[f].turn.conjugate() * (cages[f].row(n).transpose() - poses[f].shift);
+        for (int k = 0; k < 3; ++k) places.push_back(float(place[k]));
+      }
+      animate(joints[std::size_t(n)], "translation", gltf_.accessor(places, 3));
+    }
+    std::vector<float> inverse_bind;
+    for (Eigen::Index n = 0; n < count; ++n) {
+      Eigen::Matrix4f m = Eigen::Matrix4f::Identity();
+      m.topRightCorner<3, 1>() = -rest.row(n).transpose().cast<float>();
+      inverse_bind.insert(inverse_bind.end(), m.data(), m.data() + 16);
+    }
+    gltf_.document["nodes"][std::size_t(mesh_node)]["skin"] =
+        gltf_.add("skins", {{"skeleton", root},
+                            {"joints", joints},
+                            {"inverseBindMatrices", gltf_.accessor_alone(inverse_bind, 16, Gltf::none)}});
+  }
+
+  void animate(int node, const std::vector<Pose>& poses) {
+    std::vector<float> turns, shifts;
+    for (const Pose& pose : poses) {
+      for (int k = 0; k < 4; ++k) turns.push_back(float(pose.turn.coeffs()[k]));  // x y z w, as glTF
+      for (int k = 0; k < 3; ++k) shifts.push_back(float(pose.shift[k]));
+    }
+    animate(node, "rotation", gltf_.accessor_alone(turns, 4, Gltf::none));
+    animate(node, "translation", gltf_.accessor_alone(shifts, 3, Gltf::none));
+  }
+  void animate(int node, const char* path, int values) {
+    Json& samplers = animation_["samplers"];
+    animation_["channels"].push_back(
+        {{"sampler", samplers.size()}, {"target", {{"node", node}, {"path", path}}}});
+    samplers.push_back({{"input", times_}, {"interpolation", "LINEAR"}, {"output", values}});
+  }
+
+  const PlannedMotion& motion_;
+  Gltf gltf_;
+  int times_;
+  Json animation_;
+  std::vector<int> roots_;
+};
+
+}  // namespace
+
+WrittenFiles write_gltf(const PlannedMotion& motion, const fs::path& folder) {
+  Writer writer(motion);
+  for (int b = 0; b < int(motion.bodies.size()); ++b) writer.add(b);
+  const std::string content = writer.binary();
+  write_file(folder / "motion.glb", content);
+  return {folder / "motion.glb", 1, content.size()};
+}
+
+}  // namespace limber::app

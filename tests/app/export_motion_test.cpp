@@ -1,0 +1,229 @@
+// A planned motion as other programs read it: here by assimp and by a few lines that know the format; by VTK,
+// Khronos' validator, TinyUSDZ, three.js and Blender in tools/check_exports, where they are installed.
+#include <assimp/scene.h>
+#include <signal.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+
+#include <assimp/Importer.hpp>
+#include <cstdlib>
+#include <cstring>
+#include <map>
+
+#include "app/plan_folder.h"
+#include "app/scene_world.h"
+#include "fem/observe.h"
+#include "tests/app/program.h"
+
+namespace limber::app {
+namespace {
+
+// Beside the robot and the soft block: a rigid body that falls, and one that stands.
+std::string scene_with_rigid_bodies() {
+  std::string text = small_scene;
+  const std::string without = "gravity_m_s2 = [0, 0, 0]";
+  text.replace(text.find(without), without.size(), "gravity_m_s2 = [0, 0, -1]");
+  const std::string goal = "[goal]\n";
+  return text.insert(text.find(goal), R"([[bodies]]
+name = "2nd-stone"
+role = "free"
+kind = "rigid"
+model = { box = { size_m = [0.3, 0.2, 0.2] } }
+cage = { cells = [1, 1, 1] }
+material = { density_kg_m3 = 200 }
+pose = { position_m = [1.1, 0.3, 1.6], axis = [1, 2, 3], angle_deg = 40 }
+[[bodies]]
+name = "table"
+role = "obstacle"
+kind = "rigid"
+model = { box = { size_m = [0.4, 0.4, 0.9] } }
+cage = { cells = [1, 1, 1] }
+pose = { position_m = [1.2, 0.5, 0.45] }
+)");
+}
+
+class ExportMotion : public Program {
+ protected:
+  void SetUp() override {
+    // Far from the goal will do, as long as things move.
+    const Result planned =
+        limber_program({"plan", scene(scene_with_rigid_bodies()), "-o", out(), "--iterations", "60"});
+    ASSERT_TRUE(planned.code == exit_done || planned.code == exit_no_plan) << planned.err;
+  }
+  Result exported(const std::string& formats, std::vector<std::string> more = {}) const {
+    std::vector<std::string> words{"export", out(), "--format", formats, "--json"};
+    words.insert(words.end(), more.begin(), more.end());
+    return limber_program(words);
+  }
+  fs::path file(const std::string& name) const { return fs::path(out()) / "export" / name; }
+};
+
+// What the files must show, from plan.npz and the bodies.
+struct Truth {
+  explicit Truth(const fs::path& work_folder)
+      : planned(read_plan_folder(work_folder)),
+        bodies(read_bodies_of(planned, work_folder)),
+        world(build_world(planned.scene, bodies)) {}
+  Points surface(int b, int frame) const {
+    const PreparedBody& body = bodies[std::size_t(b)];
+    if (!world.bodies[std::size_t(b)].moving) return body.surface.positions;
+    Points p;
+    ffd::deform(body.binding, body.cage.tets,
+                fem::body_positions(world, planned.plan.trajectory.frames[std::size_t(frame)], b), p);
+    return p;
+  }
+  PlanFolder planned;
+  std::vector<PreparedBody> bodies;
+  fem::World world;
+};
+
+aiMatrix4x4 local_at(const aiNode& node, const aiAnimation& animation, unsigned key) {
+  for (unsigned c = 0; c < animation.mNumChannels; ++c) {
+    const aiNodeAnim& channel = *animation.mChannels[c];
+    if (channel.mNodeName != node.mName) continue;
+    const auto at = [&](const auto* keys, unsigned count) { return keys[std::min(key, count - 1)].mValue; };
+    return aiMatrix4x4(at(channel.mScalingKeys, channel.mNumScalingKeys),
+                       at(channel.mRotationKeys, channel.mNumRotationKeys),
+                       at(channel.mPositionKeys, channel.mNumPositionKeys));
+  }
+  return node.mTransformation;
+}
+
+aiMatrix4x4 world_at(const aiNode* node, const aiAnimation& animation, unsigned key) {
+  aiMatrix4x4 m;
+  for (; node; node = node->mParent) m = local_at(*node, animation, key) * m;
+  return m;
+}
+
+// Every vertex of every key, skinned as the format says, is where the binding puts it; glTF has y up.
+TEST_F(ExportMotion, GltfBySkinningIsTheBindingAtEveryFrame) {
+  ASSERT_EQ(exported("gltf").code, exit_done);
+  const Truth truth(out());
+  Assimp::Importer importer;
+  const aiScene* scene = importer.ReadFile(file("motion.glb").string(), 0);
+  ASSERT_TRUE(scene) << importer.GetErrorString();
+  ASSERT_EQ(scene->mNumAnimations, 1);
+  ASSERT_EQ(scene->mNumMeshes, truth.bodies.size());
+  const aiAnimation& animation = *scene->mAnimations[0];
+  const int frames = int(truth.planned.plan.trajectory.frames.size());
+  ASSERT_GT(frames, 5);
+  EXPECT_NEAR(animation.mDuration / animation.mTicksPerSecond, (frames - 1) / 5.0, 1e-6);
+  double traveled = 0;
+  for (std::size_t b = 0; b < truth.bodies.size(); ++b) {
+    const std::string& name = truth.planned.scene.bodies[b].name;
+    SCOPED_TRACE(name);
+    const aiMesh& mesh = *scene->mMeshes[b];
+    const aiNode* node = scene->mRootNode->FindNode(name.c_str());
+    ASSERT_TRUE(node);
+    EXPECT_EQ(mesh.HasBones(), truth.world.bodies[b].kind == fem::BodyKind::deformable);
+    for (int f = 0; f < frames; f += 3) {
+      const Points wanted = truth.surface(int(b), f);
+      ASSERT_EQ(mesh.mNumVertices, wanted.rows());
+      std::vector<aiVector3D> shown(mesh.mNumVertices);
+      if (!mesh.HasBones()) {
+        const aiMatrix4x4 world = world_at(node, animation, unsigned(f));
+        for (unsigned v = 0; v < mesh.mNumVertices; ++v) shown[v] = world * mesh.mVertices[v];
+      }
+      for (unsigned i = 0; i < mesh.mNumBones; ++i) {
+        const aiBone& bone = *mesh.mBones[i];
+        const aiMatrix4x4 skin =
+            world_at(scene->mRootNode->FindNode(bone.mName), animation, unsigned(f)) * bone.mOffsetMatrix;
+        for (unsigned w = 0; w < bone.mNumWeights; ++w) {
+          const unsigned v = bone.mWeights[w].mVertexId;
+          shown[v] += bone.mWeights[w].mWeight * (skin * mesh.mVertices[v]);
+        }
+      }
+      double worst = 0;
+      for (unsigned v = 0; v < mesh.mNumVertices; ++v)
+        worst =
+            std::max(worst, (Vec3(shown[v].x, -shown[v].z, shown[v].y) - wanted.row(v).transpose()).norm());
+      EXPECT_LT(worst, 5e-6) << "frame " << f;
+      traveled = std::max(traveled, (wanted - truth.surface(int(b), 0)).rowwise().norm().maxCoeff());
+    }
+  }
+  EXPECT_GT(traveled, 0.3);
+}
+
+TEST_F(ExportMotion, PointCacheIsAHeadAndThePointsOfEachFrame) {
+  ASSERT_EQ(exported("pc2", {"--frames", "2-10:4"}).code, exit_done);
+  const Truth truth(out());
+  const std::string cache = read_file(file("pc2/2nd-stone.pc2"));
+  const Points first = truth.surface(2, 2), last = truth.surface(2, 10);
+  ASSERT_EQ(cache.size(), 32 + 3 * 12 * std::size_t(first.rows()));
+  EXPECT_EQ(cache.substr(0, 12), std::string("POINTCACHE2\0", 12));
+  const auto number = [&]<class T>(std::size_t at, T) {
+    T value;
+    std::memcpy(&value, cache.data() + at, sizeof value);
+    return value;
+  };
+  EXPECT_EQ(number(12, 0), 1);
+  EXPECT_EQ(number(16, 0), first.rows());
+  EXPECT_EQ(number(24, 0.0f), 1.0f);
+  EXPECT_EQ(number(28, 0), 3);
+  for (int k = 0; k < 3; ++k) {
+    EXPECT_EQ(number(32 + 4 * std::size_t(k), 0.0f), float(first(0, k)));
+    EXPECT_EQ(number(cache.size() - 12 + 4 * std::size_t(k), 0.0f), float(last(last.rows() - 1, k)));
+  }
+  EXPECT_FALSE(fs::exists(file("pc2/table.pc2"))) << "it stands still";
+  EXPECT_TRUE(fs::exists(file("pc2/table.obj")));
+  EXPECT_NE(read_file(file("pc2/README.txt")).find("1.25 frames a second"), std::string::npos);
+}
+
+TEST_F(ExportMotion, SameMotionSameBytesAndAnEarlierSeriesGoes) {
+  ASSERT_EQ(exported("gltf,pc2,usd,vtu", {"--frames", "0-8:4"}).code, exit_done);
+  const auto first = contents(file(""));
+  ASSERT_EQ(exported("gltf,pc2,usd,vtu").code, exit_done);
+  EXPECT_TRUE(fs::exists(file("vtu/cages/0003.vtu")));
+  const Result again = exported("gltf,pc2,usd,vtu", {"--frames", "0-8:4"});
+  EXPECT_TRUE(contents(file("")) == first);
+  std::uintmax_t bytes = 0;
+  const Json formats = again.json().at("formats");
+  for (const auto& [format, written] : formats.items()) bytes += written.at("bytes").get<std::uintmax_t>();
+  std::uintmax_t there = 0;
+  for (const auto& [name, content] : first) there += content.size();
+  EXPECT_EQ(bytes, there);
+  EXPECT_EQ(formats.at("vtu").at("files"), 2 * 3 + 2);
+}
+
+TEST_F(ExportMotion, WrongInputIsToldAndNothingHalfWritten) {
+  EXPECT_EQ(limber_program({"export", out(), "--format", "fbx"}).code, exit_bad_input);
+  EXPECT_EQ(limber_program({"export", out()}).code, exit_bad_input);
+  const Result unplanned = limber_program({"export", out("none"), "--format", "gltf"});
+  EXPECT_EQ(unplanned.code, exit_bad_input);
+  EXPECT_NE(unplanned.err.find("limber plan"), std::string::npos) << unplanned.err;
+  const Result uneven = exported("pc2,gltf", {"--frames", "0-3,7"});
+  EXPECT_EQ(uneven.code, exit_bad_input);
+  EXPECT_NE(uneven.err.find("7 follows 3"), std::string::npos) << uneven.err;
+  EXPECT_FALSE(fs::exists(file("motion.glb")));
+  std::ofstream(folder / "a_file") << "x";
+  EXPECT_EQ(exported("usd", {"-o", (folder / "a_file").string()}).code, exit_disk);
+
+  for (const char* format : {"gltf", "usd", "pc2", "vtu"}) {
+    SCOPED_TRACE(format);
+    rlimit old{};
+    getrlimit(RLIMIT_FSIZE, &old);
+    const rlimit small{4000, old.rlim_max};
+    signal(SIGXFSZ, SIG_IGN);
+    setrlimit(RLIMIT_FSIZE, &small);
+    const Result full = exported(format, {"-o", out("full")});
+    setrlimit(RLIMIT_FSIZE, &old);
+    signal(SIGXFSZ, SIG_DFL);
+    EXPECT_EQ(full.code, exit_disk) << full.err;
+    for (const auto& [name, content] : contents(out("full")))
+      EXPECT_TRUE(name.find(".tmp") == name.npos && content.size() < 4000) << name;
+  }
+}
+
+TEST_F(ExportMotion, OtherProgramsReadersAgree) {
+  ASSERT_EQ(exported("gltf,pc2,usd,vtu").code, exit_done);
+  const int status =
+      std::system((std::string(LIMBER_SOURCE_DIR "/tools/check_exports '") + out() + "'").c_str());
+  ASSERT_TRUE(WIFEXITED(status));
+  if (WEXITSTATUS(status) == 77)
+    GTEST_SKIP()
+        << "none of python3-vtk9, Khronos' validator (tools/install-node-tools), Blender is installed";
+  EXPECT_EQ(WEXITSTATUS(status), 0);
+}
+
+}  // namespace
+}  // namespace limber::app
