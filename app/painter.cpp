@@ -292,8 +292,7 @@ Picture Shot::Painter::paint(int frame) {
   const Output& output = shot_.output_;
   views_[0]->show(frame);
   render::Passes passes;
-  const render::Image image =
-      output.passes.empty() ? views_[0]->renderer.draw(camera) : views_[0]->renderer.draw(camera, passes);
+  const render::Image image = views_[0]->renderer.draw(camera, output.passes.empty() ? nullptr : &passes);
   Picture picture;
   for (const std::string& name : output.passes) {
     const bool depth = name == "depth";
