@@ -190,21 +190,31 @@ Eigen::Matrix3d lean(int frame) {
   return m;
 }
 
-// A body, its coarse level and a box beside it.
+// A body, its coarse level and a box beside it. As a veil, it has two organs in it that are veils, too, and
+// the camera is nearer.
 class Stage {
  public:
-  Stage(const SurfaceMesh& body, const SurfaceMesh& coarse, const Look& look)
+  Stage(const SurfaceMesh& body, const SurfaceMesh& coarse, const Look& look, bool veil = false)
       : body_(body),
         coarse_(coarse),
         box_(box_mesh({0.62, -0.3, 0}, {1.12, 0.3, 0.7})),
         renderer_(look),
-        camera_(frame_automatically(look.stage, toward_eye, double(look.width) / look.height)),
+        camera_(frame_automatically(veil ? bounding_box(body.positions) : look.stage, toward_eye,
+                                    double(look.width) / look.height)),
         normals_(vertex_normals(body.positions, body.triangles)),
         coarse_normals_(vertex_normals(coarse.positions, coarse.triangles)),
         prolong_(prolongation(body.positions, coarse.positions)) {
     MeshLook fine_look{"body", Vec3(0xc0, 0x39, 0x2b) / 255}, coarse_look{"coarse"};
     fine_look.casts_shadow = false, fine_look.crease_angle_deg = 180;
     coarse_look.seen = false;
+    if (veil) {
+      fine_look.opacity = 0.3;
+      coarse_look.casts_shadow = false;
+      for (const double x : {-0.1, 0.08}) {
+        const SurfaceMesh organ = sphere_mesh({x, 0, 0.5}, 0.15, 60);
+        renderer_.add_mesh(organ.triangles, organ.positions, {"organ", {0.2, 0.3, 0.8}, 0.4, 0, 0.5});
+      }
+    }
     mesh_ = renderer_.add_mesh(body.triangles, body.positions, fine_look);
     caster_ = renderer_.add_mesh(coarse.triangles, coarse.positions, coarse_look);
     renderer_.add_mesh(box_.triangles, box_.positions, {"box", Vec3(0x29, 0x80, 0xb9) / 255});
@@ -317,6 +327,16 @@ void run(const std::string& model, const std::vector<int>& sizes, int frames, in
           stages.finish_s * ms, png.size() / 1000, hex(hash_of(png)));
       if (!out.empty()) write_file(out / (name + ".png"), png);
     }
+  }
+  {
+    Stage stage(source, coarse, look_of(1920, 1080, false), true);
+    stage.png(0, none, unused);
+    StageTimes stages;
+    std::string png;
+    for (int f = 0; f < frames; ++f) png = stage.png(f, none, stages);
+    fmt::print("veils, {} triangles over two organs of 14 k: {:.0f} beside the rest, {}\n",
+               source.triangles.rows(), 1000 * stages.veils_s / frames, hex(hash_of(png)));
+    if (!out.empty()) write_file(out / "veils.png", png);
   }
   if (repeat > 0) {
     Stage stage(source, coarse, look_of(320, 180, false));

@@ -90,8 +90,12 @@ class DepthMap {
 Eigen::VectorXd sky_occlusion(const Points& points, const Points& normals,
                               std::span<const Occluder> occluders, const std::optional<Ground>& ground) {
   LIMBER_CHECK(points.rows() == normals.rows(), points.rows(), normals.rows());
+  LIMBER_CHECK(points.allFinite() && normals.allFinite(), points.rows());
   Box box;
-  for (const Occluder& occluder : occluders) box.include(bounding_box(occluder.positions));
+  for (const Occluder& occluder : occluders) {
+    LIMBER_CHECK(occluder.positions.allFinite(), occluder.positions.rows());
+    box.include(bounding_box(occluder.positions));
+  }
   if (box.empty()) box.include(Vec3::Zero().eval());
   const Vec3 up = ground ? ground->up.normalized() : Vec3::UnitZ();
   const double floor = ground ? ground->height_m : -std::numeric_limits<double>::infinity();

@@ -36,7 +36,7 @@ const Vec3 sky_light(0.42, 0.445, 0.48);
 struct Mesh {
   MeshLook look;
   MeshOnCard card;
-  Points colors_srgb = {};         // empty: the look's
+  Points colors = {};              // linear; empty: the look's
   Eigen::VectorXd occlusion = {};  // empty: none
 
   bool transparent() const { return look.opacity < 1; }
@@ -654,7 +654,7 @@ void tint(Mesh& mesh) {
   Eigen::Matrix<float, Eigen::Dynamic, 4, Eigen::RowMajor> tints(mesh.card.vertices(), 4);
   const Vec3 plain = linear_from_srgb(mesh.look.color_srgb);
   for (Eigen::Index v = 0; v < tints.rows(); ++v) {
-    const Vec3 color = mesh.colors_srgb.rows() > 0 ? linear_from_srgb(Vec3(mesh.colors_srgb.row(v))) : plain;
+    const Vec3 color = mesh.colors.rows() > 0 ? Vec3(mesh.colors.row(v)) : plain;
     const double open = mesh.occlusion.size() > 0 ? 1 - mesh.occlusion[v] : 1;
     tints.row(v) << color.transpose().cast<float>(), float(open);
   }
@@ -681,7 +681,7 @@ void Renderer::set_positions(int number, const Points& positions, const Points& 
 void Renderer::set_colors(int number, const Points& colors_srgb) {
   Mesh& mesh = impl_->mesh_with(number, colors_srgb.rows(), true);
   LIMBER_CHECK(colors_srgb.allFinite(), mesh.look.name);
-  mesh.colors_srgb = colors_srgb;
+  mesh.colors = colors_srgb.unaryExpr([](double c) { return linear_from_srgb(c); });
   tint(mesh);
 }
 

@@ -632,11 +632,18 @@ TEST(Renderer, SeveralThreadsDrawTheSameBytes) {
   for (const Image& image : images) EXPECT_TRUE(image.rgba == expected.rgba);
 }
 
+// Of something solid, something with colours, and veils.
 std::string picture_hash() {
-  const SurfaceMesh sphere = sphere_mesh({0, 0, 0.5}, 0.5, 60);
+  const SurfaceMesh sphere = sphere_mesh({0, 0, 0.5}, 0.5, 60),
+                    small = sphere_mesh({0.5, -0.3, 0.2}, 0.2, 30);
   Look look = small_look();
   look.ground_height_m = 0;
-  const Image image = picture_of(sphere, look, camera_from({1, -4, 2}, {0, 0, 0.5}));
+  Renderer renderer(look);
+  const int mesh = renderer.add_mesh(sphere.triangles, sphere.positions, {"solid"});
+  renderer.set_colors(mesh, (sphere.positions.array() + 0.5).cwiseMin(1).cwiseMax(0).matrix());
+  add(renderer, small, {"veil", {0.2, 0.3, 0.8}, 0.5, 0, 0.4});
+  add(renderer, sphere_mesh({0, 0, 0.5}, 0.6, 30), {"veil", {0.8, 0.3, 0.2}, 0.5, 0, 0.3});
+  const Image image = renderer.draw(camera_from({1, -4, 2}, {0, 0, 0.5}));
   return hex(Hasher().values(std::span<const float>(image.rgba)).digest());
 }
 
