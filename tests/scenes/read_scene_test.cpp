@@ -579,7 +579,7 @@ std::string all_of(const Scene& s) {
                    p.control_point_radius_m, p.settle_time_s, p.settle_speed_m_s, p.settle_force_share);
   t += fmt::format("{} {} {} {} {} {} {} {} {} {} {}\n", p.lag, p.metric, p.time_weight, p.guidance,
                    p.soft_price, p.look_s, p.learn_prices, p.steer, p.stop_in_goal, p.end_hopeless, p.hold);
-  t += fmt::format("{}\n", p.shortcut_rounds);
+  t += fmt::format("{} {}\n", p.shortcut_rounds, p.settle_hold);
   t += fmt::format("{} {}", v(s.camera.direction), s.camera.fov_deg);
   for (const Keyframe& k : s.camera.keyframes) t += fmt::format(" {} {} {}", k.at, v(k.eye_m), v(k.target_m));
   const FilmSpec& f = s.film;
