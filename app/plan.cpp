@@ -183,7 +183,8 @@ plan::Settings settings_of(const scenes::Scene& scene, const PlanOptions& option
   s.control_point_radius_m = p.control_point_radius_m;
   s.settle = {.max_duration_s = p.settle_time_s,
               .mean_speed_m_s = p.settle_speed_m_s,
-              .max_force_share = p.settle_force_share};
+              .max_force_share = p.settle_force_share,
+              .hold = p.settle_hold && !scene.goal.shape};  // which holding would leave alone
   s.laws = {.lag = p.lag,
             .metric = p.metric == "distance" ? plan::Metric::distance : plan::Metric::time_to_go,
             .time_weight = p.time_weight,
@@ -193,7 +194,7 @@ plan::Settings settings_of(const scenes::Scene& scene, const PlanOptions& option
             .steer = p.steer,
             .look_s = p.look_s,
             .stop_in_goal = p.stop_in_goal,
-            .hold = p.hold && !scene.goal.shape,  // which would leave the shape alone
+            .hold = p.hold && !scene.goal.shape,
             .end_hopeless = p.end_hopeless};
   s.frames_per_second = scene.film.frames_per_second / scene.film.speed;
   s.in_flight = options.in_flight;

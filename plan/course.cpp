@@ -98,7 +98,7 @@ class Runner {
     if (in_goal() || course_.reach_force_n == 0) return begin_settle();
     LIMBER_CHECK(course_.last_step < std::numeric_limits<std::int64_t>::max(), course_.last_step);
     phase_ = Phase::reach;
-    control_ = settle_control(settings_, 0);
+    control_ = goal_control(settings_, 0);
     control_.target_m = (settings_.goal.center_of_mass_m + system_.goal_shift(state_)).cast<float>();
     control_.max_force_n = float(course_.reach_force_n);
     steps_left_ = std::numeric_limits<std::int64_t>::max() - state_.step;

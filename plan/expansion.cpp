@@ -81,12 +81,18 @@ Control control_of(const Draw& d, const Settings& s, const Vec3& center, const V
   return control;
 }
 
-Control settle_control(const Settings& s, int steps) {
+Control goal_control(const Settings& s, int steps) {
   Control control;
   control.manipulation = s.laws.hold ? Manipulation::hold : Manipulation::interpolation;
   control.target_m = s.goal.center_of_mass_m.cast<float>();
   control.max_force_n = float(s.max_force_n * s.settle.max_force_share * just_below_one);
   control.steps = steps;
+  return control;
+}
+
+Control settle_control(const Settings& s, int steps) {
+  Control control = goal_control(s, steps);
+  control.manipulation = s.settle.hold ? Manipulation::hold : Manipulation::interpolation;
   return control;
 }
 

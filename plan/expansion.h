@@ -42,7 +42,9 @@ Control steered_control(const Draw&, const Settings&, const System&, const Depar
 // The goal is where the settings have it, moved by `goal_shift`.
 Control control_of(const Draw&, const Settings&, const Vec3& center, const Vec3& goal_shift = Vec3::Zero());
 
-// The interpolation that ends a path; `steps` long.
+// Draws the robot to the goal with the force of the settle, by interpolation or as the laws have it; and as
+// the settle has it, which ends a path. `steps` long.
+Control goal_control(const Settings&, int steps);
 Control settle_control(const Settings&, int steps);
 
 // Whole steps nearest to a duration, at least one.

@@ -137,7 +137,8 @@ Json json_of(const Settings& s) {
   json["control_point_radius_m"] = s.control_point_radius_m;
   json["settle"] = {{"max_duration_s", s.settle.max_duration_s},
                     {"mean_speed_m_s", s.settle.mean_speed_m_s},
-                    {"max_force_share", s.settle.max_force_share}};
+                    {"max_force_share", s.settle.max_force_share},
+                    {"hold", s.settle.hold}};
   const Laws& l = s.laws;
   json["laws"] = {{"lag", l.lag},
                   {"metric", l.metric == Metric::distance ? "distance" : "time_to_go"},
@@ -187,6 +188,7 @@ Settings settings_from_json(const Json& json, const std::string& what) try {
   laws.at("look_s").get_to(s.laws.look_s);
   laws.at("stop_in_goal").get_to(s.laws.stop_in_goal);
   laws.at("hold").get_to(s.laws.hold);
+  s.settle.hold = json.at("settle").value("hold", s.laws.hold);  // before there were two of them
   laws.at("end_hopeless").get_to(s.laws.end_hopeless);
   json.at("frames_per_second").get_to(s.frames_per_second);
   json.at("in_flight").get_to(s.in_flight);

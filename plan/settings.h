@@ -35,11 +35,12 @@ struct Via {
   bool rest = false;  // the robot comes to rest in it, as in the last, before it goes on
 };
 
-// At the end of a path that reached the goal, interpolation holds the robot there until it rests.
+// At the end of a path that reached the goal, the robot is drawn to it until it rests.
 struct Settle {
   double max_duration_s = 3;     // 0: none
   double mean_speed_m_s = 0.02;  // slower is at rest
   double max_force_share = 1;    // of max_force_n, in [0, 1]
+  bool hold = false;             // as it is, in whatever turn and shape; else by interpolation
 };
 
 // What the preset `fast` does beyond Algorithm 1; each can be switched alone. Method: docs/planning.md.

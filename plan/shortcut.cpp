@@ -96,7 +96,7 @@ class Changes {
   }
 
   Control interpolation_to(int node, double steps, double force_n) const {
-    Control control = settle_control(settings_, whole(steps));
+    Control control = goal_control(settings_, whole(steps));
     control.target_m = center(node).cast<float>();
     control.max_force_n = float(force_n);
     return control;

@@ -582,6 +582,7 @@ PlannerSpec read_planner(const Node& table) {
   planner.settle_time_s = number(table, "settle_time_s");
   planner.settle_speed_m_s = number(table, "settle_speed_m_s");
   planner.settle_force_share = number(table, "settle_force_share");
+  planner.settle_hold = flag(table, "settle_hold");
   planner.lag = integer(table, "lag");
   planner.metric = text(table, "metric");
   planner.time_weight = number(table, "time_weight");

@@ -149,6 +149,7 @@ struct PlannerSpec {
   double settle_time_s = 0;       // the robot gets at most so long to come to rest at the goal,
   double settle_speed_m_s = 0;    // which it does when its mean speed is below this
   double settle_force_share = 0;  // of max_force_n: the largest force of the settle
+  bool settle_hold = false;       // it may rest in any turn and shape
   // What the preset `fast` adds; plan/settings.h and docs/planning.md say what they do.
   int lag = 0;
   std::string metric;  // "distance" or "time_to_go"

@@ -347,7 +347,8 @@ constexpr Key all_keys[] = {
      {},
      0,
      may_lack,
-     "the robot ends turned or formed so; a tolerance must be given, and planner.hold has no effect",
+     "the robot ends turned or formed so; a tolerance must be given, and planner.hold and "
+     "planner.settle_hold have no effect",
      "",
      ""},
     {"goal.shape.axis", Type::vector, any, 3, "[0.0, 0.0, 1.0]",
@@ -448,6 +449,16 @@ constexpr Key all_keys[] = {
      "m/s; mean speed below which it is at rest", "", ""},
     {"planner.settle_force_share", Type::number, share, 0, "1.0",
      "of max_force_n; the largest force while it comes to rest", "", ""},
+    {"planner.settle_hold",
+     Type::boolean,
+     {},
+     0,
+     "true",
+     "it may come to rest in any turn and shape: its centre of mass is held and every node slowed; false: it "
+     "is "
+     "interpolated into its shape at the goal, as in the paper; no effect with goal.shape",
+     "",
+     ""},
     {"planner.lag", Type::integer, from_to(0, 65535), 0, "0",
      "an expansion knows the nodes of all expansions but so many before it, which are computed beside it", "",
      "7"},

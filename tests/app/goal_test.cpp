@@ -7,6 +7,7 @@
 #include "core/error.h"
 #include "fem/batch.h"
 #include "fem/observe.h"
+#include "plan/course.h"
 #include "plan/search.h"
 #include "tests/fem/worlds.h"
 
@@ -101,7 +102,7 @@ TEST(Goal, TheRobotComesToRestTurnedInTheBox) {
   EXPECT_TRUE((center.array() >= s.goal.box_m->lower.array()).all() &&
               (center.array() <= s.goal.box_m->upper.array()).all());
   EXPECT_LT(system.mean_speed(end), s.settle.mean_speed_m_s);
-  s.laws.hold = true;  // held, it never turns
+  s.laws.hold = s.settle.hold = true;  // held, it never turns
   EXPECT_FALSE(plan::plan(system, s).solved());
 }
 
@@ -121,6 +122,29 @@ TEST(Goal, RolloutsThatDivergeOnTheirWayAreOnlyCounted) {
   const plan::Plan p = plan::plan(system, s);
   EXPECT_FALSE(p.solved());
   EXPECT_GT(p.statistics.diverged, 10);
+}
+
+// A robot that arrives turned rests as it is where the settle holds it; interpolation turns it upright.
+TEST(Goal, TheSettleHoldsARobotInWhateverTurnItIs) {
+  const fem::World world = fem::build_world(brick_over_slab());
+  const FemSystem system(world);
+  const Vec3 middle(0.3, 0.2, 1.1);
+  Points p = world.bodies[0].cage.positions.rowwise() - middle.transpose();
+  p = turned(p, Vec3::UnitX(), 60).rowwise() + middle.transpose();
+  plan::Course arriving;
+  arriving.from = with_robot_at(world, p);
+  const fem::Body& robot = world.bodies[0];
+  for (int n = 0; n < robot.node_count(); ++n)
+    arriving.from.velocities[std::size_t(3 * (robot.first_node + n))] = 0.1f;
+  plan::Settings s;
+  s.goal.center_of_mass_m = middle, s.goal.radius_m = 0.1, s.max_force_n = 20, s.settle.max_duration_s = 8;
+  for (const bool hold : {true, false}) {
+    s.settle.hold = hold;
+    plan::Course course = arriving;
+    plan::run(system, s, {&course, 1}, {.ask_acceptable = false});
+    EXPECT_EQ(course.result, plan::Course::rests_in_goal) << hold;
+    EXPECT_NEAR(fem::turn_from_goal_shape_deg(world, course.end), hold ? 60 : 0, 5) << hold;
+  }
 }
 
 // Where no rest is asked for, what else the goal asks still counts.

@@ -26,7 +26,7 @@ Settings fast_settings() {
             .stop_in_goal = true,
             .hold = true,
             .end_hopeless = true};
-  s.settle.max_duration_s = 10;
+  s.settle.max_duration_s = 10, s.settle.hold = true;
   return s;
 }
 

@@ -194,6 +194,10 @@ TEST_F(PlanFileTest, APlanOfAnOlderPlannerIsToBeMadeAnew) {
   write_plan(file(), plan(Toy(), toy_settings()), {});
   Npz npz = read_npz(file());
   Json meta = parse_json(npz.text("meta.json"), "meta.json");
+  meta["settings"]["settle"].erase("hold");  // it was that of the laws then
+  npz.texts["meta.json"] = meta.dump();
+  write_npz(file("old.npz"), npz);
+  EXPECT_FALSE(read_plan(file("old.npz")).plan.settings.settle.hold);
   meta["settings"]["laws"].erase("hold");
   npz.texts["meta.json"] = meta.dump();
   write_npz(file("older.npz"), npz);

@@ -624,7 +624,7 @@ std::string all_of(const Scene& s) {
                    p.control_point_radius_m, p.settle_time_s, p.settle_speed_m_s, p.settle_force_share);
   t += fmt::format("{} {} {} {} {} {} {} {} {} {} {}\n", p.lag, p.metric, p.time_weight, p.guidance,
                    p.soft_price, p.look_s, p.learn_prices, p.steer, p.stop_in_goal, p.end_hopeless, p.hold);
-  t += fmt::format("{}\n", p.shortcut_rounds);
+  t += fmt::format("{} {}\n", p.shortcut_rounds, p.settle_hold);
   for (const CameraSpec& c : s.cameras) {
     t += fmt::format("{} {} {} {} {}", c.name, v(c.direction), c.fov_deg, c.turn_deg, c.follow);
     for (const Keyframe& k : c.keyframes) t += fmt::format(" {} {} {}", k.at, v(k.eye_m), v(k.target_m));
