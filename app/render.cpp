@@ -223,6 +223,7 @@ Outcome render(const RenderOptions& options) {
               {"painted", missing.size() - failures.size()},
               {"failed", failures.size()},
               {"size", {size.first, size.second}},
+              {"trajectory_hash", hex(plan::hash_of(planned.plan.trajectory))},
               {"cpu_s", cpu_s},
               {"folder", folder.string()}};
   std::string text =
