@@ -6,6 +6,7 @@
 #include "app/analysis.h"
 #include "app/commands.h"
 #include "app/fem_system.h"
+#include "app/manifest.h"
 #include "app/plan_folder.h"
 #include "app/report_motion.h"
 #include "app/scene_world.h"
@@ -210,10 +211,8 @@ void plots(const Findings& f, Page& page) {
 
 void film(const Findings& f, Page& page, Json& result) {
   const fs::path path = f.folder / "film.mp4";
-  const fs::path manifest = f.folder / "manifest.json";
-  std::string of_plan;
-  if (fs::exists(manifest))
-    of_plan = read_json(manifest).value(Json::json_pointer("/render/trajectory_hash"), "");
+  const std::string of_plan =
+      read_manifest(f.folder).value("render", Json::object()).value("trajectory_hash", std::string());
   if (!fs::exists(path)) {
     result["film"] = "none";
     return;
@@ -327,17 +326,13 @@ void tables(const Findings& f, Page& page) {
   page.add("<h2>Timings</h2>\n");
   const plan::Statistics& s = f.plan().statistics;
   times.push_back({"search", seconds(s.cpu_s)});
-  const fs::path manifest = f.folder / "manifest.json";
   const Json& dynamics = f.planned.summary.value("dynamics", Json::object());
   for (const char* part : {"elastic", "contact", "controls", "integration"})
     if (const auto key = std::string(part) + "_cpu_s"; dynamics.contains(key))
       times.push_back({std::string("of the dynamics, searching and replaying: ") + part,
                        seconds(dynamics.at(key).get<double>())});
-  if (fs::exists(manifest)) {
-    const Json entries = read_json(manifest);
-    if (entries.contains("render"))
-      times.push_back({"render, last run", seconds(entries.at("render").value("cpu_s", 0.0))});
-  }
+  if (const Json entries = read_manifest(f.folder); entries.contains("render"))
+    times.push_back({"render, last run", seconds(entries.at("render").value("cpu_s", 0.0))});
   page.table({"stage", "CPU s"}, times);
   page.add(
       "<p class=\"note\">Wall time of the search: {:.3f} s. {} rollouts computed for {} iterations.</p>\n",
