@@ -4,6 +4,7 @@
 #include <cmath>
 #include <set>
 
+#include "app/motion_files.h"
 #include "fem/observe.h"
 #include "render/image.h"
 
@@ -54,10 +55,11 @@ PackedMotion pack_motion(const fem::World& world, const std::vector<PreparedBody
   for (std::size_t b = 0; b < bodies.size(); ++b) {
     const PreparedBody& prepared = bodies[b];
     const fem::Body& body = world.bodies[b];
-    const Box box = bounding_box(prepared.surface.positions);
+    const Points rest = surface_at_rest(body, prepared);
+    const Box box = bounding_box(rest);
     std::vector<std::uint16_t> positions;
-    Packer::quantise(prepared.surface.positions, box, positions);
-    const bool wide = prepared.surface.positions.rows() > 65536;
+    Packer::quantise(rest, box, positions);
+    const bool wide = rest.rows() > 65536;
     const Triangles& triangles = prepared.surface.triangles;
     const auto as = [](const auto& matrix, auto zero) {
       return std::vector<decltype(zero)>(matrix.data(), matrix.data() + matrix.size());
