@@ -141,7 +141,7 @@ void summary(const Findings& f, Page& page) {
          all_kept ? "kept" : "broken");
   figure("Motion", fmt::format("{:.2f} s", double(f.plan().trajectory.end.step) * f.world.dt_s),
          fmt::format("{} frames, step {:.3g} ms", f.frames().size(), 1e3 * f.world.dt_s));
-  figure("Search", fmt::format("{:.3g} CPU s", s.cpu_s),
+  figure("Search", fmt::format("{:.2f} CPU s", s.cpu_s),
          fmt::format("{} iterations, {} nodes", s.iterations, f.plan().tree.size()));
   figure("Volume change", fmt::format("{:.2f} %", 100 * volume), "at most, of any body");
   figure("Penetration",

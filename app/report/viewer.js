@@ -79,7 +79,7 @@ in vec3 position, normal;
 uniform mat4 view, shadow_view;
 uniform vec3 key;
 uniform float offset;  // along the normal: about a texel of the shadow map
-out vec3 p, n, s;
+centroid out vec3 p, n, s;  // within the triangle also where it covers a pixel in part, or edges get dark specks
 void main() {
   p = position;
   n = normal;
@@ -87,7 +87,7 @@ void main() {
   s = 0.5 + 0.5 * (shadow_view * vec4(position + out_of_it, 1.0)).xyz;
   gl_Position = view * vec4(position, 1.0);
 }`, SHADE + `
-in vec3 p, n, s;
+centroid in vec3 p, n, s;
 uniform vec3 key, eye, color, ground_color;
 out vec4 pixel;
 void main() {
