@@ -331,6 +331,15 @@ int run_command_line(int argc, const char* const* argv) {
       ->type_name("FILE.csv");
   verify_command.callback([&] { chosen = [&] { return verify(folder, observables); }; });
 
+  std::optional<fs::path> page;
+  CLI::App& report_command = *program.add_subcommand(
+      "report", "one HTML page with the motion to play, plots, promises, tree, scene and timings");
+  report_command.add_option("DIR", folder, "work folder with a plan")->required();
+  report_command.add_option("-o,--out", page, "the page; default: report.html in the work folder")
+      ->type_name("FILE.html");
+  add_global(report_command, global), add_threads(report_command, global);
+  report_command.callback([&] { chosen = [&] { return report(folder, page); }; });
+
   RobustOptions robust_options;
   CLI::App& robust_command = *program.add_subcommand(
       "robust", "replays the plan with other materials and forces, and reports how often it still works");

@@ -115,6 +115,9 @@ Outcome bench(const BenchOptions&);
 // With `observables`, of a work folder: also a CSV with the figures of every frame.
 Outcome verify(const fs::path& folder, const std::optional<fs::path>& observables = {});
 
+// One HTML page about a planned folder, that needs nothing else: docs/files.md. Default: report.html there.
+Outcome report(const fs::path& folder, const std::optional<fs::path>& file = {});
+
 struct RobustOptions {
   fs::path folder;
   int perturbations = 16;

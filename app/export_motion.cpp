@@ -29,6 +29,13 @@ Points surface_at(const PlannedMotion& motion, int body, int frame) {
   return surface;
 }
 
+Points surface_at_rest(const fem::Body& body, const PreparedBody& prepared) {
+  if (!body.moving) return prepared.surface.positions;
+  Points surface;
+  ffd::deform(prepared.binding, prepared.cage.tets, prepared.cage.positions, surface);
+  return surface;
+}
+
 Outcome export_motion(const ExportOptions& options) {
   const PlanFolder planned = read_plan_folder(options.folder);
   const std::vector<PreparedBody> bodies = read_bodies_of(planned, options.folder);

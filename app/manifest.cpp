@@ -5,18 +5,21 @@
 
 namespace limber::app {
 
-void update_manifest(const fs::path& folder, const std::string& stage, const Json& entry) {
+Json read_manifest(const fs::path& folder) {
   const fs::path file = folder / "manifest.json";
-  Json manifest;
   try {
-    if (fs::exists(file)) manifest = read_json(file);
+    const Json manifest = fs::exists(file) ? read_json(file) : Json();
+    if (manifest.is_object()) return manifest;
   } catch (const InputError&) {
-    // A damaged manifest holds nothing that the other files do not.
   }
-  if (!manifest.is_object()) manifest = Json::object();
+  return Json::object();
+}
+
+void update_manifest(const fs::path& folder, const std::string& stage, const Json& entry) {
+  Json manifest = read_manifest(folder);
   manifest["version"] = version;
   manifest[stage] = entry;
-  write_json(file, manifest);
+  write_json(folder / "manifest.json", manifest);
 }
 
 }  // namespace limber::app

@@ -6,7 +6,10 @@
 
 namespace limber::app {
 
-// Replaces the entry of one stage ("plan", "render"); starts anew when the file is missing or not readable.
+// Empty where the file is missing or not readable: a damaged one holds nothing that the other files do not.
+Json read_manifest(const fs::path& folder);
+
+// Replaces the entry of one stage ("plan", "render").
 void update_manifest(const fs::path& folder, const std::string& stage, const Json& entry);
 
 }  // namespace limber::app

@@ -25,6 +25,10 @@ struct PlannedMotion {
 // (V × 3), metres: the fine surface of a body as the frame shows it.
 Points surface_at(const PlannedMotion&, int body, int frame);
 
+// The same where the cage is at rest. Not quite surface.ply where a vertex far outside its cage is bound with
+// clamped weights.
+Points surface_at_rest(const fem::Body&, const PreparedBody&);
+
 struct WrittenFiles {
   fs::path open;  // the one to open
   int files = 0;  // how many there are

@@ -9,6 +9,7 @@
 #include "app/scene_world.h"
 #include "app/shot.h"
 #include "core/error.h"
+#include "core/hash.h"
 #include "core/log.h"
 #include "core/progress.h"
 #include "core/threads.h"
@@ -159,6 +160,7 @@ Outcome render(const RenderOptions& options) {
               {"failed", failures.size()},
               {"size", {size.first, size.second}},
               {"camera", options.camera},
+              {"trajectory_hash", hex(plan::hash_of(planned.plan.trajectory))},
               {"cpu_s", cpu_s},
               {"folder", folder.string()}};
   std::string text =

@@ -1,3 +1,4 @@
+#include "app/verify.h"
 #include "app/analysis.h"
 #include "app/commands.h"
 #include "app/fem_system.h"
@@ -128,31 +129,37 @@ MotionFigures check_plan(const PlanFolder& planned, const fem::World& world, Tab
 
 }  // namespace
 
+Outcome verify_plan(const PlanFolder& planned, const std::vector<PreparedBody>& bodies,
+                    const fem::World& world, MotionFigures& figures) {
+  Table table;
+  for (std::size_t b = 0; b < bodies.size(); ++b) check_body(planned.scene.bodies[b].name, bodies[b], table);
+  figures = check_plan(planned, world, table);
+  return table.outcome(json_of(figures));
+}
+
 Outcome verify(const fs::path& folder, const std::optional<fs::path>& observables) {
   if (!fs::is_directory(folder))
     throw InputError(fmt::format("{}: is not a folder; name a work folder of limber", folder.string()));
-  Table table;
-  Json motion;
   if (fs::exists(folder / "plan.npz")) {
     const PlanFolder planned = read_plan_folder(folder);
     const std::vector<PreparedBody> bodies = read_bodies_of(planned, folder);
-    for (std::size_t b = 0; b < bodies.size(); ++b)
-      check_body(planned.scene.bodies[b].name, bodies[b], table);
     const fem::World world = build_world(planned.scene, bodies);
-    const MotionFigures figures = check_plan(planned, world, table);
-    motion = json_of(figures);
+    MotionFigures figures;
+    const Outcome outcome = verify_plan(planned, bodies, world, figures);
     if (observables) write_observables(*observables, world, figures);
-  } else if (fs::exists(folder / "report.json")) {
+    return outcome;
+  }
+  if (fs::exists(folder / "report.json")) {
     if (observables)
       throw InputError(fmt::format(
           "{}: holds no plan, so there is nothing to observe; leave --observables out", folder.string()));
+    Table table;
     check_body("body", read_body(folder), table);
-  } else {
-    throw InputError(
-        fmt::format("{}: holds neither plan.npz nor report.json; make them with limber run or limber prepare",
-                    folder.string()));
+    return table.outcome({});
   }
-  return table.outcome(motion);
+  throw InputError(
+      fmt::format("{}: holds neither plan.npz nor report.json; make them with limber run or limber prepare",
+                  folder.string()));
 }
 
 }  // namespace limber::app

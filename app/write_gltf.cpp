@@ -172,7 +172,8 @@ class Writer {
   int mesh(int b) {
     const PreparedBody& prepared = motion_.bodies[std::size_t(b)];
     const scenes::BodySpec& spec = motion_.scene.bodies[std::size_t(b)];
-    const SurfaceMesh& surface = prepared.surface;
+    const SurfaceMesh surface{surface_at_rest(motion_.world.bodies[std::size_t(b)], prepared),
+                              prepared.surface.triangles};
     const Vec3 color = render::linear_from_srgb(spec.color_srgb);
     const render::MeshLook look;
     const int material = gltf_.add("materials", {{"name", spec.name},

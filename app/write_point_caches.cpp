@@ -50,9 +50,8 @@ frames_per_second, frames = {fps}, {frames}
 bodies = {bodies}
 
 folder = os.path.dirname(os.path.abspath(__file__))
-for other in list(bpy.data.objects):
-    if other.name == "Cube":
-        bpy.data.objects.remove(other)
+if not bpy.data.filepath and "Cube" in bpy.data.objects:  # of Blender's own empty start, never of a file
+    bpy.data.objects.remove(bpy.data.objects["Cube"])
 for body in bodies:
     bpy.ops.wm.obj_import(filepath=os.path.join(folder, body["name"] + ".obj"), forward_axis="Y", up_axis="Z")
     shape = bpy.context.selected_objects[0]

@@ -86,13 +86,14 @@ std::vector<float> lengths(const std::vector<float>& vectors) {
 // Files of an earlier series would only confuse.
 void remove_others(const fs::path& folder, const std::set<std::string>& ours) {
   std::vector<fs::path> others;
-  for (const fs::directory_entry& entry : fs::directory_iterator(folder)) {
+  std::error_code ignored;
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder, ignored)) {
     const std::string stem = entry.path().stem().string();
     if (entry.path().extension() == ".vtu" && stem.find_first_not_of("0123456789") == stem.npos &&
         !ours.contains(entry.path().filename().string()))
       others.push_back(entry.path());
   }
-  for (const fs::path& other : others) fs::remove(other);
+  for (const fs::path& other : others) fs::remove(other, ignored);
 }
 
 }  // namespace
@@ -101,7 +102,8 @@ WrittenFiles write_vtu_series(const PlannedMotion& motion, const fs::path& out) 
   const fs::path folder = out / "vtu";
   for (const char* series : {"cages", "surfaces"}) {
     make_folder(folder / series);
-    fs::remove(folder / fmt::format("{}.pvd", series));  // a list is there when all that it names is
+    std::error_code ignored;
+    fs::remove(folder / fmt::format("{}.pvd", series), ignored);  // a list is there when all that it names is
   }
   WrittenFiles written{folder / "surfaces.pvd", 0, 0};
   std::vector<PvdEntry> cages, surfaces;

@@ -132,9 +132,10 @@ std::string plot_svg(const std::vector<Curve>& curves, const PlotLook& look) {
   std::string svg = fmt::format(
       "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n"
       "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{0}\" height=\"{1}\" viewBox=\"0 0 {0} {1}\" "
-      "font-family=\"sans-serif\" font-size=\"13\" fill=\"#333\">\n"
+      "data-left=\"{2}\" data-right=\"{3}\" data-low=\"{4}\" data-high=\"{5}\" font-family=\"sans-serif\" "
+      "font-size=\"13\" fill=\"#333\">\n"
       "<rect width=\"{0}\" height=\"{1}\" fill=\"#fff\"/>\n",
-      look.width_px, look.height_px);
+      look.width_px, look.height_px, left, right, at.x_ticks.front(), at.x_ticks.back());
   const auto text = [&](double at_x, double at_y, const char* anchor, const std::string& more,
                         const std::string& words) {
     svg += fmt::format("<text x=\"{:.1f}\" y=\"{:.1f}\" text-anchor=\"{}\"{}>{}</text>\n", at_x, at_y, anchor,

@@ -20,7 +20,8 @@ struct PlotLook {
   std::vector<double> limits = {};  // dashed lines at these y, as −10 and 10 per cent; they widen the y axis
                                     // only when near the data
 };
-// A whole SVG document; valid XML, no external fonts or styles. Same input, same bytes.
+// A whole SVG document; valid XML, no external fonts or styles. Same input, same bytes. Its data-left and
+// data-right are the pixels where x is data-low and data-high.
 std::string plot_svg(const std::vector<Curve>&, const PlotLook&);
 
 // The same as pixels, in the letters of annotate.h, the y axis' words above it.

@@ -246,7 +246,8 @@ TEST_F(Program, UsageErrorsAreBadInput) {
   EXPECT_EQ(limber_program({"render", out("nothing")}).code, exit_bad_input);
   EXPECT_EQ(limber_program({"verify", folder.path().string()}).code, exit_bad_input);
   EXPECT_EQ(limber_program({"info", out("nothing")}).code, exit_bad_input);
-  for (const char* command : {"prepare", "plan", "render", "run", "verify", "info", "scenes"})
+  for (const char* command :
+       {"prepare", "plan", "render", "export", "run", "verify", "report", "info", "scenes"})
     EXPECT_EQ(limber_program({command, "--help"}).code, exit_done) << command;
   EXPECT_EQ(limber_program({"--version"}).out, "limber 0.1.0\n");
 }

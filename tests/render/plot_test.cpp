@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstring>
 #include <regex>
 
 #include "core/random.h"
@@ -45,6 +46,12 @@ TEST(Plot, PointsLieWhereTheAxesSay) {
   EXPECT_GT(number(2), number(6));
   EXPECT_NE(svg.find("stroke=\"#ff0000\""), svg.npos);
   EXPECT_NE(svg.find(">−10<"), svg.npos);
+  const auto data = [&](const char* name) {
+    return std::stod(svg.substr(svg.find("data-" + std::string(name) + "=\"") + 7 + std::strlen(name)));
+  };
+  EXPECT_NEAR(
+      number(3),
+      data("left") + (5 - data("low")) / (data("high") - data("low")) * (data("right") - data("left")), 0.01);
 }
 
 // The same curve, as pixels: each of its points is of its colour, where the SVG has it, and the rest of the
