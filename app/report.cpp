@@ -366,9 +366,9 @@ Json motion_meta(const Findings& f, Json bodies) {
   Box shown = everything;
   if (scene.film.bounds_lines) shown.include(scene.bounds_m);
   render::Camera camera =
-      render::frame_automatically(shown, scene.camera.direction, 16.0 / 9, scene.camera.fov_deg);
-  if (!scene.camera.keyframes.empty())
-    camera.eye = scene.camera.keyframes[0].eye_m, camera.target = scene.camera.keyframes[0].target_m;
+      render::frame_automatically(shown, scene.cameras[0].direction, 16.0 / 9, scene.cameras[0].fov_deg);
+  if (!scene.cameras[0].keyframes.empty())
+    camera.eye = scene.cameras[0].keyframes[0].eye_m, camera.target = scene.cameras[0].keyframes[0].target_m;
   Json goal{{"center", json_of(f.plan().settings.goal.center_of_mass_m)},
             {"radius", f.plan().settings.goal.radius_m}};
   if (scene.goal.box_m) goal["box"] = json_of(*scene.goal.box_m);
