@@ -122,7 +122,7 @@ TEST(ReadScene, SceneryIsSeenAndNoBody) {
   EXPECT_EQ(s.scenery[0].opacity, 0.3);
   EXPECT_EQ(s.scenery[0].color_srgb, Vec3(1, 0, 0));
   EXPECT_EQ(s.bodies.size(), 2U);
-  EXPECT_THAT(complaint(good, {"goal.above=skin"}), HasSubstr("robot, gate"));
+  EXPECT_THAT(complaint(good, {"goal.above=skin"}), HasSubstr("than the robot: gate"));
 }
 
 TEST(ReadScene, CamerasAreMainAndThoseNamed) {
