@@ -194,12 +194,13 @@ Settings settings_from_json(const Json& json, const std::string& what) try {
   json.at("in_flight").get_to(s.in_flight);
   if (const Json& limit = json.at("time_limit_s"); !limit.is_null()) limit.get_to(s.time_limit_s);
   return s;
-} catch (const Json::out_of_range& lacking) {
-  throw InputError(fmt::format(
-      "{}: the plan was made by an older limber, whose planner had fewer settings ({}); plan anew "
-      "with limber plan, without --resume",
-      what, lacking.what()));
 } catch (const Json::exception& trouble) {
+  constexpr int key_not_found = 403;
+  if (trouble.id == key_not_found)
+    throw InputError(fmt::format(
+        "{}: the plan was made by an older limber, whose planner had fewer settings ({}); plan anew "
+        "with limber plan, without --resume",
+        what, trouble.what()));
   throw InputError(fmt::format("{}: planner settings: {}", what, trouble.what()));
 }
 
