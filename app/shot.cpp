@@ -108,7 +108,7 @@ void Shot::lay_out_camera(double aspect) {
     for (int f = 0; f < frames(); ++f)
       followed_m_.row(f) =
           fem::center_of_mass_m(world_, plan_.trajectory.frames[std::size_t(f)], camera_->follow).transpose();
-    constexpr double room = 1.25;  // about the body, in its own diagonals
+    constexpr double room = 0.75;  // about the body, in its own diagonals
     const Vec3 reach = Vec3::Constant(
         room * bounding_box(bodies_[std::size_t(camera_->follow)].surface.positions).diagonal());
     const Vec3 center = followed_m_.row(0).transpose();

@@ -7,6 +7,7 @@
 #include <functional>
 
 #include "core/random.h"
+#include "render/png_file.h"
 #include "tests/app/program.h"
 
 namespace limber::app {
@@ -119,6 +120,40 @@ TEST_F(Interrupt, SignalsToAProcessKeepAPlanThatGoesOnToTheSameBytes) {
     const Json resumed = plan_json("barriers1", cut, rest);
     expect_same_plan(resumed, whole);
     fs::remove_all(cut);
+  }
+}
+
+// Killed at twenty points: whatever has a frame's name then is a whole picture, and a resumed run ends with
+// the frames of an uninterrupted one.
+TEST_F(Interrupt, KilledWhileRenderingItGoesOnToTheSameFrames) {
+  const std::string text = replaced("frames_per_second = 5\n", "frames_per_second = 15\n");
+  const Result planned = limber_program({"plan", scene(text), "-o", out(), "--json"});
+  ASSERT_EQ(planned.code, exit_done) << planned.err;
+  const int frames = planned.json().at("frames");
+  ASSERT_GE(frames, 20);
+  ASSERT_EQ(limber_program({"render", out(), "--as", "whole"}).code, exit_done);
+  const auto whole = contents(fs::path(out()) / "frames-whole");
+  ASSERT_EQ(int(whole.size()), frames);
+
+  const fs::path folder_cut = fs::path(out()) / "frames-cut";
+  const auto finished = [&] {
+    int count = 0;
+    if (fs::exists(folder_cut))
+      for (const auto& entry : fs::directory_iterator(folder_cut))
+        count += entry.path().extension() == ".png" && entry.path().filename().string()[0] != '.';
+    return count;
+  };
+  Rng rng(73, 0);
+  for (int point = 0; point < 20; ++point) {
+    const int after = 1 + rng.below(frames - 2);
+    SCOPED_TRACE(fmt::format("killed after {} of {} frames", after, frames));
+    fs::remove_all(folder_cut);
+    exit_code_after_signal({"render", out(), "--as", "cut", "-q"}, SIGKILL,
+                           [&] { return finished() >= after; });
+    for (const auto& [name, bytes] : whole)
+      EXPECT_TRUE(!fs::exists(folder_cut / name) || render::frame_hash(folder_cut / name)) << name;
+    ASSERT_EQ(limber_program({"render", out(), "--as", "cut", "--resume"}).code, exit_done);
+    for (const auto& [name, bytes] : whole) EXPECT_EQ(read_file(folder_cut / name), bytes) << name;
   }
 }
 
