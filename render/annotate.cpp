@@ -63,8 +63,21 @@ void draw_caption(Image8& image, const std::string& line, const std::string& sma
   };
   const double large = letter(line, image.height / 40.0), small = letter(small_line, image.height / 60.0);
   const double baseline = image.height - margin;
-  detail::draw_text(image, small_line, margin, baseline, small, ink);
-  detail::draw_text(image, line, margin, baseline - 1.9 * small, large, ink);
+  const auto write = [&](const std::string& text, double y, double height) {
+    const double rim = 0.14 * height;  // pale, so that it reads on dark bodies too
+    for (const auto& [dx, dy] : {std::pair(-1.0, 0.0),
+                                 {1.0, 0.0},
+                                 {0.0, -1.0},
+                                 {0.0, 1.0},
+                                 {-0.7, -0.7},
+                                 {-0.7, 0.7},
+                                 {0.7, -0.7},
+                                 {0.7, 0.7}})
+      detail::draw_text(image, text, margin + rim * dx, y + rim * dy, height, white);
+    detail::draw_text(image, text, margin, y, height, ink);
+  };
+  write(small_line, baseline, small);
+  write(line, baseline - 1.9 * small, large);
 }
 
 void draw_color_bar(Image8& image, const ColorBar& bar) {
