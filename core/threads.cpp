@@ -4,7 +4,12 @@
 #include <tbb/info.h>
 #include <tbb/parallel_for.h>
 
-#include <memory>
+#include <algorithm>
+#include <atomic>
+#include <exception>
+#include <mutex>
+#include <thread>
+#include <vector>
 
 #include "core/error.h"
 
@@ -29,8 +34,29 @@ void parallel_for(int n, const std::function<void(int)>& body) {
     for (int i = 0; i < n; ++i) body(i);
     return;
   }
+#ifdef __SANITIZE_THREAD__
+  // ThreadSanitizer does not see how TBB's library, which it has not built, hands work over.
+  std::atomic<int> next{0};
+  std::exception_ptr failure;
+  std::mutex mutex;
+  const auto work = [&] {
+    for (int i; (i = next++) < n;) try {
+        body(i);
+      } catch (...) {
+        const std::lock_guard lock(mutex);
+        if (!failure) failure = std::current_exception();
+        next = n;
+      }
+  };
+  std::vector<std::jthread> workers;
+  for (int t = 1; t < std::min(count(), n); ++t) workers.emplace_back(work);
+  work();
+  workers.clear();
+  if (failure) std::rethrow_exception(failure);
+#else
   const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, std::size_t(count()));
   tbb::parallel_for(0, n, [&](int i) { body(i); });
+#endif
 }
 
 }  // namespace limber
