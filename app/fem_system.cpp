@@ -27,7 +27,7 @@ std::uint64_t hash_of(const fem::World& world) {
         .value(int(body.kind))
         .value(int(body.self_contact));
     for (const double v : {m.youngs_modulus_pa, m.poisson_ratio, m.density_kg_m3, m.damping_ratio, m.friction,
-                           body.stiffness_share})
+                           body.stiffness_share, body.max_volume_change})
       hasher.value(v);
     for (const auto* of_tets : {&body.youngs_modulus_from_tet_pa, &body.density_from_tet_kg_m3})
       for (const double v : *of_tets) hasher.value(v);
@@ -80,23 +80,27 @@ class FemSystem::Propagator final : public plan::Propagator {
     in_lane.resize(std::size_t(batch.lanes()), nullptr);
     for (std::size_t lane = 0; lane < in_lane.size(); ++lane)
       if (in_lane[lane]) load(lane);
+    const auto now = [&](std::size_t lane) {
+      return in_lane[lane]->from->step + taken(batch, *in_lane[lane], lane);
+    };
+    std::vector<std::int64_t> shown(in_lane.size());  // the step at which the lane's state is, next
     for (bool any = true; any;) {
-      int steps = look_every;
+      std::int64_t steps = look_every;
       for (std::size_t lane = 0; lane < in_lane.size(); ++lane)
-        if (in_lane[lane])
-          steps = std::min(steps, look_every - taken(batch, *in_lane[lane], lane) % look_every);
-      batch.advance(steps);
+        if (in_lane[lane]) {
+          shown[lane] = supply.next_shown(now(lane));
+          steps = std::min({steps, look_every - taken(batch, *in_lane[lane], lane) % std::int64_t(look_every),
+                            shown[lane] - now(lane)});
+        }
+      batch.advance(int(steps));
       for (std::size_t lane = 0; lane < in_lane.size(); ++lane) {
         if (!in_lane[lane]) continue;
         plan::Rollout& rollout = *in_lane[lane];
         const int steps_taken = taken(batch, rollout, lane);
         if (batch.steps_left(int(lane)) > 0) {
-          if (steps_taken % look_every) continue;
-          const plan::Look seen = look(batch, int(lane), steps_taken);
-          // Numbers that are none stay so: it has diverged, and nobody need look.
-          const bool finite =
-              seen.center.allFinite() && seen.velocity.allFinite() && seen.goal_shift.allFinite();
-          if (finite && supply.goes_on(rollout, seen)) continue;
+          if (goes_on(batch, int(lane), rollout, supply, steps_taken % look_every == 0,
+                      now(lane) == shown[lane]))
+            continue;
           batch.stop(int(lane));
           rollout.control.steps = steps_taken;
         }
@@ -111,6 +115,19 @@ class FemSystem::Propagator final : public plan::Propagator {
         any = any || in_lane[lane];
       }
     }
+  }
+
+  bool goes_on(const fem::Batch& batch, int lane, const plan::Rollout& rollout, plan::Supply& supply,
+               bool look_due, bool state_due) {
+    if (look_due) {
+      const plan::Look seen = look(batch, lane, rollout.control.steps - batch.steps_left(lane));
+      // Numbers that are none stay so: it has diverged, and nobody need look.
+      const bool finite = seen.center.allFinite() && seen.velocity.allFinite() && seen.goal_shift.allFinite();
+      if (!finite || !supply.goes_on(rollout, seen)) return false;
+    }
+    if (!state_due) return true;
+    batch.peek(lane, peeked_);
+    return supply.goes_on(rollout, peeked_);
   }
 
   // The smallest that has so many lanes, if any: idle lanes cost as much as busy ones.
@@ -138,6 +155,7 @@ class FemSystem::Propagator final : public plan::Propagator {
   const FemSystem& system_;
   std::array<std::optional<fem::Batch>, std::size(widths)> batches_;
   std::vector<fem::Rollout> work_;
+  State peeked_;
 };
 
 FemSystem::FemSystem(const fem::World& world, const GoalRules& goal)
@@ -177,7 +195,7 @@ bool FemSystem::acceptable(const State& state) const {
     for (int n = body.first_node; body.moving && n < body.first_node + body.node_count(); ++n)
       if (double(state.positions[std::size_t(3 * n + 2)]) < *last.lost_below_m) return false;
   }
-  return fem::inverted_tets(world_, state) == 0;
+  return fem::is_sound(world_, state);
 }
 const plan::System& FemSystem::on_leg(int leg) const {
   return leg < int(via_.size()) ? static_cast<const plan::System&>(*via_[std::size_t(leg)]) : *this;

@@ -36,7 +36,7 @@ class FemSystem final : public plan::System {
   Box sample_bounds() const override;
   double dt_s() const override;
   std::uint64_t hash() const override;
-  bool acceptable(const State&) const override;  // no tet is inverted, and the goal is not lost
+  bool acceptable(const State&) const override;  // it is sound, and the goal is not lost
   bool goal_holds(const State&) const override;
   const System& on_leg(int) const override;
   Vec3 goal_shift(const State&) const override;

@@ -252,6 +252,7 @@ fem::World build_world(const scenes::Scene& scene, const std::vector<PreparedBod
     fem_body.fixed_nodes = scenes::fixed_nodes(body, scene.bounds_m, prepared[b].cage.positions);
     fem_body.kind = kind_of(body);
     fem_body.self_contact = body.self_contact;
+    fem_body.max_volume_change = body.max_volume_change;
     set_parts(body, prepared[b], fem_body);
     spec.bodies.push_back(std::move(fem_body));
   }

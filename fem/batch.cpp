@@ -131,6 +131,15 @@ Batch::Motion Batch::motion(int lane, int index) const {
   return {sum.center_m / body.mass_kg, sum.velocity_m_s / body.mass_kg, sum.lowest_m};
 }
 
+void Batch::peek(int lane, State& state) const {
+  const auto& mine = impl_->lanes.at(std::size_t(lane));
+  LIMBER_CHECK(mine.steps_left > 0, lane, mine.steps_left);
+  state.step = mine.state.step + mine.control.steps - mine.steps_left;
+  state.positions.resize(impl_->rest.positions.size()),
+      state.velocities.resize(impl_->rest.velocities.size());
+  impl_->stepper.store(lane, state.positions.data(), state.velocities.data());
+}
+
 void Batch::stop(int lane) {
   auto& mine = impl_->lanes.at(std::size_t(lane));
   if (mine.steps_left == 0) return;

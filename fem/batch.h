@@ -45,6 +45,8 @@ class Batch {
     double lowest_m;
   };
   Motion motion(int lane, int body) const;
+  // As it is now, in a lane that was loaded and has steps left.
+  void peek(int lane, State&) const;
   // The lane takes no further steps: as if its control had had only those that it took.
   void stop(int lane);
   // Once steps_left is 0. A diverged lane holds no state to go on from: store() gives the one it was loaded

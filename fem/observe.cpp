@@ -173,6 +173,24 @@ int inverted_tets(const World& world, const State& state) {
   return count;
 }
 
+bool is_sound(const World& world, const State& state) {
+  for (int b = 0; b < int(world.bodies.size()); ++b) {
+    const Body& body = world.bodies[b];
+    if (!body.moving) continue;
+    const auto corner = [at = &state.positions[std::size_t(3 * body.first_node)]](int node) -> Vec3 {
+      return Eigen::Map<const Vec3f>(at + 3 * node).cast<double>();
+    };
+    double volume = 0;
+    for (const auto& t : body.cage.tets.rowwise()) {
+      const double of_tet = signed_volume(corner(t[0]), corner(t[1]), corner(t[2]), corner(t[3]));
+      if (!(of_tet > 0)) return false;
+      volume += of_tet;
+    }
+    if (!(std::abs(volume / body.rest_volume_m3 - 1) <= body.max_volume_change)) return false;
+  }
+  return true;
+}
+
 Penetration deepest_penetration(const World& world, const State& state) {
   Penetration deepest;
   std::vector<Points> positions;

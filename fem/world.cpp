@@ -107,6 +107,7 @@ Body make_body(const BodySpec& spec) {
   const int nodes = body.node_count();
   body.fixed.assign(std::size_t(nodes), spec.kind == BodyKind::immovable);
   body.kind = spec.kind;
+  body.max_volume_change = spec.max_volume_change;
   body.self_contact = spec.self_contact && spec.kind == BodyKind::deformable;
   for (int n : spec.fixed_nodes) body.fixed[n] = true;
   body.moving = std::find(body.fixed.begin(), body.fixed.end(), false) != body.fixed.end();

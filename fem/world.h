@@ -2,6 +2,7 @@
 // docs/contact.md.
 #pragma once
 
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -43,6 +44,7 @@ struct BodySpec {
   // (T) each, or empty: the material's everywhere.
   std::vector<double> youngs_modulus_from_tet_pa = {}, density_from_tet_kg_m3 = {};
   bool self_contact = false;  // parts of the body that are not neighbours push one another apart
+  double max_volume_change = std::numeric_limits<double>::infinity();  // |V − V0|/V0 of a sound state, > 0
 };
 
 struct WorldSpec {
@@ -76,6 +78,7 @@ struct Body {
   std::vector<double> youngs_modulus_from_tet_pa,
       density_from_tet_kg_m3;  // (T) the material's, or a part's own
   double mass_kg, rest_volume_m3;
+  double max_volume_change;   // as asked for
   double stiffness_share;     // by which the elements' stiffness is multiplied; 1 unless mesh_independent
   double elastic_dt_limit_s;  // largest stable step of the damped elastic body; infinite unless deformable
   int node_count() const { return int(cage.positions.rows()); }

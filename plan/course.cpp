@@ -6,6 +6,7 @@
 #include "core/error.h"
 #include "core/threads.h"
 #include "plan/expansion.h"
+#include "plan/frame_times.h"
 
 namespace limber::plan {
 
@@ -28,12 +29,11 @@ class Runner {
         options_(options),
         course_(course),
         state_(course.from),
-        first_step_(system.start().step),
-        steps_per_frame_(1 / (settings.frames_per_second * system.dt_s())),
+        times_(system, settings.frames_per_second),
+        next_frame_(times_.frame_from(state_.step)),
         settle_limit_(int(std::lround(settings.settle.max_duration_s / system.dt_s()))) {
     course_.states.clear(), course_.costs_of_states.clear(), course_.frames.clear();
     course_.settle_steps = 0;
-    while (step_of_next_frame() < state_.step) ++next_frame_;
     take_due_frames();
     begin_control();
   }
@@ -55,7 +55,7 @@ class Runner {
     std::swap(state_, rollout.to);
     steps_left_ -= steps;
     (phase_ == Phase::settle ? course_.settle_steps : control_.steps) += steps;
-    course_.costs.duration_s = double(state_.step - first_step_) * system_.dt_s();
+    course_.costs.duration_s = double(state_.step - times_.first_step) * system_.dt_s();
     course_.costs.effort_n_s += double(largest_force(control_)) * steps * system_.dt_s();
     const bool frame = state_.step == step_of_next_frame();
     take_due_frames();
@@ -136,19 +136,16 @@ class Runner {
     return holds(settings_.goal, system_.robot_center(state_) - system_.goal_shift(state_));
   }
 
-  std::int64_t step_of_next_frame() const {
-    return first_step_ + std::llround(double(next_frame_) * steps_per_frame_);
-  }
+  std::int64_t step_of_next_frame() const { return times_.step_of(next_frame_); }
 
   const System& system_;
   const Settings& settings_;
   const CourseOptions& options_;
   Course& course_;
   State state_;
-  std::int64_t first_step_;
-  double steps_per_frame_;
+  FrameTimes times_;
+  std::int64_t next_frame_;
   int settle_limit_;
-  std::int64_t next_frame_ = 0;
   Phase phase_ = Phase::controls;
   Control control_;              // its steps are those taken
   std::int64_t steps_left_ = 0;  // of it, until something is to be decided

@@ -7,6 +7,7 @@
 #include "core/progress.h"
 #include "plan/course.h"
 #include "plan/expansion.h"
+#include "plan/frame_times.h"
 #include "plan/shortcut.h"
 
 namespace limber::plan {
@@ -63,7 +64,8 @@ class Follower {
         reference_(reference),
         base_(in_steps_of(system.dt_s(), reference.controls, reference.dt_s)),
         propagator_(system.make_propagator()),
-        first_step_(system.start().step) {}
+        first_step_(system.start().step),
+        frames_(system, settings.frames_per_second) {}
 
   // What was run, from the start. The last state is the last good one: acceptable, and not far from where the
   // reference was.
@@ -79,8 +81,7 @@ class Follower {
         rollout.from = &state;
         rollout.control = control(base, state);
         rollout.control.steps = steps;
-        propagator_->propagate({&rollout, 1});
-        if (!rollout.ok || !system_.acceptable(rollout.to)) return path;
+        if (!passes(rollout)) return path;
         const double error =
             (at(reference_.centers, frame_of(rollout.to)) - system_.robot_center(rollout.to)).norm();
         if (error > 2 * settings_.goal.radius_m) return path;
@@ -97,6 +98,21 @@ class Follower {
   bool complete() const { return complete_; }
 
  private:
+  // Fills `to`; whether it and all frames on the way are acceptable.
+  bool passes(Rollout& rollout) {
+    State now = *rollout.from;
+    const std::int64_t end = now.step + rollout.control.steps;
+    while (now.step < end) {
+      Rollout piece{&now, rollout.control, {}, false};
+      piece.control.steps = int(std::min(end, frames_.next_step(now.step)) - now.step);
+      propagator_->propagate({&piece, 1});
+      if (!piece.ok || !system_.acceptable(piece.to)) return false;
+      now = std::move(piece.to);
+    }
+    rollout.to = std::move(now);
+    return true;
+  }
+
   double seconds(const State& state) const { return double(state.step - first_step_) * system_.dt_s(); }
   double frame_of(const State& state) const { return seconds(state) * reference_.frames_per_second; }
 
@@ -129,6 +145,7 @@ class Follower {
   std::vector<Control> base_;  // in steps of this system
   std::unique_ptr<Propagator> propagator_;
   std::int64_t first_step_;
+  FrameTimes frames_;
   bool complete_ = false;
 };
 
@@ -140,7 +157,7 @@ Course arrive(const System& system, const Settings& settings, const Course& foll
   path.reach_force_n = settings.max_force_n * just_below_one;
   const std::int64_t now = followed.states.empty() ? path.from.step : followed.states.back().step;
   path.last_step = now + steps_of(reach_s + settings.settle.max_duration_s, system.dt_s());
-  run(system, settings, {&path, 1}, {.ask_acceptable = false});
+  run(system, settings, {&path, 1}, {});
   return path;
 }
 
@@ -207,7 +224,7 @@ Plan refine(const System& system, const Settings& settings, const Reference& ref
   Course replay;
   replay.from = system.start();
   replay.controls = in_steps_of(system.dt_s(), reference.controls, reference.dt_s);
-  run(system, settings, {&replay, 1}, {.ask_acceptable = false});
+  run(system, settings, {&replay, 1}, {});
   report.replay_cpu_s = spent();
   if (replay.result == Course::rests_in_goal) {
     report.how = RefineReport::replayed;

@@ -16,6 +16,7 @@
 #include "core/threads.h"
 #include "plan/chooser.h"
 #include "plan/course.h"
+#include "plan/frame_times.h"
 
 namespace limber::plan {
 
@@ -85,6 +86,7 @@ class Search {
         watch_(watch),
         progress_("plan", settings.max_iterations),
         started_(started),
+        frames_(system, settings.frames_per_second),
         guidance_(guidance_of(system, settings)),
         chooser_(system, settings, guidance_ ? &*guidance_ : nullptr, plan.legs.back().root),
         next_iteration_(plan.legs.back().first_iteration),
@@ -131,6 +133,8 @@ class Search {
       // No lane but this thread's touches the rollout.
       return search_.goes_on(const_cast<Expansion&>(static_cast<const Expansion&>(rollout)), look);
     }
+    std::int64_t next_shown(std::int64_t step) const override { return search_.frames_.next_step(step); }
+    bool goes_on(const Rollout&, const State& state) override { return search_.system_.acceptable(state); }
     void done(Rollout& rollout) override {
       Outcome outcome = outcome_of(search_.system_, rollout);
       const std::lock_guard lock(search_.mutex_);
@@ -329,6 +333,7 @@ class Search {
   const double cpu_before_ = cpu_seconds();
   const std::int64_t iterations_before_ = plan_.statistics.iterations;
 
+  const FrameTimes frames_;
   const std::optional<Guidance> guidance_;  // as the search begins; prices are learnt in the chooser's copy
 
   std::atomic<bool> ended_ = false;

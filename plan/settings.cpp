@@ -208,7 +208,7 @@ std::string first_difference(const Settings& a, const Settings& b) {
   const Json in_a = json_of(a), in_b = json_of(b);
   for (const char* key :
        {"seed", "via", "goal", "goal_bias", "weights", "max_force_n", "min_force_share", "max_force_share",
-        "min_duration_s", "max_duration_s", "control_point_radius_m", "settle", "laws"})
+        "min_duration_s", "max_duration_s", "control_point_radius_m", "settle", "laws", "frames_per_second"})
     if (in_a.value(key, Json()) != in_b.value(key, Json())) return key;  // no goals on the way, no via
   return "";
 }

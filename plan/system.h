@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <memory>
 #include <span>
 #include <vector>
@@ -37,6 +38,9 @@ class Supply {
   // Asked every look_every steps of a rollout that has not diverged; false ends it there, and its
   // control.steps are those it took. Must be a function of the rollout and what was seen of it.
   virtual bool goes_on(const Rollout&, const Look&) { return true; }
+  // The same of whole states: the first step later than `step` (both as State::step) whose state is shown.
+  virtual std::int64_t next_shown(std::int64_t) const { return std::numeric_limits<std::int64_t>::max(); }
+  virtual bool goes_on(const Rollout&, const State&) { return true; }
   virtual void done(Rollout&) = 0;
 };
 
@@ -78,12 +82,13 @@ class System {
   virtual Vec3 robot_center(const State&) const = 0;    // centre of mass, metres
   virtual Vec3 robot_velocity(const State&) const = 0;  // of the centre of mass, metres a second
   virtual double robot_mass_kg() const = 0;
-  virtual double mean_speed(const State&) const = 0;            // of the robot's nodes, metres a second
-  virtual int robot_nodes() const = 0;                          // Control::node is below it
-  virtual Box sample_bounds() const = 0;                        // where random points are drawn, metres
-  virtual double dt_s() const = 0;                              // length of a step
-  virtual std::uint64_t hash() const = 0;                       // of all that a rollout's result depends on
-  virtual bool acceptable(const State&) const { return true; }  // false: no node is made of this state
+  virtual double mean_speed(const State&) const = 0;  // of the robot's nodes, metres a second
+  virtual int robot_nodes() const = 0;                // Control::node is below it
+  virtual Box sample_bounds() const = 0;              // where random points are drawn, metres
+  virtual double dt_s() const = 0;                    // length of a step
+  virtual std::uint64_t hash() const = 0;             // of all that a rollout's result depends on
+  // False: no rollout passes through this state at a frame time, and no node is made of it.
+  virtual bool acceptable(const State&) const { return true; }
   // What else than the place of the robot's centre of mass makes it reach the goal: its turn, its shape, …
   virtual bool goal_holds(const State&) const { return true; }
   // How far the goal has moved since the start: it may hang on a body that moves by itself. Metres.

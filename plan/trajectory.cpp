@@ -40,7 +40,7 @@ bool comes_to_rest(const System& system, const Settings& s, const State& in_goal
   if (s.settle.max_duration_s == 0) return system.goal_holds(in_goal);
   Course course;
   course.from = in_goal;
-  run(system, s, {&course, 1}, {.ask_acceptable = false});
+  run(system, s, {&course, 1}, {});
   return course.result == Course::rests_in_goal;
 }
 

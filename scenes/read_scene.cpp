@@ -403,6 +403,7 @@ BodySpec read_body(const Node& table, const Box& bounds) {
   body.role = read_role(text(table, "role"));
   body.kind = text(table, "kind") == "rigid" ? Kind::rigid : Kind::deformable;
   body.self_contact = flag(table, "self_contact");
+  body.max_volume_change = number(table, "max_volume_change");
   body.model = read_model(child(table, "model"), what);
   body.color_srgb = read_body_color(table, body.role);
   body.opacity = number(table, "opacity");

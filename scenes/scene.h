@@ -99,7 +99,8 @@ struct BodySpec {
   std::string name;  // letters, digits, _ and -: it names a folder
   Role role = Role::obstacle;
   Kind kind = Kind::deformable;
-  bool self_contact = false;  // parts of it that are not neighbours push one another apart
+  bool self_contact = false;       // parts of it that are not neighbours push one another apart
+  double max_volume_change = 0.1;  // |V − V0|/V0 in all states of a plan, in (0, 1]
   Model model;
   CageSpec cage;
   MaterialSpec

@@ -228,6 +228,8 @@ TEST(Batch, ALaneCanBeWatchedAndStopped) {
     ASSERT_EQ(batch.advance(25), 25);
     const int last = lanes - 1;
     const Batch::Motion robot = batch.motion(last, 0), plate = batch.motion(last, 1);
+    State peeked;
+    batch.peek(last, peeked);
     batch.stop(last);
     EXPECT_EQ(batch.steps_left(last), 0);
     State stopped;
@@ -235,6 +237,7 @@ TEST(Batch, ALaneCanBeWatchedAndStopped) {
     Control cut = cases[std::size_t(last)].control;
     cut.steps = 25;
     EXPECT_EQ(stopped, propagate(world, cases[std::size_t(last)].start, cut).end);
+    EXPECT_EQ(peeked, stopped);
     EXPECT_LT((robot.center_m - center_of_mass_m(world, stopped, 0)).norm(), 1e-12);
     EXPECT_LT((robot.velocity_m_s - center_velocity_m_s(world, stopped, 0)).norm(), 1e-12);
     EXPECT_LT((plate.center_m - center_of_mass_m(world, stopped, 1)).norm(), 1e-12);

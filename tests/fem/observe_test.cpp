@@ -62,6 +62,43 @@ TEST(Observe, StrainsOfAffineMapsAreThoseOfTheBook) {
 }
 
 // Two soft cubes, a rigid one and a static block pressed together in a corner of the room, under gravity.
+// A body stretched by 1 + s along an axis has changed by s; mirrored, all its tets are inverted. In the state
+// of another body nothing of that shows.
+TEST(Observe, AStateIsSoundUpToTheVolumeChangeAskedFor) {
+  for (const double most : {0.05, 0.2}) {
+    WorldSpec spec = alone({"ball", ball({0, 0, 0}, 0.5, 3), {}, {}});
+    spec.bodies[0].max_volume_change = most;
+    const World world = build_world(spec);
+    for (const double change : {-0.25, -0.19, -0.06, -0.04, 0.0, 0.04, 0.06, 0.19, 0.25}) {
+      const State state = deformed(world, Vec3(1, 1 + change, 1).asDiagonal());
+      EXPECT_EQ(is_sound(world, state), std::abs(change) < most) << most << ' ' << change;
+    }
+    EXPECT_FALSE(is_sound(world, deformed(world, Vec3(1, 1, -1).asDiagonal())));
+  }
+}
+
+// One tet turned inside out is seen, wherever it is and however much room the body has.
+TEST(Observe, OneInvertedTetIsNotSound) {
+  WorldSpec spec = alone({"ball", ball({0, 0, 0}, 0.5, 3), {}, {}});
+  spec.bodies[0].max_volume_change = 1;
+  const World world = build_world(spec);
+  const auto& cage = world.bodies[0].cage;
+  for (int t = 0; t < cage.tets.rows(); t += 7) {
+    State state = rest_state(world);
+    // A corner is drawn through the face opposite to it, by a thousandth of its height.
+    const Vec3 a = cage.positions.row(cage.tets(t, 0)), b = cage.positions.row(cage.tets(t, 1)),
+               c = cage.positions.row(cage.tets(t, 2)), d = cage.positions.row(cage.tets(t, 3));
+    const Vec3 normal = (b - a).cross(c - a).normalized(), way = normal * normal.dot(a - d);
+    Eigen::Map<Vec3f> corner(&state.positions[std::size_t(3 * cage.tets(t, 3))]);
+    corner = (d + 0.999 * way).cast<float>();
+    const bool before = inverted_tets(world, state) == 0;
+    EXPECT_EQ(is_sound(world, state), before) << t;
+    corner = (d + 1.001 * way).cast<float>();
+    EXPECT_GT(inverted_tets(world, state), 0) << t;
+    EXPECT_FALSE(is_sound(world, state)) << t;
+  }
+}
+
 World pile() {
   Material material;
   material.friction = 0.4;

@@ -10,6 +10,7 @@
 namespace limber::plan {
 namespace {
 
+using testing::passes;
 using testing::Toy;
 using testing::toy_settings;
 
@@ -58,8 +59,7 @@ Tree lagged_tree(const System& system, const Settings& s, std::int64_t iteration
     const Aim aim = chooser.choose(draw(s, system, i));
     const State from = all.states[std::size_t(aim.node)];
     Rollout r{&from, aim.control, {}, false};
-    propagator->propagate({&r, 1});
-    if (r.ok && system.acceptable(r.to))
+    if (passes(system, s, *propagator, r))
       all.add(r.to, aim.node, aim.control, i, system.robot_center(r.to).cast<float>());
   }
   return all;

@@ -159,6 +159,23 @@ TEST(Search, TreeAndPathAreWhatTheyClaim) {
   });
 }
 
+// Not only nodes: a push that rises above the forbidden height and falls back between two nodes is none.
+TEST(Search, NoFrameOfAPathIsUnacceptable) {
+  Toy toy(5, true, false, 1.15f);
+  for (const double fps : {30.0, 13.0}) {
+    Settings s = toy_settings();
+    s.frames_per_second = fps;
+    int solved = 0;
+    for (s.seed = 1; s.seed <= 20; ++s.seed) {
+      const Plan p = plan(toy, s);
+      solved += p.solved();
+      EXPECT_GT(p.statistics.rejected, 0);
+      for (const State& frame : p.trajectory.frames) ASSERT_TRUE(toy.acceptable(frame)) << s.seed;
+    }
+    EXPECT_GT(solved, 10);
+  }
+}
+
 TEST(Search, FirstNodeOfAFreePointHasItsClosedForm) {
   Toy toy;
   toy.damping_per_s = 0;
@@ -292,13 +309,14 @@ TEST(Search, AnotherWorldOrSettingIsNotResumed) {
       [](Settings& t) { t.max_force_share = 0.9; },
       [](Settings& t) { t.min_duration_s = 0.3; },
       [](Settings& t) { t.max_duration_s = 0.9; },
-      [](Settings& t) { t.control_point_radius_m = 0.1; }};
+      [](Settings& t) { t.control_point_radius_m = 0.1; },
+      [](Settings& t) { t.frames_per_second = 24; }};
   for (std::size_t i = 0; i < changes.size(); ++i) {
     Settings changed = s;
     changes[i](changed);
     EXPECT_THROW(plan(toy, changed, p), InputError) << "change " << i;
   }
-  s.max_iterations = 6, s.in_flight = 3, s.time_limit_s = 100, s.frames_per_second = 12;
+  s.max_iterations = 6, s.in_flight = 3, s.time_limit_s = 100;
   EXPECT_NO_THROW(plan(toy, s, p));
 }
 

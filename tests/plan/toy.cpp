@@ -1,6 +1,7 @@
 #include "tests/plan/toy.h"
 
 #include <chrono>
+#include <cmath>
 #include <thread>
 
 #include "core/hash.h"
@@ -21,12 +22,9 @@ class ToyPropagator final : public Propagator {
   explicit ToyPropagator(const Toy& toy) : toy_(toy) {}
   void propagate(std::span<Rollout> rollouts) override {
     for (Rollout& r : rollouts) {
-      if (toy_.before_each_rollout) toy_.before_each_rollout();
-      const std::int64_t number = toy_.rollouts++;
-      if (toy_.jitter) std::this_thread::sleep_for(std::chrono::microseconds(number * 7919 % 200));
+      begin();
       r.to = *r.from;
-      r.ok = true;
-      for (int i = 0; i < r.control.steps && r.ok; ++i) r.ok = toy_.step(r.control, r.to);
+      r.ok = steps(r.control, r.control.steps, r.to);
     }
   }
 
@@ -39,25 +37,26 @@ class ToyPropagator final : public Propagator {
     };
     std::vector<Running> running;
     while (true) {
-      while (Rollout* r = supply.next()) running.push_back({r, *r->from});
+      while (Rollout* r = supply.next()) begin(), running.push_back({r, *r->from});
       if (running.empty()) return;
       for (std::size_t i = 0; i < running.size();) {
         Running& mine = running[i];
         Rollout& rollout = *mine.rollout;
-        const int steps = std::min(look_every, rollout.control.steps - mine.steps);
-        Rollout piece{&mine.now, rollout.control, {}, false};
-        piece.control.steps = steps;
-        propagate({&piece, 1});
-        mine.now = piece.to, mine.steps += steps;
-        rollout.ok = piece.ok;
+        const std::int64_t shown = supply.next_shown(mine.now.step);
+        const int piece =
+            int(std::min<std::int64_t>({look_every - mine.steps % look_every,
+                                        rollout.control.steps - mine.steps, shown - mine.now.step}));
+        rollout.ok = steps(rollout.control, piece, mine.now);
+        mine.steps += piece;
         const Look look{mine.steps, toy_.robot_center(mine.now), toy_.robot_velocity(mine.now),
                         toy_.goal_shift(mine.now)};
-        const bool whole = !piece.ok || mine.steps == rollout.control.steps;
-        if (!whole && supply.goes_on(rollout, look)) {
+        const bool whole = !rollout.ok || mine.steps == rollout.control.steps;
+        if (!whole && (mine.steps % look_every || supply.goes_on(rollout, look)) &&
+            (mine.now.step < shown || supply.goes_on(rollout, mine.now))) {
           ++i;
           continue;
         }
-        if (piece.ok) rollout.control.steps = mine.steps;
+        if (rollout.ok) rollout.control.steps = mine.steps;
         rollout.to = mine.now;
         running.erase(running.begin() + std::ptrdiff_t(i));
         supply.done(rollout);
@@ -66,6 +65,17 @@ class ToyPropagator final : public Propagator {
   }
 
  private:
+  void begin() {
+    if (toy_.before_each_rollout) toy_.before_each_rollout();
+    const std::int64_t number = toy_.rollouts++;
+    if (toy_.jitter) std::this_thread::sleep_for(std::chrono::microseconds(number * 7919 % 200));
+  }
+  bool steps(const Control& control, int count, State& state) const {
+    for (int i = 0; i < count; ++i)
+      if (!toy_.step(control, state)) return false;
+    return true;
+  }
+
   const Toy& toy_;
 };
 
@@ -177,6 +187,24 @@ Settings toy_settings() {
   return s;
 }
 
+bool passes(const System& system, const Settings& settings, Propagator& propagator, Rollout& rollout) {
+  const double steps_per_frame = 1 / (settings.frames_per_second * system.dt_s());
+  const State from = *rollout.from;
+  const std::int64_t end = from.step + rollout.control.steps;
+  Rollout piece = rollout;
+  for (std::int64_t frame = 0;; ++frame) {
+    const auto step =
+        std::min<std::int64_t>(end, system.start().step + std::llround(double(frame) * steps_per_frame));
+    if (step <= from.step) continue;
+    piece.control.steps = int(step - from.step);  // from its beginning: pieces are nobody's business here
+    propagator.propagate({&piece, 1});
+    if (!piece.ok || !system.acceptable(piece.to)) return false;
+    if (step == end) break;
+  }
+  rollout.to = piece.to, rollout.ok = true;
+  return true;
+}
+
 Tree sequential_tree(const System& system, const Settings& settings, std::int64_t first_iteration) {
   const auto propagator = system.make_propagator();
   Tree tree;
@@ -196,8 +224,7 @@ Tree sequential_tree(const System& system, const Settings& settings, std::int64_
     const State from = tree.states[std::size_t(near)];
     r.from = &from;
     r.control = control_of(d, settings, tree.centers[near].cast<double>(), shift(near));
-    propagator->propagate({&r, 1});
-    if (!r.ok || !system.acceptable(r.to)) continue;
+    if (!passes(system, settings, *propagator, r)) continue;
     const Vec3 center = system.robot_center(r.to);
     tree.add(r.to, near, r.control, i, center.cast<float>());
     if ((center - system.goal_shift(r.to) - settings.goal.center_of_mass_m).norm() <= settings.goal.radius_m)

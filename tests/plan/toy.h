@@ -55,6 +55,9 @@ struct Toy final : System {
 // Settings under which the toys are solved in some hundred iterations.
 Settings toy_settings();
 
+// The whole rollout; whether it stays acceptable at each frame time and at its end.
+bool passes(const System&, const Settings&, Propagator&, Rollout&);
+
 // The planner as the paper prints it: one expansion after the other, no speculation. The tree it grows.
 Tree sequential_tree(const System&, const Settings&, std::int64_t first_iteration = 0);
 

@@ -598,7 +598,7 @@ std::string all_of(const Scene& s) {
                      m.youngs_modulus_pa, m.poisson_ratio, m.density_kg_m3, m.damping_ratio, m.friction,
                      m.mesh_independent, v(body.pose.position_m), v(body.pose.axis), body.pose.angle_deg,
                      body.pose.anchor, v(body.color_srgb));
-    t += fmt::format(" {} {} {}", body.opacity, body.roughness, body.metallic);
+    t += fmt::format(" {} {} {} {}", body.opacity, body.roughness, body.metallic, body.max_volume_change);
     t += fmt::format(" {}", body.fixed.walls);
     for (const Box& box : body.fixed.boxes_m) t += b(box);
     for (const PartSpec& part : body.parts)
