@@ -13,6 +13,7 @@
 #include "core/progress.h"
 #include "render/detail/gl_context.h"
 #include "render/detail/ground_shade.h"
+#include "render/detail/layer_lists.h"
 #include "render/detail/line_quads.h"
 #include "render/detail/mesh_on_card.h"
 #include "render/detail/program.h"
@@ -122,11 +123,11 @@ namespace {
 std::string sample_defines(const Look& look) {
   if (look.multisampling)
     return "#define SAMPLER sampler2DMS\n#define INTEGER_SAMPLER isampler2DMS\n#define SAMPLES 4\n"
-           "#extension GL_ARB_sample_shading : require\n#define SAMPLE gl_SampleID\n"
+           "#define SAMPLES_A_TEXEL 4\n#define SAMPLE gl_SampleID\n"
            "#define FETCH(samples, pixel, i) texelFetch(samples, pixel, i)\n";
   return fmt::format(
       "#define SAMPLER sampler2D\n#define INTEGER_SAMPLER isampler2D\n#define SAMPLES {1}\n"
-      "#define SAMPLE 0\n"
+      "#define SAMPLES_A_TEXEL 1\n#define SAMPLE 0\n"
       "#define FETCH(samples, pixel, i) texelFetch(samples, pixel * {0} + ivec2(i % {0}, i / {0}), 0)\n",
       look.supersampling, look.supersampling * look.supersampling);
 }
@@ -139,7 +140,6 @@ SampleGrid sample_grid(const Look& look) {
 }  // namespace
 
 struct Renderer::Impl {
-  struct Chunk;
   explicit Impl(const Look& l);
 
   Image draw(const Camera&, Passes*, StageTimes*);
@@ -151,15 +151,21 @@ struct Renderer::Impl {
   void draw_shadow_map();
   void shade_ground_maps();
   void draw_opaque(bool passes);
+  struct Rectangle {
+    int left, top, right, bottom;  // right and bottom are beyond
+  };
+  Rectangle place_of_veils() const;
   void draw_veils();
-  void draw_lines(bool over_veils);
+  // Where there are veils: first what lies before one is put into the lists, then the rest is drawn.
+  enum class LinePass { draw_all, put, draw_rest };
+  void draw_lines(LinePass);
   Image finish();
   Passes finish_passes();
 
   std::vector<Plane> planes_of(const Mesh&) const;
   // Programs for what is drawn next, with all their uniforms.
-  void use_mesh(const Mesh&, const std::string& defines);
-  void use_depth(const Mat4& clip_from, const std::vector<Plane>&, const std::string& defines);
+  const Program& use_mesh(const Mesh&, const std::string& defines);
+  void use_depth(const Mat4& clip_from, const std::vector<Plane>&);
   bool has_veils() const;
   // Checks the number, and that there is a value for each of its vertices.
   Mesh& mesh_with(int number, Eigen::Index values, bool may_be_empty);
@@ -171,10 +177,12 @@ struct Renderer::Impl {
   Variants line_programs{line_vertex_shader, line_fragment_shader};
   Variants picture_programs{picture_vertex_shader, picture_fragment_shader};
   Variants passes_programs{picture_vertex_shader, passes_fragment_shader};
+  Variants layers_programs{picture_vertex_shader, layers_fragment_shader};
   std::string samples;  // defines
+  const std::string veiled = std::string("#define VEILED\n") + layer_lists;
   Targets targets;
+  LayerLists lists;
   GLuint empty_array, line_array, line_buffer;
-  std::vector<GLuint> queries;  // one a chunk of veils
   std::vector<Mesh> meshes;
   std::vector<Lines> lines;
   std::vector<Plane> clip_planes;
@@ -192,7 +200,7 @@ struct Renderer::Impl {
 };
 
 Renderer::Impl::Impl(const Look& l)
-    : look(l), samples(sample_defines(l)), targets(l.width, l.height, sample_grid(l)) {
+    : look(l), samples(sample_defines(l)), targets(l.width, l.height, sample_grid(l)), lists(sample_grid(l)) {
   look.up.normalize();
   look.toward_key.normalize();
   ground = ground_frame(look.up, look.ground_height_m.value_or(0));
@@ -286,7 +294,7 @@ void Renderer::Impl::draw_shadow_map() {
   for (Mesh& mesh : meshes) {
     if (!mesh.casts()) continue;
     (mesh.look.seen ? glDisable : glEnable)(GL_CULL_FACE);
-    use_depth(clip_from, clip_planes, "");
+    use_depth(clip_from, clip_planes);
     mesh.card.draw();
   }
   glDisable(GL_CULL_FACE);
@@ -332,16 +340,14 @@ void set_planes(const Program& program, const std::vector<Plane>& planes) {
 
 }  // namespace
 
-void Renderer::Impl::use_depth(const Mat4& clip_from, const std::vector<Plane>& planes,
-                               const std::string& defines) {
-  const Program& p = depth_programs.with(plane_defines(planes) + defines);
+void Renderer::Impl::use_depth(const Mat4& clip_from, const std::vector<Plane>& planes) {
+  const Program& p = depth_programs.with(plane_defines(planes));
   p.use();
   p.set("clip_from_world", clip_from);
-  p.set("nearer", 0);
   set_planes(p, planes);
 }
 
-void Renderer::Impl::use_mesh(const Mesh& mesh, const std::string& defines) {
+const Program& Renderer::Impl::use_mesh(const Mesh& mesh, const std::string& defines) {
   const std::vector<Plane> planes = planes_of(mesh);
   std::string all = plane_defines(planes) + defines;
   if (mesh.card.tinted()) all += "#define TINTED\n";
@@ -378,6 +384,7 @@ void Renderer::Impl::use_mesh(const Mesh& mesh, const std::string& defines) {
   p.set("metallic", mesh.look.metallic);
   p.set("opacity", mesh.look.opacity);
   p.set("object", int(&mesh - meshes.data()));
+  return p;
 }
 
 // Drawn with its edges over it, a surface stands back by as much as its depth changes over half the width of
@@ -413,113 +420,95 @@ void Renderer::Impl::draw_opaque(bool passes) {
   plane_defines({});
 }
 
-// A piece of a veil, drawn by itself: neighbours along the Morton curve.
-struct Renderer::Impl::Chunk {
-  Mesh* mesh;
-  std::size_t first, count;  // corners
-  GLuint query;
-  GLuint left = 0, seen = 0;  // samples no layer has shown yet; samples this layer may show
-
-  GLuint counted() const {
-    GLuint samples = 0;
-    glGetQueryObjectuiv(query, GL_QUERY_RESULT, &samples);
-    return samples;
-  }
-};
-
-// Depth peeling, front to back: of all veils the layer behind the last one is found by depth alone, then
-// shaded and put under what is there. A chunk all of whose samples have been shown is not drawn any more:
-// most are done after two or three layers.
-void Renderer::Impl::draw_veils() {
-  const Targets::Veils& veils = targets.veils();
+// All samples that veils may cover.
+Renderer::Impl::Rectangle Renderer::Impl::place_of_veils() const {
   const SampleGrid grid = sample_grid(look);
-  constexpr std::size_t chunk_corners = 3 * 512;
-  std::vector<Chunk> chunks;
-  for (Mesh& mesh : meshes)
+  Eigen::Array2d lower(1, 1), upper(-1, -1);  // of the screen, −1 … 1
+  for (const Mesh& mesh : meshes)
     if (mesh.look.seen && mesh.transparent())
-      for (std::size_t first = 0, all = mesh.card.drawn().corners.size(); first < all; first += chunk_corners)
-        chunks.push_back({&mesh, first, std::min(chunk_corners, all - first), 0});
-  if (queries.size() < chunks.size()) {
-    glDeleteQueries(GLsizei(queries.size()), queries.data());
-    queries.resize(chunks.size());
-    glGenQueries(GLsizei(queries.size()), queries.data());
-  }
-  for (std::size_t c = 0; c < chunks.size(); ++c) chunks[c].query = queries[c];
-
-  // Draws the chunks that `wanted` names, mesh by mesh, and counts the samples of each that pass.
-  const auto draw = [&](const auto& wanted, const auto& prepare) {
-    const Mesh* prepared = nullptr;
-    for (Chunk& chunk : chunks) {
-      if (!wanted(chunk)) continue;
-      if (chunk.mesh != prepared) {
-        stand_back_for_edges(*chunk.mesh, look.multisampling ? 1 : look.supersampling);
-        prepare(*chunk.mesh);
-        prepared = chunk.mesh;
-      }
-      glBeginQuery(GL_SAMPLES_PASSED, chunk.query);
-      chunk.mesh->card.draw(chunk.first, chunk.count);
-      glEndQuery(GL_SAMPLES_PASSED);
-    }
+      for_corners(mesh.card.box(), [&](const Vec3& corner) {
+        const Eigen::Vector4d clip = clip_from_world * corner.homogeneous();
+        if (clip.w() > 0) {
+          lower = lower.min(clip.head<2>().array() / clip.w());
+          upper = upper.max(clip.head<2>().array() / clip.w());
+        } else {  // behind the eye
+          lower.setConstant(-1), upper.setConstant(1);
+        }
+      });
+  const auto sample = [](double screen, int side) {
+    return int(std::clamp(0.5 + 0.5 * screen, 0.0, 1.0) * side);
   };
-  const auto draw_depths = [&](bool behind, const auto& wanted) {
-    glColorMask(GL_FALSE, GL_FALSE, GL_FALSE, GL_FALSE);
-    draw(wanted, [&](Mesh& mesh) {
-      use_depth(clip_from_world, planes_of(mesh), behind ? samples + "#define BEHIND\n" : "");
-    });
-    glColorMask(GL_TRUE, GL_TRUE, GL_TRUE, GL_TRUE);
-  };
-
-  const float nothing[4] = {0, 0, 0, 0};
-  glBindFramebuffer(GL_FRAMEBUFFER, veils.frame[0]);
-  glClearBufferfv(GL_COLOR, 0, nothing);
-  glBindFramebuffer(GL_FRAMEBUFFER, targets.samples_frame);
-  glDepthMask(GL_FALSE);
-  draw_depths(false, [](const Chunk&) { return true; });
-  for (Chunk& chunk : chunks) chunk.left = chunk.counted();
-
-  for (int layer = 0; layer < most_veil_layers; ++layer) {
-    if (std::none_of(chunks.begin(), chunks.end(), [](const Chunk& c) { return c.left > 0; })) break;
-    // The first layer's depth is kept: lines before it are drawn over it.
-    const auto place = [](int l) { return std::size_t(l == 0 ? 0 : 1 + l % 2); };
-    const unsigned frame = veils.frame[place(layer)];
-    glBindFramebuffer(GL_READ_FRAMEBUFFER, targets.samples_frame);
-    glBindFramebuffer(GL_DRAW_FRAMEBUFFER, frame);
-    glBlitFramebuffer(0, 0, grid.width, grid.height, 0, 0, grid.width, grid.height, GL_DEPTH_BUFFER_BIT,
-                      GL_NEAREST);
-    glBindFramebuffer(GL_FRAMEBUFFER, frame);
-    glDepthMask(GL_TRUE);
-    if (layer > 0) veils.depth[place(layer - 1)].bind(0);
-    draw_depths(layer > 0, [](const Chunk& c) { return c.left > 0; });
-    for (Chunk& chunk : chunks) chunk.seen = chunk.left > 0 ? chunk.counted() : 0;
-
-    glDepthMask(GL_FALSE);
-    glDepthFunc(GL_EQUAL);
-    glEnable(GL_BLEND);
-    glBlendFunc(GL_ONE_MINUS_DST_ALPHA, GL_ONE);
-    const auto may_be_seen = [](const Chunk& c) { return c.seen > 0; };
-    draw(may_be_seen, [&](Mesh& mesh) { use_mesh(mesh, ""); });
-    glDepthFunc(GL_LESS);
-    glDisable(GL_BLEND);
-    for (Chunk& chunk : chunks)
-      if (may_be_seen(chunk)) chunk.left -= std::min(chunk.left, chunk.counted());
-  }
-  glDepthMask(GL_TRUE);
-  glDisable(GL_POLYGON_OFFSET_FILL);
-  plane_defines({});
+  return {sample(lower.x(), grid.width), sample(lower.y(), grid.height),
+          std::min(sample(upper.x(), grid.width) + 1, grid.width),
+          std::min(sample(upper.y(), grid.height) + 1, grid.height)};
 }
 
-// Under the veils all lines are drawn on what is opaque; over them, those before the first layer, where there
-// is one.
-void Renderer::Impl::draw_lines(bool over_veils) {
+// Veils, and the lines before some of them, by lists of layers: whatever is not hidden by the opaque is
+// shaded once, and each sample's list is put over the sample front to back.
+void Renderer::Impl::draw_veils() {
+  const SampleGrid grid = sample_grid(look);
+  const Rectangle place = place_of_veils();
+  glBindFramebuffer(GL_FRAMEBUFFER, targets.samples_frame);
+  glEnable(GL_SCISSOR_TEST);
+  int rows = lists.most_rows();
+  for (int row = 0; row < grid.height;) {
+    rows = std::min(rows, grid.height - row);
+    glScissor(0, row, grid.width, rows);
+    lists.clear(row, rows);
+    glDepthMask(GL_FALSE);
+    glColorMask(GL_FALSE, GL_FALSE, GL_FALSE, GL_FALSE);
+    for (const Mesh& mesh : meshes) {
+      if (!mesh.look.seen || !mesh.transparent()) continue;
+      stand_back_for_edges(mesh, look.multisampling ? 1 : look.supersampling);
+      lists.set_uniforms(use_mesh(mesh, samples + veiled));
+      mesh.card.draw();
+    }
+    glDisable(GL_POLYGON_OFFSET_FILL);
+    plane_defines({});
+    glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT);
+    draw_lines(LinePass::put);
+    glColorMask(GL_TRUE, GL_TRUE, GL_TRUE, GL_TRUE);
+    if (lists.wanted() > lists.room()) {
+      if (lists.make_room(lists.wanted())) continue;
+      if (rows > 1) {
+        rows = (rows + 1) / 2;
+        continue;
+      }
+    }  // hundreds of layers all along one row: what has no room is left out
+    draw_lines(LinePass::draw_rest);
+
+    const int first = std::max(row, place.top), last = std::min(row + rows, place.bottom);
+    glScissor(place.left, first, std::max(place.right - place.left, 0), std::max(last - first, 0));
+    glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT);
+    glDisable(GL_DEPTH_TEST);
+    glEnable(GL_BLEND);
+    glBlendFunc(GL_ONE, GL_ONE_MINUS_SRC_ALPHA);
+    const Program& p = layers_programs.with(samples + layer_lists);
+    p.use();
+    lists.set_uniforms(p);
+    glBindVertexArray(empty_array);
+    glDrawArrays(GL_TRIANGLES, 0, 3);
+    glDisable(GL_BLEND);
+    glEnable(GL_DEPTH_TEST);
+    row += rows;
+  }
+  glDisable(GL_SCISSOR_TEST);
+}
+
+void Renderer::Impl::draw_lines(LinePass pass) {
   const double per_pixel = look.multisampling ? 1 : look.supersampling;
   const SampleGrid grid = sample_grid(look);
   const Screen screen{clip_from_world, Eigen::Vector2d(grid.width, grid.height)};
-  glBindFramebuffer(GL_FRAMEBUFFER, over_veils ? targets.veils().frame[0] : targets.samples_frame);
+  glBindFramebuffer(GL_FRAMEBUFFER, targets.samples_frame);
   glEnable(GL_BLEND);
-  glBlendFunc(GLenum(over_veils ? GL_DST_ALPHA : GL_ONE), GL_ONE_MINUS_SRC_ALPHA);
+  glBlendFunc(GL_ONE, GL_ONE_MINUS_SRC_ALPHA);
   glDepthMask(GL_FALSE);
-  const Program& p = line_programs.with("");
+  const Program& p = line_programs.with(pass == LinePass::draw_all ? "" : samples + veiled);
   p.use();
+  if (pass != LinePass::draw_all) {
+    lists.set_uniforms(p);
+    p.set("putting", pass == LinePass::put ? 1 : 0);
+  }
   glBindVertexArray(line_array);
   std::vector<float> corners;
   const auto draw = [&](const Points& ends, const LineLook& line, const std::vector<Plane>& planes) {
@@ -543,9 +532,8 @@ Image Renderer::Impl::finish() {
   glBindFramebuffer(GL_FRAMEBUFFER, targets.picture_frame);
   glViewport(0, 0, look.width, look.height);
   glDisable(GL_DEPTH_TEST);
-  const bool veiled = has_veils();
-  const Program& p = picture_programs.with(samples + (veiled ? "#define VEILS\n" : "") +
-                                           (look.transparent_background ? "#define TRANSPARENT\n" : ""));
+  const Program& p =
+      picture_programs.with(samples + (look.transparent_background ? "#define TRANSPARENT\n" : ""));
   p.use();
 
   const double tangent = std::tan(0.5 * camera.fov_deg * std::numbers::pi / 180);
@@ -558,7 +546,6 @@ Image Renderer::Impl::finish() {
   const double key_share = key_light.y() * look.toward_key.dot(look.up);
   p.set("ray_from_screen", ray);
   p.set("samples", 0);
-  p.set("veils", 3);
   p.set("last_row", look.height - 1);
   p.set("background_bottom", shown_as(look.background_bottom_srgb));
   p.set("background_top", shown_as(look.background_top_srgb));
@@ -584,7 +571,6 @@ Image Renderer::Impl::finish() {
   targets.samples.bind(0);
   targets.ground_key_map.bind(1);
   targets.ground_sky_map.bind(2);
-  if (veiled) targets.veils().color.bind(3);
   glBindVertexArray(empty_array);
   glDrawArrays(GL_TRIANGLES, 0, 3);
 
@@ -737,12 +723,12 @@ Image Renderer::Impl::draw(const Camera& from, Passes* passes, StageTimes* times
   done(&StageTimes::ground_s);
   draw_opaque(passes != nullptr);
   done(&StageTimes::opaque_s);
-  draw_lines(false);
-  done(&StageTimes::lines_s);
   if (has_veils()) {
     draw_veils();
-    draw_lines(true);
     done(&StageTimes::veils_s);
+  } else {
+    draw_lines(LinePass::draw_all);
+    done(&StageTimes::lines_s);
   }
   if (passes) *passes = finish_passes();
   const Image image = finish();

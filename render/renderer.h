@@ -55,9 +55,6 @@ struct MeshLook {
   std::optional<LineLook> edges = {};  // drawn over the surface; what hides the surface hides them
 };
 
-// Where one ray of sight meets more layers of veils (opacity below 1) than this, the farthest are left out.
-constexpr int most_veil_layers = 8;
-
 // A plane n·p + d = 0 as (n, d).
 using Plane = Eigen::Vector4d;
 constexpr int most_clip_planes = 6;

@@ -42,7 +42,7 @@ struct GlContext::Backend {
 
 GlContext::GlContext() : backend_(std::make_unique<Backend>()) {
   const EGLint attributes[] = {EGL_CONTEXT_MAJOR_VERSION,
-                               3,
+                               4,
                                EGL_CONTEXT_MINOR_VERSION,
                                3,
                                EGL_CONTEXT_OPENGL_PROFILE_MASK,
@@ -50,7 +50,7 @@ GlContext::GlContext() : backend_(std::make_unique<Backend>()) {
                                EGL_NONE};
   if (!eglBindAPI(EGL_OPENGL_API)) refuse("has no OpenGL");
   backend_->context = eglCreateContext(display(), EGL_NO_CONFIG_KHR, EGL_NO_CONTEXT, attributes);
-  if (backend_->context == EGL_NO_CONTEXT) refuse("gives no OpenGL 3.3 context");
+  if (backend_->context == EGL_NO_CONTEXT) refuse("gives no OpenGL 4.3 context");
   make_current();
 }
 

@@ -9,12 +9,12 @@ namespace limber::render::detail {
 
 Program::Program(const char* vertex, const char* fragment, const std::string& defines)
     : id_(glCreateProgram()) {
-  const std::string head = "#version 330 core\n" + defines;
   for (const auto& [kind, text] :
        {std::pair{GL_VERTEX_SHADER, vertex}, std::pair{GL_FRAGMENT_SHADER, fragment}}) {
     const GLuint shader = glCreateShader(GLenum(kind));
-    const char* texts[] = {head.c_str(), text};
-    glShaderSource(shader, 2, texts, nullptr);
+    const char* texts[] = {"#version 430 core\n", kind == GL_VERTEX_SHADER ? "" : "#define FRAGMENT\n",
+                           defines.c_str(), text};
+    glShaderSource(shader, 4, texts, nullptr);
     glCompileShader(shader);
     GLint compiled = 0;
     char log[2000] = "";

@@ -10,7 +10,8 @@ namespace limber::render::detail {
 
 class Program {
  public:
-  // defines: lines of #define put before both texts. The programs live as long as their context.
+  // defines: lines put before both texts. FRAGMENT is defined in one of them. The programs live as long as
+  // their context.
   Program(const char* vertex, const char* fragment, const std::string& defines = "");
   void use() const;
   // The uniform of this name; one that the shaders do not use is passed over.

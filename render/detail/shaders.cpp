@@ -2,6 +2,26 @@
 
 namespace limber::render::detail {
 
+// A list a sample of what is drawn there half transparent: detail/layer_lists.h.
+const char* const layer_lists = R"(
+#ifdef FRAGMENT
+struct Fragment { uint red_green, blue_alpha; float depth; uint next; };
+layout(std430, binding = 0) buffer Heads { uint count; uint heads[]; };   // 1 + the place of the last one put; 0: none
+layout(std430, binding = 1) buffer Fragments { Fragment fragments[]; };
+uniform int columns, first_row;  // of the texels that have lists
+uint list() {
+  ivec2 texel = ivec2(gl_FragCoord.xy);
+  return uint(((texel.y - first_row) * columns + texel.x) * SAMPLES_A_TEXEL + SAMPLE);
+}
+void put(vec4 color, float depth) {
+  uint place = atomicAdd(count, 1u);
+  if (place >= uint(fragments.length())) return;
+  uint next = atomicExchange(heads[list()], place + 1u);
+  fragments[place] = Fragment(packHalf2x16(color.rg), packHalf2x16(color.ba), depth, next);
+}
+#endif
+)";
+
 const char* const mesh_vertex_shader = R"(
 layout(location = 0) in vec3 position_in;
 layout(location = 1) in vec3 normal_in;
@@ -22,7 +42,6 @@ uniform vec4 planes[PLANES];     // what is below one is cut off
 out float gl_ClipDistance[PLANES];
 #endif
 out vec3 position, normal, shadow_place;
-invariant gl_Position;           // the same in all variants: veils compare depths for equality
 void main() {
   position = position_in;
   normal = normal_in;
@@ -69,7 +88,11 @@ uniform float roughness, metallic, opacity;
 uniform float shadow_step;       // between taps, in units of the map
 uniform sampler2DShadow shadow_map;
 uniform sampler2D ground_sky_map;
+#ifdef VEILED
+layout(early_fragment_tests) in;
+#else
 layout(location = 0) out vec4 color;
+#endif
 
 float key_visibility() {
   float sum = 0.0;
@@ -134,7 +157,11 @@ void main() {
 #ifdef FLAT_INSIDE
   if (!gl_FrontFacing) light = 0.5 * albedo * (sky_light + 0.5 * key_light);
 #endif
+#ifdef VEILED
+  put(vec4(light * opacity, opacity), gl_FragCoord.z);
+#else
   color = vec4(light * opacity, opacity);
+#endif
 #ifdef PASSES
   normal_scalar = vec4(n, scalar);
   object_seen = object;
@@ -149,7 +176,6 @@ uniform mat4 clip_from_world;
 uniform vec4 planes[PLANES];
 out float gl_ClipDistance[PLANES];
 #endif
-invariant gl_Position;
 void main() {
   gl_Position = clip_from_world * vec4(position_in, 1.0);
 #if PLANES > 0
@@ -157,14 +183,29 @@ void main() {
 #endif
 }
 )";
-const char* const depth_fragment_shader = R"(
-#ifdef BEHIND
-uniform SAMPLER nearer;
-#endif
+const char* const depth_fragment_shader = "void main() {}";
+
+// Of equal depth, what was put later is in front: a list begins with the last.
+const char* const layers_fragment_shader = R"(
+out vec4 color;
 void main() {
-#ifdef BEHIND
-  if (gl_FragCoord.z <= texelFetch(nearer, ivec2(gl_FragCoord.xy), SAMPLE).r) discard;
-#endif
+  uint head = heads[list()];
+  if (head == 0u) discard;
+  color = vec4(0.0);
+  float shown_depth = -1.0;
+  uint shown = head + 1u;
+  for (;;) {
+    uint nearest = 0u;
+    float depth = 2.0;
+    for (uint i = head; i != 0u; i = fragments[i - 1u].next) {
+      float d = fragments[i - 1u].depth;
+      if (d < depth && (d > shown_depth || (d == shown_depth && i < shown))) nearest = i, depth = d;
+    }
+    if (nearest == 0u) break;
+    Fragment f = fragments[nearest - 1u];
+    color += (1.0 - color.a) * vec4(unpackHalf2x16(f.red_green), unpackHalf2x16(f.blue_alpha));
+    shown = nearest, shown_depth = depth;
+  }
 }
 )";
 
@@ -178,10 +219,22 @@ const char* const line_fragment_shader = R"(
 noperspective in float across;
 uniform vec4 line_color;    // straight
 uniform float half_width;   // samples
+#ifdef VEILED
+layout(early_fragment_tests) in;
+uniform int putting;        // 1: what lies before a veil is put into its list; 0: the rest is drawn
+#endif
 out vec4 color;
 void main() {
   float cover = line_color.a * clamp(half_width + 0.5 - abs(across), 0.0, 1.0);
   color = vec4(line_color.rgb * cover, cover);
+#ifdef VEILED
+  // Just before the nearest veil behind it. Lines that are there already have the depth of their veil.
+  float veil = 2.0;
+  for (uint i = heads[list()]; i != 0u; i = fragments[i - 1u].next)
+    if (fragments[i - 1u].depth > gl_FragCoord.z) veil = min(veil, fragments[i - 1u].depth);
+  if (putting == 1 && veil < 2.0 && cover > 0.0) put(color, veil);
+  if (veil < 2.0) color = vec4(0.0);
+#endif
 }
 )";
 
@@ -201,9 +254,6 @@ const char* const picture_fragment_shader = R"(
 in vec3 ray;
 in float height;
 uniform SAMPLER samples;
-#ifdef VEILS
-uniform SAMPLER veils;
-#endif
 uniform int last_row;
 uniform vec3 background_bottom, background_top;
 uniform vec3 eye;
@@ -220,14 +270,7 @@ out vec4 color;
 void main() {
   ivec2 pixel = ivec2(gl_FragCoord.x, last_row - int(gl_FragCoord.y));
   vec4 sum = vec4(0.0);
-  for (int i = 0; i < SAMPLES; ++i) {
-    vec4 nearest = FETCH(samples, pixel, i);
-#ifdef VEILS
-    vec4 veil = FETCH(veils, pixel, i);
-    nearest = veil + (1.0 - veil.a) * nearest;
-#endif
-    sum += nearest;
-  }
+  for (int i = 0; i < SAMPLES; ++i) sum += FETCH(samples, pixel, i);
   sum *= 1.0 / float(SAMPLES);
 
   vec3 background = mix(background_bottom, background_top, height);

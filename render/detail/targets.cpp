@@ -87,17 +87,6 @@ Targets::Targets(int width, int height, SampleGrid grid) : width_(width), height
   ground_sky_map = new_texture(GL_LINEAR, GL_CLAMP_TO_EDGE);
 }
 
-const Targets::Veils& Targets::veils() {
-  if (veils_.color.id == 0) {
-    veils_.color = new_target(GL_RGBA16F, grid_);
-    for (std::size_t i = 0; i < veils_.depth.size(); ++i) {
-      veils_.depth[i] = new_target(GL_DEPTH_COMPONENT32F, grid_);
-      veils_.frame[i] = new_framebuffer({veils_.color}, veils_.depth[i]);
-    }
-  }
-  return veils_;
-}
-
 const Targets::Passes& Targets::passes() {
   if (passes_.object.id == 0) {
     passes_.normal_scalar = new_target(GL_RGBA32F, grid_);

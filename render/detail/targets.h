@@ -1,8 +1,6 @@
-// What the renderer draws into, and the textures it reads back from. Those that only veils or passes need are
-// made when they are first asked for.
+// What the renderer draws into, and the textures it reads back from. Those that only passes need are made
+// when they are first asked for.
 #pragma once
-
-#include <array>
 
 namespace limber::render::detail {
 
@@ -26,20 +24,12 @@ class Targets {
   Texture shadow_map;
   unsigned shadow_frame;
 
-  // The opaque: colour (premultiplied, linear) and depth.
+  // Colour (premultiplied, linear), and the depth of the opaque.
   Texture samples, samples_depth;
   unsigned samples_frame;
   Texture picture;  // (height × width), four floats
   unsigned picture_frame;
   Texture ground_key_map, ground_sky_map;
-
-  // Veils: their sum, and the depths of the first layer and of the last two.
-  struct Veils {
-    Texture color;
-    std::array<Texture, 3> depth;
-    std::array<unsigned, 3> frame;  // colour with depth[i]
-  };
-  const Veils& veils();
 
   // Beside the colours of the opaque: normal and scalar, number of the mesh; and the same once a pixel.
   struct Passes {
@@ -53,7 +43,6 @@ class Targets {
  private:
   int width_, height_;
   SampleGrid grid_;
-  Veils veils_{};
   Passes passes_{};
 };
 

@@ -323,12 +323,67 @@ TEST(Renderer, VeilsAreSortedWithinEachPixel) {
   }
 }
 
-TEST(Renderer, NoMoreLayersOfVeilsThanSaid) {
-  Renderer renderer(small_look());
-  for (int i = 0; i < most_veil_layers + 3; ++i)
-    add(renderer, upright_quad(0.1 * i), {"veil", {1, 1, 1}, 0.5, 0, 0.2});
-  EXPECT_NEAR(alpha(renderer.draw(camera_from({0, -5, 0})), 160, 120), 1 - std::pow(0.8, most_veil_layers),
-              2e-3);
+// Each one is seen, also where they are too many to be held for the whole picture at once.
+TEST(Renderer, EveryLayerOfVeilsCounts) {
+  constexpr double opacity = 0.03;
+  for (const int layers : {2, 11, 30}) {
+    Renderer renderer(small_look());
+    for (int i = 0; i < layers; ++i)
+      add(renderer, upright_quad(0.1 * i, 3 + 0.2 * i), {"veil", {1, 1, 1}, 0.5, 0, opacity});
+    const Image image = renderer.draw(camera_from({0, -5, 0}));
+    for (const int y : {2, 60, 120, 180, 237})
+      for (const int x : {2, 160, 317})
+        EXPECT_NEAR(alpha(image, x, y), 1 - std::pow(1 - opacity, layers), 1e-3) << x << ' ' << y;
+  }
+}
+
+// Three veils, a line before, between or behind them, drawn across something opaque: as if each were drawn
+// alone and the pictures laid over one another. Where no line is, nothing changes.
+TEST(Renderer, ALineBetweenVeilsIsVeiledByThoseBeforeItAlone) {
+  const Camera camera = camera_from({0, -5, 0});
+  const LineLook line_look{{0.9, 0.1, 0.1}, 8, 0.7};
+  const auto line_at = [](double y) {
+    Points ends(2, 3);
+    ends << -2, y, 0, 2, y, 0;
+    return ends;
+  };
+  for (const bool multisampling : {false, true}) {
+    Look look = small_look();
+    look.multisampling = multisampling;
+    look.transparent_background = true;
+    look.stage.include(Vec3(-2, -2, -2)), look.stage.include(Vec3(2, 4, 2));
+    const auto veil = [](int i) {
+      return MeshLook{"veil", {0.2 + 0.3 * i, 0.8 - 0.3 * i, 0.5}, 0.5, 0, 0.3 + 0.05 * i};
+    };
+    const MeshLook solid{"solid", {0.7, 0.7, 0.7}};
+    std::vector<Image> alone;
+    for (int i = 0; i < 3; ++i) alone.push_back(picture_of(upright_quad(i), look, camera, veil(i)));
+    const Image behind = picture_of(upright_quad(3), look, camera, solid);
+    const auto with_line = [&](std::optional<double> y) {
+      Renderer renderer(look);
+      for (const int i : {1, 2, 0}) add(renderer, upright_quad(i), veil(i));
+      add(renderer, upright_quad(3), solid);
+      if (y) renderer.add_lines(line_at(*y), line_look);
+      return renderer.draw(camera);
+    };
+    const Image without = with_line({});
+    for (int before = 0; before < 4; ++before) {  // veils before the line
+      const double y = before - 0.5;
+      Renderer line_alone(look);
+      line_alone.add_lines(line_at(y), line_look);
+      const Eigen::Vector4d line = rgba(line_alone.draw(camera), 160, 120);
+      Eigen::Vector4d expected = rgba(behind, 160, 120);
+      for (int i = 2; i >= 0; --i) {
+        if (before == i + 1) expected = over(line, expected);
+        expected = over(rgba(alone[std::size_t(i)], 160, 120), expected);
+      }
+      if (before == 0) expected = over(line, expected);
+      const Image image = with_line(y);
+      EXPECT_LT((rgba(image, 160, 120) - expected).cwiseAbs().maxCoeff(), 3e-3)
+          << before << ' ' << multisampling;
+      EXPECT_EQ(rgba(image, 160, 60), rgba(without, 160, 60));
+    }
+  }
 }
 
 TEST(Renderer, ALineBehindAVeilIsVeiledAndOneBeforeItIsNot) {

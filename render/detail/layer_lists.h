@@ -1,0 +1,37 @@
+// Of each sample a list of what is drawn there half transparent, with its depth: an A-buffer (Carpenter 1984)
+// as linked lists (Yang et al., Real-time concurrent linked list construction on the GPU, 2010). What
+// shaders put and read with is in shaders.cpp. A list holds rows of samples; many layers in a large
+// picture do not fit at once, and are then drawn band by band.
+#pragma once
+
+#include <cstddef>
+
+#include "render/detail/program.h"
+#include "render/detail/targets.h"
+
+namespace limber::render::detail {
+
+class LayerLists {
+ public:
+  explicit LayerLists(const SampleGrid&);
+
+  // Empty lists for so many rows of texels; 1 … most_rows().
+  void clear(int first_row, int rows);
+  int most_rows() const;
+  void set_uniforms(const Program&) const;  // of a program that puts or reads, in use
+
+  // How many were put since they were cleared; those beyond the room are not in any list.
+  std::size_t wanted() const;
+  std::size_t room() const { return room_; }
+  // Makes room for so many, with a reserve; what the lists hold is lost. False, and nothing is done: OpenGL
+  // allows no buffer as large.
+  bool make_room(std::size_t fragments);
+
+ private:
+  SampleGrid grid_;
+  int first_row_ = 0, rows_with_heads_ = 0;
+  std::size_t largest_buffer_, room_ = 0;
+  unsigned heads_ = 0, fragments_ = 0;
+};
+
+}  // namespace limber::render::detail
