@@ -424,11 +424,19 @@ int run_command_line(int argc, const char* const* argv) {
       ->check(CLI::Range(1e-9, 1e9))
       ->capture_default_str();
   new_command
-      .add_option("--shrink", new_options.shrink,
-                  "of every organ's true size, 0.1 … 1, since cages need room")
-      ->check(CLI::Range(0.1, 1.0))
+      .add_option(
+          "--shrink", new_options.shrink,
+          "largest share of its true size that an organ may have, 0.3 … 1; as much less as cages need")
+      ->check(CLI::Range(0.3, 1.0))
       ->capture_default_str();
-  new_command.add_option("--tets", new_options.tets, "of each soft cage, about; 60 … 20000")
+  new_command
+      .add_option("--goal", new_options.goal,
+                  "where the robot goes, past all that lies that way: front, back, left, right (the body's), "
+                  "up, down")
+      ->check(CLI::IsMember({"front", "back", "left", "right", "up", "down"}))
+      ->capture_default_str();
+  new_command
+      .add_option("--tets", new_options.tets, "of each soft cage, about; 60 … 20000; more fit more closely")
       ->check(CLI::Range(60, 20000))
       ->capture_default_str();
   for (const auto& [flag, axis, meaning] :

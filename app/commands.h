@@ -147,9 +147,10 @@ struct NewSceneOptions {
   std::vector<std::string> only;                // names without ending; empty: all models of the folder
   std::vector<std::string> see_through, rigid;  // besides those whose names say so
   double scale = 0.001;                         // metres a file unit
-  double shrink = 0.8;                          // of every organ's true size
-  int tets = 80;                                // of a soft cage
+  double shrink = 1;                            // at most so much of every organ's true size
+  int tets = 160;                               // of a soft cage
   std::string up = "+z", front = "-y";
+  std::string goal = "front";  // or back, left, right, up, down
 };
 Outcome new_scene(const NewSceneOptions&);
 

@@ -3,11 +3,16 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <map>
 
 #include "app/commands.h"
+#include "app/layout.h"
+#include "app/scene_world.h"
 #include "core/error.h"
 #include "core/log.h"
+#include "core/progress.h"
+#include "meshing/cage.h"
 #include "meshing/import.h"
 #include "scenes/models.h"
 #include "scenes/scene.h"
@@ -46,12 +51,50 @@ const Usual& usual_of(const std::string& name) {
                        [&](const Usual& u) { return name.starts_with(u.name); });
 }
 
+constexpr int bone_tets = 500;
+// What is thinner, of its diagonal, is a sheet, as a diaphragm: no coarse cage is near it, so it is only
+// seen.
+constexpr double least_thickness = 0.02;
+// The largest of these shares of its true size is taken at which the organs come apart within that reach, a
+// share of all organs' diagonal.
+constexpr double scale_step = 0.05, least_scale = 0.3;
+constexpr double reach = 0.03;
+constexpr double room = 0.005;  // cages are parted by so much larger than they are, and by more in each round
+constexpr int most_rounds = 8;
+constexpr int most_triangles_seen_through = 30'000;
+
 struct Organ {
   std::string name, file;
-  Box box;  // metres, in our axes, of its true size
-  double volume_m3 = 0;
+  SurfaceMesh surface;  // as in the file
+  Box box;              // metres, in our axes, of its true size
+  double volume_m3 = 0, thickness_m = 0;
   bool see_through = false, bone = false;
+  int pieces = 1;
+  TetMesh cage;               // of its true size and at its true place; none when seen through
+  Vec3 way_m = Vec3::Zero();  // from there
 };
+
+// Where a model of the folder is, at its true size.
+void to_our_frame(const NewSceneOptions& options, Points& positions) {
+  scenes::BodySpec body;
+  scenes::FileModel model;
+  model.scale = options.scale;
+  model.up = scenes::axis_named(options.up), model.front = scenes::axis_named(options.front);
+  body.model = model;
+  body.pose.anchor = "origin";
+  scenes::transform(scenes::world_from_model(body, positions, false), positions);
+}
+
+// Throws InputError where a name that was given is none of the folder's.
+void check_names(const NewSceneOptions& options, const std::vector<std::string>& names) {
+  for (const auto& [flag, list] : {std::pair("--only", &options.only),
+                                   {"--see-through", &options.see_through},
+                                   {"--rigid", &options.rigid}})
+    for (const std::string& wanted : *list)
+      if (std::count(names.begin(), names.end(), wanted) == 0)
+        throw InputError(fmt::format("{} {}: {} has no such model; there are: {}", flag, wanted,
+                                     options.from.string(), fmt::join(names, ", ")));
+}
 
 std::vector<Organ> read_organs(const NewSceneOptions& options) {
   std::vector<fs::path> files;
@@ -63,93 +106,228 @@ std::vector<Organ> read_organs(const NewSceneOptions& options) {
     throw InputError(fmt::format("{}: holds no model ({})", options.from.string(), fmt::join(endings, ", ")));
   std::vector<std::string> names;
   for (const fs::path& file : files) names.push_back(file.stem().string());
-  for (const std::string& wanted : options.only)
-    if (std::count(names.begin(), names.end(), wanted) == 0)
-      throw InputError(fmt::format("--only {}: {} has no such model; there are: {}", wanted,
-                                   options.from.string(), fmt::join(names, ", ")));
+  check_names(options, names);
   std::vector<Organ> organs;
   for (std::size_t i = 0; i < files.size(); ++i) {
     if (!options.only.empty() && std::count(options.only.begin(), options.only.end(), names[i]) == 0)
       continue;
+    throw_if_stopped();
     log::info("reading {}", files[i].string());
-    SurfaceMesh mesh = meshing::import_model(files[i], {}).surface;
-    scenes::BodySpec body;
-    scenes::FileModel model;
-    model.scale = options.scale;
-    model.up = scenes::axis_named(options.up), model.front = scenes::axis_named(options.front);
-    body.model = model;
-    body.pose.anchor = "origin";
-    scenes::transform(scenes::world_from_model(body, mesh.positions, false), mesh.positions);
-    organs.push_back({.name = names[i],
-                      .file = files[i].filename().string(),
-                      .box = bounding_box(mesh.positions),
-                      .volume_m3 = std::abs(volume(mesh)),
-                      .see_through = begins_with_one_of(names[i], hulls),
-                      .bone = begins_with_one_of(names[i], bones)});
+    Organ organ;
+    organ.name = names[i], organ.file = files[i].filename().string();
+    const meshing::ImportedModel model = meshing::import_model(files[i], {.count_self_intersections = false});
+    organ.surface = model.surface;
+    Points positions = organ.surface.positions;
+    to_our_frame(options, positions);
+    organ.box = bounding_box(positions);
+    const SurfaceMesh placed{positions, organ.surface.triangles};
+    organ.volume_m3 = std::abs(volume(placed));
+    organ.thickness_m = 2 * organ.volume_m3 / area(placed);
+    organ.pieces = int(model.left.components);
+    organ.see_through = begins_with_one_of(organ.name, hulls);
+    organ.bone = begins_with_one_of(organ.name, bones);
+    for (const auto& [list, flag] :
+         {std::pair(&options.see_through, &organ.see_through), {&options.rigid, &organ.bone}})
+      if (std::count(list->begin(), list->end(), organ.name) > 0) *flag = true;
+    if (organ.name == options.robot) organ.see_through = organ.bone = false;
+    organs.push_back(std::move(organ));
   }
   return organs;
+}
+
+// Of two bones, or two things seen through, that fill the same place one is enough: the one of fewer pieces,
+// then of fewer triangles.
+void leave_out_doubles(std::vector<Organ>& organs, std::vector<std::string>& notes) {
+  const auto same_place = [](const Organ& a, const Organ& b) {
+    const double tolerance_m = 0.01 * a.box.diagonal();
+    return a.see_through == b.see_through && a.bone == b.bone && (a.see_through || a.bone) &&
+           (a.box.lower - b.box.lower).norm() < tolerance_m &&
+           (a.box.upper - b.box.upper).norm() < tolerance_m;
+  };
+  const auto effort = [](const Organ& organ) {
+    return std::pair(organ.pieces, organ.surface.triangles.rows());
+  };
+  for (std::size_t a = 0; a < organs.size(); ++a)
+    for (std::size_t b = a + 1; b < organs.size();) {
+      if (!same_place(organs[a], organs[b])) {
+        ++b;
+        continue;
+      }
+      if (effort(organs[b]) < effort(organs[a])) std::swap(organs[a], organs[b]);
+      notes.push_back(fmt::format("{} is left out: it is where {} is", organs[b].name, organs[a].name));
+      organs.erase(organs.begin() + std::ptrdiff_t(b));
+    }
+}
+
+void make_cage(const NewSceneOptions& options, Organ& organ) {
+  throw_if_stopped();
+  SurfaceMesh surface = organ.surface;
+  to_our_frame(options, surface.positions);
+  organ.cage = meshing::build_cage(surface, {}, {.tets = organ.bone ? bone_tets : options.tets}).mesh;
+}
+
+// About its own middle, and moved by its way.
+TetMesh placed(const Organ& organ, double scale) {
+  TetMesh cage = organ.cage;
+  const Vec3 center = organ.box.center();
+  cage.positions = ((cage.positions.rowwise() - center.transpose()) * scale).rowwise() +
+                   (center + organ.way_m).transpose();
+  return cage;
+}
+
+std::vector<std::size_t> simulated(const std::vector<Organ>& organs) {
+  std::vector<std::size_t> indices;
+  for (std::size_t i = 0; i < organs.size(); ++i)
+    if (!organs[i].see_through) indices.push_back(i);
+  return indices;
+}
+
+bool move_apart(std::vector<Organ>& organs, double scale, double reach_m, int round = 1) {
+  std::vector<LaidCage> cages;
+  for (const std::size_t i : simulated(organs))
+    cages.push_back({placed(organs[i], scale * (1 + round * room)), organs[i].bone});
+  const auto ways = ways_apart(std::move(cages), reach_m);
+  if (!ways) return false;
+  std::size_t next = 0;
+  for (const std::size_t i : simulated(organs)) organs[i].way_m += (*ways)[next++];
+  return true;
+}
+
+// The largest scale at which all come apart.
+double come_apart(const NewSceneOptions& options, std::vector<Organ>& organs) {
+  Box all;
+  for (const std::size_t i : simulated(organs))
+    if (!organs[i].bone) all.include(organs[i].box);
+  for (int step = 0;; ++step) {
+    const double scale = options.shrink - scale_step * step;
+    if (scale < least_scale)
+      throw InputError(
+          fmt::format("{}: at {:g} of their size the organs still do not come apart; take fewer with "
+                      "--only, or ask for more --tets",
+                      options.from.string(), scale + scale_step));
+    log::info("parting the organs at {:.2f} of their size", scale);
+    if (move_apart(organs, scale, reach * all.diagonal())) return scale;
+  }
 }
 
 std::string vector_text(const Vec3& v) {
   return fmt::format("[{:.4g}, {:.4g}, {:.4g}]", v.x(), v.y(), v.z());
 }
 
-std::string body_text(const Organ& organ, const NewSceneOptions& options) {
+std::string body_text(const Organ& organ, const NewSceneOptions& options, double scale) {
   const bool robot = organ.name == options.robot;
-  const double scale = options.scale * (organ.see_through ? 1 : options.shrink);
+  const Vec3 center = organ.box.center() + organ.way_m;
   std::string text = fmt::format("\n[[bodies]]\nname = \"{}\"\nrole = \"{}\"\n", organ.name,
                                  organ.see_through ? "scenery"
                                  : robot           ? "robot"
                                                    : "obstacle");
   if (organ.bone && !organ.see_through) text += "kind = \"rigid\"\n";
   text += fmt::format("model = {{ file = \"{}\", scale = {:g}, up = \"{}\", front = \"{}\" }}\n", organ.file,
-                      scale, options.up, options.front);
-  text += fmt::format("pose = {{ position_m = {}, anchor = \"center\" }}\n", vector_text(organ.box.center()));
-  if (organ.see_through)
-    return text + fmt::format("color = \"{}\"\nopacity = {}\n", organ.bone ? "#e8dfc8" : "#e6c3ad",
-                              organ.bone ? 0.35 : 0.15);
-  text += fmt::format("cage = {{ tets = {} }}\n", organ.bone ? 250 : options.tets);
-  if (organ.bone) return text + "color = \"#e8dfc8\"\nroughness = 0.7\n";
+                      options.scale * (organ.see_through ? 1 : scale), options.up, options.front);
+  text += fmt::format("pose = {{ position_m = [{:.7g}, {:.7g}, {:.7g}], anchor = \"center\" }}", center.x(),
+                      center.y(), center.z());
+  if (organ.way_m.norm() > 0) text += fmt::format("   # {:.2g} m from its true place", organ.way_m.norm());
+  text += "\n";
   const Usual& u = usual_of(organ.name);
+  if (organ.see_through) {
+    const bool hull = begins_with_one_of(organ.name, hulls);
+    text += fmt::format("color = \"{}\"\nopacity = {}\n",
+                        organ.bone ? "#e8dfc8"
+                        : hull     ? "#e6c3ad"
+                                   : u.color,
+                        organ.bone ? 0.35 : 0.15);
+    if (organ.surface.triangles.rows() > most_triangles_seen_through)
+      text += fmt::format("triangles = {}\n", most_triangles_seen_through);
+    return text;
+  }
+  text += fmt::format("cage = {{ tets = {} }}\n", organ.bone ? bone_tets : options.tets);
+  if (organ.bone) return text + "color = \"#e8dfc8\"\nroughness = 0.7\n";
   text += fmt::format(
       "material = {{ youngs_modulus_pa = {:g}, poisson_ratio = 0.45, density_kg_m3 = {:g}, friction = 0.05 "
       "}}\n",
       u.youngs_modulus_pa, u.density_kg_m3);
   text += fmt::format("color = \"{}\"\nroughness = 0.3\n", u.color);
   if (robot) return text;
-  const Vec3 half = 0.5 * options.shrink * organ.box.size(), center = organ.box.center();
+  const Vec3 half = 0.5 * scale * organ.box.size();
   const Vec3 lower(center.x() - 2 * half.x(), center.y() - 2 * half.y(), center.z() - 2 * half.z()),
       upper(center.x() - 0.5 * half.x(), center.y() + 2 * half.y(), center.z() + 2 * half.z());
   return text + fmt::format("fixed = [{{ box_m = [{}, {}] }}]   # its back\n", vector_text(lower),
                             vector_text(upper));
 }
 
-std::string scene_text(const std::vector<Organ>& organs, const NewSceneOptions& options) {
-  const auto robot = std::find_if(organs.begin(), organs.end(),
-                                  [&](const Organ& organ) { return organ.name == options.robot; });
-  const Vec3 size = options.shrink * robot->box.size(), start = robot->box.center();
-  const Vec3 goal = start + Vec3(1.5 * size.x(), 0, 0);
+const Vec3& direction_of(const std::string& goal) {
+  static const std::map<std::string, Vec3> directions{{"front", Vec3::UnitX()}, {"back", -Vec3::UnitX()},
+                                                      {"left", Vec3::UnitY()},  {"right", -Vec3::UnitY()},
+                                                      {"up", Vec3::UnitZ()},    {"down", -Vec3::UnitZ()}};
+  return directions.at(goal);
+}
+
+Vec3 center_of_mass(const TetMesh& cage) {
+  Vec3 sum = Vec3::Zero();
+  double all = 0;
+  for (Eigen::Index t = 0; t < cage.tets.rows(); ++t) {
+    const auto corner = [&](int i) -> Vec3 { return cage.positions.row(cage.tets(t, i)); };
+    const double share = signed_volume(corner(0), corner(1), corner(2), corner(3));
+    sum += share / 4 * (corner(0) + corner(1) + corner(2) + corner(3)), all += share;
+  }
+  return sum / all;
+}
+
+// How far the robot goes along `direction` until it is past all that lies in its way, and one and a half
+// times its length at least.
+double way_to_goal(const std::vector<Organ>& organs, const Organ& robot, double scale,
+                   const Vec3& direction) {
+  const Box box = bounding_box(placed(robot, scale).positions);
+  const Vec3 along = direction.cwiseAbs();
+  const double from = direction.dot(box.center()) - along.dot(box.size()) / 2;
+  const double length = scale * along.dot(robot.box.size());
+  double way = 1.5 * length;
+  for (const std::size_t i : simulated(organs)) {
+    if (&organs[i] == &robot) continue;
+    const Box other = bounding_box(placed(organs[i], scale).positions);
+    const Vec3 gap = (other.center() - box.center()).cwiseAbs() - (other.size() + 1.25 * box.size()) / 2;
+    bool in_the_way = true;
+    for (int c = 0; c < 3; ++c) in_the_way &= along[c] > 0 || gap[c] < 0;
+    const double end = direction.dot(other.center()) + along.dot(other.size()) / 2;
+    if (in_the_way) way = std::max(way, end - from + 0.1 * length);
+  }
+  return way;
+}
+
+std::string scene_text(const std::vector<Organ>& organs, const NewSceneOptions& options, double scale) {
+  const Organ& robot = *std::find_if(organs.begin(), organs.end(),
+                                     [&](const Organ& organ) { return organ.name == options.robot; });
+  const TetMesh robot_cage = placed(robot, scale);
+  const Vec3 size = scale * robot.box.size(), start = center_of_mass(robot_cage);
+  const Vec3 direction = direction_of(options.goal);
+  const Vec3 goal = start + way_to_goal(organs, robot, scale, direction) * direction;
   Box bounds;
-  for (const Organ& organ : organs) {
-    if (organ.see_through) continue;
-    const Vec3 reach = (0.5 * options.shrink * organ.box.size()).array() + 0.5 * size.maxCoeff();
-    bounds.include(organ.box.center() - reach), bounds.include(organ.box.center() + reach);
+  for (const std::size_t i : simulated(organs)) {
+    // Bones do not move, and may reach out.
+    const Box box = organs[i].bone ? Box{organs[i].box.center(), organs[i].box.center()}
+                                   : bounding_box(placed(organs[i], scale).positions);
+    const Vec3 more = Vec3::Constant(0.3 * size.maxCoeff());
+    bounds.include(box.lower - more), bounds.include(box.upper + more);
   }
   bounds.include(goal + 1.5 * size), bounds.include(goal - 1.5 * size);
   // At 5 m/s² a body of a metre is pushed for 0.2 to 1 s at a time; times go with the root of the length.
   const double length = size.maxCoeff(), time = std::sqrt(length);
-  const double mass = std::pow(options.shrink, 3) * robot->volume_m3 * usual_of(robot->name).density_kg_m3;
+  const double mass = std::pow(scale, 3) * robot.volume_m3 * usual_of(robot.name).density_kg_m3;
+  const std::string of_true_size = scale < 1
+                                       ? fmt::format("{:g} of its true size, about its own middle", scale)
+                                       : std::string("of its true size");
   std::string text = fmt::format(
-      "# Made by limber scene new. Every organ is {:g} of its true size, about its own middle, so that their "
-      "cages do not\n"
-      "# overlap at the start: where limber plan says that two do, shrink or move one. Materials are usual "
-      "ones; the goal is to\n"
-      "# the front. Edit what is to be otherwise: docs/scene.md has all keys.\n"
-      "name = \"{}\"\ndescription = \"{} moves to the front among {} organs\"\n\n[world]\nbounds_m = [{}, "
+      "# Made by limber scene new. In a body organs touch, and cages are larger than what they enclose. So "
+      "every "
+      "organ is\n# {}, and some stand off their true places, so that no two\n"
+      "# cages overlap at the start. Materials are usual ones. Edit what is to be otherwise: docs/scene.md "
+      "has all "
+      "keys.\n"
+      "name = \"{}\"\ndescription = \"{} moves to the {} among {} bodies\"\n\n[world]\nbounds_m = [{}, "
       "{}]\ngravity_m_s2 = [0, 0, 0]\n",
-      options.shrink, options.out.stem().string(), robot->name, organs.size() - 1, vector_text(bounds.lower),
-      vector_text(bounds.upper));
-  for (const Organ& organ : organs) text += body_text(organ, options);
+      of_true_size, options.out.stem().string(), robot.name, options.goal, simulated(organs).size() - 1,
+      vector_text(bounds.lower), vector_text(bounds.upper));
+  for (const Organ& organ : organs) text += body_text(organ, options, scale);
   text +=
       fmt::format("\n[goal]\ncenter_of_mass_m = {}\nradius_m = {:.3g}\n", vector_text(goal), 0.4 * length);
   text += fmt::format(
@@ -160,12 +338,59 @@ std::string scene_text(const std::vector<Organ>& organs, const NewSceneOptions& 
   text += "\n[[cameras]]\nname = \"side\"\ndirection = [0.1, -1, 0.15]\nfov_deg = 24\n";
   text += fmt::format(
       "\n[[cameras]]\nname = \"follow\"\nfollow = \"{}\"\ndirection = [1, 0.6, 0.25]\nfov_deg = 24\n",
-      robot->name);
+      robot.name);
   text += fmt::format(
       "\n[film]\nframes_per_second = 30\nspeed = {:.2g}   # slow motion: what is small moves "
       "quickly\nbounds_lines = false\nclock = true\ncaption = \"{}\"\n",
       std::clamp(time, 0.05, 1.0), options.out.stem().string());
   return text;
+}
+
+// The bodies as limber plan will prepare them, as far as a world asks for them.
+std::vector<PreparedBody> bodies_of(const scenes::Scene& scene, const std::vector<Organ>& organs) {
+  std::vector<PreparedBody> bodies;
+  for (const scenes::BodySpec& body : scene.bodies) {
+    throw_if_stopped();
+    const Organ& organ =
+        *std::find_if(organs.begin(), organs.end(), [&](const Organ& o) { return o.name == body.name; });
+    SurfaceMesh surface = organ.surface;
+    scenes::transform(scenes::world_from_model(body, surface.positions, false), surface.positions);
+    bodies.emplace_back().cage = meshing::build_cage(surface, {}, {.tets = body.cage.tets}).mesh;
+  }
+  return bodies;
+}
+
+bool overlap(const scenes::Scene& scene, const std::vector<PreparedBody>& bodies) {
+  for (std::size_t a = 0; a < bodies.size(); ++a)
+    for (std::size_t b = a + 1; b < bodies.size(); ++b) {
+      const bool static_ones =
+          scene.bodies[a].kind == scenes::Kind::rigid && scene.bodies[b].kind == scenes::Kind::rigid;
+      if (!static_ones && fem::cage_overlap(bodies[a].cage, bodies[b].cage).depth_m > 0) return true;
+    }
+  return false;
+}
+
+// The scene, its organs parted. The cages that limber plan makes of organs of that size, at that place,
+// differ a little from those that were parted: where they overlap, they are parted once more.
+scenes::Scene laid_out(const NewSceneOptions& options, std::vector<Organ>& organs, double scale) {
+  for (int round = 0;; ++round) {
+    scenes::Scene scene = scenes::read_scene(scene_text(organs, options, scale), options.out.string());
+    const std::vector<PreparedBody> bodies = bodies_of(scene, organs);
+    if (round == most_rounds || !overlap(scene, bodies)) {
+      build_world(scene, bodies);  // says what limber plan would say
+      return scene;
+    }
+    for (std::size_t b = 0; b < bodies.size(); ++b) {
+      Organ& organ = *std::find_if(organs.begin(), organs.end(),
+                                   [&](const Organ& o) { return o.name == scene.bodies[b].name; });
+      const Vec3 center = organ.box.center();
+      organ.cage = bodies[b].cage;
+      organ.cage.positions =
+          ((organ.cage.positions.rowwise() - (center + organ.way_m).transpose()) / scale).rowwise() +
+          center.transpose();
+    }
+    move_apart(organs, scale, std::numeric_limits<double>::infinity(), round + 2);
+  }
 }
 
 }  // namespace
@@ -175,29 +400,47 @@ Outcome new_scene(const NewSceneOptions& options) {
     throw InputError(
         fmt::format("{}: is there already; choose another name, or remove it", options.out.string()));
   std::vector<Organ> organs = read_organs(options);
-  std::vector<std::string> deformable;
+  std::vector<std::string> deformable, notes;
   for (Organ& organ : organs) {
-    for (const auto& [list, flag] :
-         {std::pair(&options.see_through, &organ.see_through), {&options.rigid, &organ.bone}})
-      if (std::count(list->begin(), list->end(), organ.name) > 0) *flag = true;
-    if (organ.name == options.robot) organ.see_through = organ.bone = false;
+    if (organ.thickness_m < least_thickness * organ.box.diagonal() && !organ.see_through && !organ.bone &&
+        organ.name != options.robot) {
+      organ.see_through = true;
+      notes.push_back(
+          fmt::format("{} is only seen: it is a sheet, {:.2g} m thick", organ.name, organ.thickness_m));
+    }
     if (!organ.see_through && !organ.bone) deformable.push_back(organ.name);
   }
   if (std::count(deformable.begin(), deformable.end(), options.robot) == 0)
     throw InputError(fmt::format("--robot {}: {} has no such soft body; there are: {}", options.robot,
                                  options.from.string(), fmt::join(deformable, ", ")));
-  const std::string text = scene_text(organs, options);
-  const scenes::Scene scene = scenes::read_scene(text, options.out.string());
-  write_file(options.out, text);
+  if (options.only.empty()) leave_out_doubles(organs, notes);
+  log::info("making cages");
+  for (Organ& organ : organs)
+    if (!organ.see_through) make_cage(options, organ);
+  const double scale = come_apart(options, organs);
+  const scenes::Scene scene = laid_out(options, organs, scale);
+  write_file(options.out, scene.text);
   const std::string next =
       fmt::format("limber run {} --data {} -o DIR", options.out.string(), options.from.string());
+  Json moved_m = Json::object();
+  std::string text = fmt::format("{}: {} bodies at {:g} of their size, {} only seen\n", options.out.string(),
+                                 scene.bodies.size(), scale, scene.scenery.size());
+  for (const Organ& organ : organs)
+    if (const double way = organ.way_m.norm(); way > 0) {
+      moved_m[organ.name] = way;
+      text += fmt::format("  {} stands {:.1f} mm off its true place\n", organ.name, 1e3 * way);
+    }
+  for (const std::string& note : notes) text += fmt::format("  {}\n", note);
+  text += fmt::format("next: {}\n", next);
   return {exit_done,
           {{"scene", options.out.string()},
            {"bodies", scene.bodies.size()},
            {"scenery", scene.scenery.size()},
+           {"scale", scale},
+           {"moved_m", moved_m},
+           {"notes", notes},
            {"next", next}},
-          fmt::format("{}: {} bodies, {} seen through; next: {}\n", options.out.string(), scene.bodies.size(),
-                      scene.scenery.size(), next)};
+          text};
 }
 
 }  // namespace limber::app

@@ -8,6 +8,7 @@
 #include "core/mesh_files.h"
 #include "core/progress.h"
 #include "core/version.h"
+#include "meshing/simplify.h"
 #include "scenes/library.h"
 #include "scenes/models.h"
 
@@ -51,7 +52,8 @@ BodySource source_of(const scenes::Scene& scene, const scenes::BodySpec& body,
     source.model = path->filename().string();
     source.identity = identity_of(body, hex(hash_of(std::string_view(read_file(*path)))));
     source.load = [&body, file = *path] {
-      meshing::ImportedModel model = meshing::import_model(file, {});
+      meshing::ImportedModel model =
+          meshing::import_model(file, {.count_self_intersections = body.role != scenes::Role::scenery});
       scenes::transform(scenes::world_from_model(body, model.surface.positions, false),
                         model.surface.positions);
       return model;
@@ -94,6 +96,7 @@ void prepare_scenery(const scenes::Scene& scene, const scenes::BodySpec& body,
     source.model = "nothing";
     source.load = [] { return meshing::ImportedModel{}; };
   }
+  source.identity["triangles"] = body.triangles;
   const fs::path mesh = scenery_file(work_folder, body, ".ply"),
                  origin = scenery_file(work_folder, body, ".json");
   try {
@@ -105,9 +108,10 @@ void prepare_scenery(const scenes::Scene& scene, const scenes::BodySpec& body,
   } catch (const Json::exception&) {
   }
   log::info("{}: reading {}", mesh.string(), source.model);
-  const meshing::ImportedModel model = source.load();
+  SurfaceMesh surface = source.load().surface;
+  if (body.triangles > 0) surface = meshing::simplify(surface, body.triangles);
   make_folder(mesh.parent_path());
-  write_ply(mesh, model.surface);
+  write_ply(mesh, surface);
   write_json(origin, {{"version", version},
                       {"input", source.identity},
                       {"hash", hex(hash_of(std::string_view(read_file(mesh))))}});

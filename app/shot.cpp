@@ -54,9 +54,13 @@ Shot::Shot(const scenes::Scene& scene, const std::string& camera, const plan::Pl
   const int views = scene.film.side_by_side ? 2 : 1;
   look_.width = size_px.first / views, look_.height = size_px.second;
   look_.background_top_srgb = look_.background_bottom_srgb = scene.film.background_srgb;
-  look_.ground_height_m = scene.bounds_m.lower.z();
+  double ground_m = scene.bounds_m.lower.z();
+  for (const SurfaceMesh& mesh : scenery)
+    ground_m = std::min(ground_m, bounding_box(mesh.positions).lower.z());
+  look_.ground_height_m = ground_m;
   look_.transparent_background = scene.film.transparent;
   look_.stage = box_of_motion();
+  for (const SurfaceMesh& mesh : scenery) look_.stage.include(bounding_box(mesh.positions));
   lay_out_camera(double(look_.width) / look_.height);
   look_.toward_key = toward_key_light(path_.front().camera);
   if (!output.passes.empty()) measure_depths();
@@ -96,12 +100,11 @@ Box Shot::box_of_motion() const {
     for (std::size_t i = 0; i + 2 < state.positions.size(); i += 3)
       box.include(Vec3(state.positions[i], state.positions[i + 1], state.positions[i + 2]));
   for (const PreparedBody& body : bodies_) box.include(bounding_box(body.surface.positions));
-  for (const SurfaceMesh& mesh : scenery_) box.include(bounding_box(mesh.positions));
   return box;
 }
 
 void Shot::lay_out_camera(double aspect) {
-  Box shown = look_.stage;
+  Box shown = box_of_motion();  // a skin is not what the film is about
   if (scene_.film.bounds_lines) shown.include(scene_.bounds_m);
   if (camera_->follow >= 0) {
     followed_m_.resize(frames(), 3);

@@ -596,6 +596,14 @@ World build_world(const WorldSpec& spec) {
   return world;
 }
 
+CageOverlap cage_overlap(const TetMesh& one, const TetMesh& two) {
+  const Triangles surface_of_one = boundary_triangles(one.tets),
+                  surface_of_two = boundary_triangles(two.tets);
+  const auto overlap = detail::deepest_overlap({one.positions, one.tets, surface_of_one},
+                                               {two.positions, two.tets, surface_of_two});
+  return {overlap.depth_m, overlap.way_m};
+}
+
 State rest_state(const World& world) {
   State state;
   state.positions.assign(world.tables.rest_positions.begin(),

@@ -111,6 +111,14 @@ struct World {
 // float32, a step too small to be of use.
 World build_world(const WorldSpec&);
 
+// How deep two cages are in one another, as build_world measures it at the start.
+struct CageOverlap {
+  double depth_m = 0;  // 0: apart
+  Vec3 way_m =
+      Vec3::Zero();  // of that length: the first cage moved by it has the deepest place no longer inside
+};
+CageOverlap cage_overlap(const TetMesh& one, const TetMesh& two);
+
 // All moving bodies in their rest shapes and places, at rest.
 State rest_state(const World&);
 

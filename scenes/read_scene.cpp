@@ -412,6 +412,13 @@ BodySpec read_body(const Node& table, const Box& bounds) {
   body.pose = {vector(pose, "position_m"), direction(pose, "axis", (what + ".pose.axis").c_str()),
                number(pose, "angle_deg"), text(pose, "anchor")};
   body.where = child(pose, "position_m").where.text();
+  if (const Node* triangles = table.find("triangles")) {
+    body.triangles = integer(table, "triangles");
+    if (body.role != Role::scenery)
+      complain(
+          *triangles,
+          fmt::format("{} is not scenery, so its surface is kept vertex by vertex; remove triangles", what));
+  }
   if (body.role == Role::scenery) {
     for (const char* key : {"cage", "material"})
       if (const Node* node = table.find(key))

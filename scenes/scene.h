@@ -110,6 +110,7 @@ struct BodySpec {
   FixedSpec fixed;
   Vec3 color_srgb = Vec3::Zero();  // 0 … 1
   double opacity = 1, roughness = 0.45, metallic = 0;
+  int triangles = 0;  // scenery: its surface is simplified to about so many; 0: as it is
   std::string where;  // "scene.toml:12:24": its place in the text, for complaints
 };
 

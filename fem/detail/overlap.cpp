@@ -24,13 +24,26 @@ Vec3 nearest_on_segment(const Vec3& p, const Vec3& a, const Vec3& b) {
   return a + t * (b - a);
 }
 
+// Whether p, moved along the normal n of (a b c), comes to lie in it.
+bool is_above(const Vec3& p, const Vec3& n, const Vec3& a, const Vec3& b, const Vec3& c) {
+  return n.squaredNorm() > 0 && n.dot((b - a).cross(p - a)) >= 0 && n.dot((c - b).cross(p - b)) >= 0 &&
+         n.dot((a - c).cross(p - c)) >= 0;
+}
+
+Vec3 nearest_on_triangle(const Vec3& p, const Vec3& a, const Vec3& b, const Vec3& c) {
+  const Vec3 n = (b - a).cross(c - a);
+  if (is_above(p, n, a, b, c)) return p - n.dot(p - a) / n.squaredNorm() * n;
+  Vec3 nearest = nearest_on_segment(p, a, b);
+  for (const Vec3& other : {nearest_on_segment(p, b, c), nearest_on_segment(p, c, a)})
+    if ((p - other).norm() < (p - nearest).norm()) nearest = other;
+  return nearest;
+}
+
 }  // namespace
 
 double distance_to_triangle(const Vec3& p, const Vec3& a, const Vec3& b, const Vec3& c) {
   const Vec3 n = (b - a).cross(c - a);
-  const bool above = n.squaredNorm() > 0 && n.dot((b - a).cross(p - a)) >= 0 &&
-                     n.dot((c - b).cross(p - b)) >= 0 && n.dot((a - c).cross(p - c)) >= 0;
-  if (above) return std::abs(n.dot(p - a)) / n.norm();
+  if (is_above(p, n, a, b, c)) return std::abs(n.dot(p - a)) / n.norm();
   return std::min({(p - nearest_on_segment(p, a, b)).norm(), (p - nearest_on_segment(p, b, c)).norm(),
                    (p - nearest_on_segment(p, c, a)).norm()});
 }
@@ -74,6 +87,16 @@ struct Near {
     return nearest;
   }
 
+  Vec3 way_out(const Vec3& p) const {
+    Vec3 nearest = Vec3::Constant(1e300);
+    for (int f = 0; f < shape.surface.rows(); ++f) {
+      const auto t = shape.surface.row(f);
+      const Vec3 q = nearest_on_triangle(p, corner(t[0]), corner(t[1]), corner(t[2]));
+      if ((p - q).norm() < (p - nearest).norm()) nearest = q;
+    }
+    return nearest - p;
+  }
+
   // Where from a (0) to b (1) the segment crosses the surface, ascending.
   std::vector<double> crossings(const Vec3& a, const Vec3& b) const {
     std::vector<double> at;
@@ -113,11 +136,13 @@ void for_each_crossing_edge(const Shape& a, const Near& near, const Box& region,
   }
 }
 
-void include_points_of(const Shape& a, const Shape& b, const Box& region, Overlap& deepest) {
+// `side` is 1 where the overlap's way is a's, −1 where it is told for b.
+void include_points_of(const Shape& a, const Shape& b, const Box& region, double side, Overlap& deepest) {
   const Near near(b, region);
   const auto consider = [&](const Vec3& p) {
     if (!meet(region, {p, p}) || !near.contains(p)) return;
-    if (const double depth = near.depth(p); depth > deepest.depth_m) deepest = {depth, p};
+    if (const double depth = near.depth(p); depth > deepest.depth_m)
+      deepest = {depth, p, side * near.way_out(p)};
   };
   for (int v : vertices_of(a.surface)) consider(a.positions.row(v));
   for_each_crossing_edge(a, near, region, [&](const Vec3& p, const Vec3& q, std::vector<double> at) {
@@ -151,8 +176,8 @@ Overlap deepest_overlap(const Shape& a, const Shape& b) {
   Overlap deepest;
   const Box region = common_box(a, b);
   if (is_empty(region)) return deepest;
-  include_points_of(a, b, region, deepest);
-  include_points_of(b, a, region, deepest);
+  include_points_of(a, b, region, 1, deepest);
+  include_points_of(b, a, region, -1, deepest);
   return deepest;
 }
 

@@ -17,6 +17,8 @@ double distance_to_triangle(const Vec3& p, const Vec3& a, const Vec3& b, const V
 struct Overlap {
   double depth_m = 0;  // 0: apart
   Vec3 place = Vec3::Zero();
+  Vec3 way_m =
+      Vec3::Zero();  // of that length: a moved by it, or b by its opposite, has that place no longer inside
 };
 
 // The largest distance to the other body's surface, over points of each body's surface edges that are inside

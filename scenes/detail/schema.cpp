@@ -108,6 +108,8 @@ constexpr Key all_keys[] = {
      ""},
     {"bodies[].roughness", Type::number, from_to(0.05, 1), 0, "0.45",
      "of its surface: 0.05 like glass, 1 like chalk", "", ""},
+    {"bodies[].triangles", Type::integer, from_to(100, 10'000'000), 0, may_lack,
+     "scenery: its surface is simplified to about so many, for film; veils cost by the triangle", "", ""},
     {"bodies[].metallic", Type::number, share, 0, "0.0", "1: reflects in its own colour and scatters nothing",
      "", ""},
 

@@ -152,9 +152,10 @@ TEST(Library, UnknownSceneNamesTheNearest) {
     find_scene("bariers1");
     FAIL();
   } catch (const InputError& error) {
-    EXPECT_THAT(error.what(),
-                HasSubstr("did you mean \"barriers1\"? known scenes: barriers1, barriers2, "
-                          "body_parts, bunny_gate, falling_objects, squeeze, there_and_back, windows"));
+    EXPECT_THAT(
+        error.what(),
+        HasSubstr("did you mean \"barriers1\"? known scenes: barriers1, barriers2, "
+                  "body_parts, bunny_gate, falling_objects, squeeze, there_and_back, torso, windows"));
   }
 }
 

@@ -290,6 +290,8 @@ TEST(ReadScene, ComplainsWithLineAndColumn) {
       {"at = 1,", "at = 0,", "0, eye_m = [9", "put them in order"},
       {"name = \"side\"", "name = \"main\"", "\"main\"", "two cameras are called \"main\""},
       {"follow = \"gate\"", "follow = \"robt\"", "\"robt\"", "a body that is not scenery: robot, gate"},
+      {"role = \"obstacle\"", "triangles = 500\nrole = \"obstacle\"", "500",
+       "bodies.gate is not scenery, so its surface is kept vertex by vertex; remove triangles"},
       {"role = \"obstacle\"", "role = \"scenery\"", "{ tets", "bodies.gate is scenery, which has no cage"},
       {"cage = { tets = 200 }\n", "", "[[bodies]]\nname = \"gate", "bodies.gate lacks a cage"},
       {"[[cameras]]", "[film]\ncolor_range = [2, 2]\n[[cameras]]", "[2, 2]", "are the same"},
@@ -399,6 +401,7 @@ std::string another_value(const Key& key) {
       {"goal.center_of_mass_m", "[8, 1, 1]"},
       {"bodies[].pose.position_m", "[2, 1.5, 1.5]"},
       {"bodies[].pose.axis", "[1, 0, 0]"},
+      {"bodies[].triangles", "777"},
       {"bodies[].model.box.size_m", "[0.9, 0.8, 0.7]"},
       {"bodies[].model.box.bevel_m", "0.2"},
       {"bodies[].model.box.triangle_m", "0.2"},
@@ -505,13 +508,17 @@ TEST(Keys, EveryKeyChangesTheScene) {
       sets = {"goal={ center_of_mass_m = [9, 1.5, 1.5], box_m = [[8, 1, 1], [9.5, 2, 2]] }"};
     if (key.parent() == "goal.shape") sets = {"goal.shape.tolerance_m=0.25"};
     if (key.path == "goal.lost_below_m") sets = {"planner.settle_time_s=0", "goal.moves_with=gate"};
+    if (key.path == "bodies[].triangles")
+      sets = {"cameras.side.follow=robot",
+              "bodies.gate={ name = \"gate\", role = \"scenery\", model = { made = \"heart\" } }"};
     if (key.path == "bodies[].pose.axis") sets = {"bodies.robot.pose.angle_deg=90"};
     if (key.parent() == "bodies[].parts[]")
       sets = {key.name() == "box_m"
                   ? "bodies.robot.parts=[{ box_m = [[0, 0, 0], [1, 1, 1]], density_kg_m3 = 1 }]"
                   : "bodies.robot.parts=[{ shell = 0, density_kg_m3 = 1 }]"};
     std::string path = replaced(std::string(key.path) + " ", " ", "");
-    const std::string body = plate || fixed || key.path == "bodies[].kind" || key.path == "bodies[].role"
+    const std::string body = plate || fixed || key.path == "bodies[].kind" || key.path == "bodies[].role" ||
+                                     key.path == "bodies[].triangles"
                                  ? "bodies.gate"
                                  : "bodies.robot";
     if (path.starts_with("via[]")) path = replaced(path, "via[]", "via.0");
@@ -633,6 +640,7 @@ std::string all_of(const Scene& s) {
   const Eigen::Vector2d range = f.color_range.value_or(Eigen::Vector2d(-1, -1));
   t += fmt::format("\n{} {} {} {} {} {} {}", f.width_px, f.height_px, f.frames_per_second,
                    v(f.background_srgb), f.bounds_lines, f.sheet_columns, f.sheet_rows);
+  for (const BodySpec& body : s.scenery) t += fmt::format(" {}", body.triangles);
   return t + fmt::format("\n{} {} {} {} {} {} {} {} {} {} {} {} {}", f.speed, f.transparent, f.caption,
                          f.clock, int(f.color_by), range[0], range[1], f.cages, f.forces, f.path, f.tree,
                          f.side_by_side, s.scenery.size());
