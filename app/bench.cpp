@@ -17,6 +17,7 @@
 #include "core/hash.h"
 #include "core/log.h"
 #include "core/progress.h"
+#include "core/temporary_files.h"
 #include "core/threads.h"
 #include "core/version.h"
 
@@ -151,6 +152,7 @@ void run_all(const BenchOptions& options, const std::vector<std::string>& preset
   runs = chunk_of(runs, options.chunk);
 
   make_folder(options.out / "runs");
+  remove_abandoned(options.out / "runs");
   const std::string program = hash_of_program();
   std::map<std::size_t, Setup> setups;  // by scene and preset
   std::map<std::string, std::string> scene_from_name;

@@ -3,10 +3,12 @@
 #include "app/export.h"
 #include "app/preview.h"
 #include "core/error.h"
+#include "core/events.h"
 #include "core/hash.h"
 #include "core/log.h"
 #include "core/mesh_files.h"
 #include "core/progress.h"
+#include "core/temporary_files.h"
 #include "core/version.h"
 #include "ffd/binding_file.h"
 #include "meshing/cage.h"
@@ -85,9 +87,11 @@ Json prepare_body(const BodySource& source, const PrepareSettings& settings, con
   const Json input{{"model", source.identity}, {"settings", json_of(settings)}};
   if (up_to_date(folder, input)) {
     log::info("{}: up to date", folder.string());
+    events::tell({{"event", "body"}, {"folder", folder.string()}, {"up_to_date", true}});
     return read_json(folder / "report.json");
   }
   log::info("{}: preparing {}", folder.string(), source.model);
+  events::tell({{"event", "body"}, {"folder", folder.string()}, {"up_to_date", false}});
   Costs costs;
   const meshing::ImportedModel model = source.load();
   validate(model.surface, source.model);
@@ -124,6 +128,7 @@ Json prepare_body(const BodySource& source, const PrepareSettings& settings, con
   costs.end_stage("bind");
 
   make_folder(folder);  // not before: a model that is refused leaves all as it was
+  remove_abandoned(folder);
   std::error_code ignored;
   fs::remove(folder / "report.json",
              ignored);  // what is in the folder counts again when a new report says so

@@ -7,6 +7,7 @@
 #include "app/export.h"
 #include "app/shot.h"
 #include "core/error.h"
+#include "core/events.h"
 #include "core/log.h"
 #include "core/progress.h"
 #include "core/threads.h"
@@ -18,6 +19,7 @@ namespace {
 
 struct GlobalOptions {
   bool json = false, quiet = false, verbose = false;
+  std::string progress;
   int threads = 0;
 };
 
@@ -33,6 +35,19 @@ void add_threads(CLI::App& command, GlobalOptions& options) {
                   "threads to use, 0 … 256; 0: as many as the machine has. Results do not depend on it")
       ->check(CLI::Range(0, 256))
       ->capture_default_str();
+}
+
+void add_progress(CLI::App& command, GlobalOptions& options) {
+  command
+      .add_option("--progress", options.progress,
+                  "tell what goes on, a line of JSON an event: json (on stderr, which has nothing else then) "
+                  "or a file whose name ends in .jsonl")
+      ->type_name("json|FILE.jsonl")
+      ->check(CLI::Validator(
+          [](const std::string& where) {
+            return where == "json" || where.ends_with(".jsonl") ? "" : "neither json nor a file FILE.jsonl";
+          },
+          ""));
 }
 
 void add_edits(CLI::App& command, std::vector<std::string>& sets, std::vector<fs::path>& data) {
@@ -112,7 +127,7 @@ void add_shortcut(CLI::App& command, PlanOptions& options) {
 void add_render(CLI::App& command, RenderOptions& options) {
   command.add_option(
       "--frames", options.frames,
-      "frames to render: 0-30,47-327:2; beyond the last is left out with a warning; default: all");
+      "frames to render: 0-30,47-327:2 (or x2); beyond the last is left out with a warning; default: all");
   command.add_option("--chunk", options.chunk, "render the i-th of n parts of these frames, 1 ≤ i ≤ n")
       ->type_name("I/N");
   command.add_option("--size", options.size, "pixels of a frame, 16x16 … 8192x8192; default: the scene's")
@@ -174,6 +189,7 @@ void print(const Outcome& outcome, bool json) {
 
 int report_failure(int code, const std::string& what, bool json) {
   log::warn("limber: {}", what);
+  events::tell({{"event", "end"}, {"exit_code", code}, {"error", what}});
   if (json) fmt::print("{}\n", Json{{"error", what}, {"exit_code", code}}.dump(2));
   return code;
 }
@@ -266,7 +282,7 @@ int run_command_line(int argc, const char* const* argv) {
   add_shortcut(plan_command, plan_options);
   plan_command.add_flag("--resume", plan_options.resume,
                         "go on from the plan in the work folder: more iterations, or after it was stopped");
-  add_global(plan_command, global), add_threads(plan_command, global);
+  add_global(plan_command, global), add_threads(plan_command, global), add_progress(plan_command, global);
   plan_command.callback([&] { chosen = [&] { return plan(plan_options); }; });
 
   CLI::App& render_command = *program.add_subcommand("render", "path → frames, contact sheet, film");
@@ -280,7 +296,8 @@ int run_command_line(int argc, const char* const* argv) {
       ->allow_extra_args(false);
   render_command.add_flag("--resume", render_options.resume,
                           "keep frames that already show what they should");
-  add_global(render_command, global), add_threads(render_command, global);
+  add_global(render_command, global), add_threads(render_command, global),
+      add_progress(render_command, global);
   render_command.callback([&] { chosen = [&] { return render(render_options); }; });
 
   ExportOptions export_options;
@@ -310,13 +327,13 @@ int run_command_line(int argc, const char* const* argv) {
       *program.add_subcommand("run", "all of it: prepare, plan, render; what is up to date is skipped");
   add_scene(run_command, plan_options.scene), add_plan(run_command, plan_options),
       add_shortcut(run_command, plan_options), add_render(run_command, render_options);
-  add_global(run_command, global), add_threads(run_command, global);
+  add_global(run_command, global), add_threads(run_command, global), add_progress(run_command, global);
   run_command.callback([&] { chosen = [&] { return run(plan_options, render_options); }; });
 
   CLI::App& bench_command = *program.add_subcommand(
       "bench", "many runs: scenes × seeds × presets → a record a run, a table; what is done is skipped");
   add_bench(bench_command, bench_options);
-  add_global(bench_command, global), add_threads(bench_command, global);
+  add_global(bench_command, global), add_threads(bench_command, global), add_progress(bench_command, global);
   bench_command.callback([&] { chosen = [&] { return bench(bench_options); }; });
 
   CLI::App& verify_command =
@@ -462,7 +479,9 @@ int run_command_line(int argc, const char* const* argv) {
   if (global.quiet) set_progress_enabled(false);
   set_thread_count(global.threads);
   try {
+    events::set_up(global.progress);
     const Outcome outcome = chosen();
+    events::tell({{"event", "end"}, {"exit_code", outcome.exit_code}});
     print(outcome, global.json);
     return outcome.exit_code;
   } catch (const InputError& error) {

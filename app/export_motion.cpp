@@ -1,6 +1,8 @@
 #include <algorithm>
+#include <set>
 
 #include "app/commands.h"
+#include "app/exported_files.h"
 #include "app/frame_list.h"
 #include "app/manifest.h"
 #include "app/motion_files.h"
@@ -8,6 +10,7 @@
 #include "app/scene_world.h"
 #include "core/hash.h"
 #include "core/log.h"
+#include "core/temporary_files.h"
 #include "fem/observe.h"
 
 namespace limber::app {
@@ -36,6 +39,31 @@ Points surface_at_rest(const fem::Body& body, const PreparedBody& prepared) {
   return surface;
 }
 
+std::vector<fs::path> exported_files(const fs::path& folder) {
+  std::vector<fs::path> files;
+  const auto add = [&](const fs::path& where, const auto& is_ours) {
+    std::error_code none;
+    for (const fs::directory_entry& entry : fs::directory_iterator(where, none))
+      if (entry.is_regular_file() && is_ours(entry.path())) files.push_back(entry.path());
+  };
+  const auto is = [](std::set<std::string> names) {
+    return [names](const fs::path& file) { return names.contains(file.filename().string()); };
+  };
+  add(folder, is({"motion.glb", "motion.usda"}));
+  add(folder / "pc2", [](const fs::path& file) { return file.extension() == ".pc2"; });
+  for (const fs::path& cache : std::vector<fs::path>(files))
+    if (cache.extension() == ".pc2") files.push_back(fs::path(cache).replace_extension(".obj"));
+  add(folder / "pc2", is({"load_in_blender.py", "README.txt"}));
+  add(folder / "vtu", is({"cages.pvd", "surfaces.pvd"}));
+  for (const char* series : {"cages", "surfaces"})
+    add(folder / "vtu" / series, [](const fs::path& file) {
+      const std::string stem = file.stem().string();
+      return file.extension() == ".vtu" && stem.find_first_not_of("0123456789") == stem.npos;
+    });
+  std::sort(files.begin(), files.end());
+  return files;
+}
+
 Outcome export_motion(const ExportOptions& options) {
   const PlanFolder planned = read_plan_folder(options.folder);
   const std::vector<PreparedBody> bodies = read_bodies_of(planned, options.folder);
@@ -54,6 +82,7 @@ Outcome export_motion(const ExportOptions& options) {
               count - 1);
   const fs::path out = options.out.value_or(options.folder / "export");
   make_folder(out);
+  remove_abandoned(out);
 
   Json formats;
   std::string text;

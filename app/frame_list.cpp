@@ -32,8 +32,8 @@ struct Range {
   int first, last, step;
 };
 
-// "3,5-9:2": what a render farm writes. `what` is the option and `one` the thing that is numbered, for
-// complaints.
+// "3,5-9:2" or "3,5-9x2": what a render farm writes. `what` is the option and `one` the thing that is
+// numbered, for complaints.
 std::vector<Range> ranges_of(const std::string& text, const char* what, const char* one) {
   std::vector<Range> ranges;
   std::string_view rest = text;
@@ -41,7 +41,7 @@ std::vector<Range> ranges_of(const std::string& text, const char* what, const ch
     const auto comma = rest.find(',');
     const std::string_view part = rest.substr(0, comma);
     rest = comma == rest.npos ? std::string_view() : rest.substr(comma + 1);
-    const auto colon = part.find(':');
+    const auto colon = part.find_first_of(":x");
     const std::string_view range = part.substr(0, colon);
     const auto step = colon == part.npos ? std::optional(1) : whole_number(part.substr(colon + 1));
     const auto single = whole_number(range);

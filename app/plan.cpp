@@ -1,6 +1,7 @@
 #include "app/analysis.h"
 #include "app/commands.h"
 #include "app/diagnosis.h"
+#include "app/exported_files.h"
 #include "app/fem_system.h"
 #include "app/manifest.h"
 #include "app/plan_folder.h"
@@ -11,6 +12,7 @@
 #include "core/hash.h"
 #include "core/log.h"
 #include "core/progress.h"
+#include "core/temporary_files.h"
 #include "core/threads.h"
 #include "plan/anytime.h"
 #include "scenes/library.h"
@@ -212,6 +214,7 @@ Outcome plan(const PlanOptions& options) { return plan(options, read_scene(optio
 
 Outcome plan(const PlanOptions& options, const scenes::Scene& scene) {
   make_folder(options.out);
+  remove_abandoned(options.out);
   const std::vector<PreparedBody> bodies = prepare_bodies(scene, options.scene.data, options.out);
   const fem::World world = build_world(scene, bodies);
   const FemSystem system(world, goal_rules_of(scene));
@@ -258,6 +261,22 @@ Outcome plan(const PlanOptions& options, const scenes::Scene& scene) {
   return outcome;
 }
 
+namespace {
+
+// What `limber export` and `limber report` made. Leaves the user's own files where they are, and what was
+// exported with -o.
+void remove_what_shows_another_plan(const fs::path& folder, const Json& summary) {
+  const Json before = read_manifest(folder).value("plan", Json::object());
+  const auto differs = [&](const char* hash) { return before.value(hash, "") != summary.at(hash); };
+  if (!differs("trajectory_hash") && !differs("tree_hash")) return;
+  bool removed = fs::remove(folder / "report.html");
+  for (const fs::path& file : exported_files(folder / "export")) removed |= fs::remove(file);
+  if (removed)
+    log::info("{}: export and report of another plan are removed; make them anew", folder.string());
+}
+
+}  // namespace
+
 Outcome keep_plan(const fs::path& folder, const scenes::Scene& scene, const std::vector<PreparedBody>& bodies,
                   const fem::World& world, const FemSystem& system, const plan::Plan& plan, const Json& extra,
                   const std::string& extra_text) {
@@ -269,6 +288,7 @@ Outcome keep_plan(const fs::path& folder, const scenes::Scene& scene, const std:
     summary["diagnosis"] = diagnosis.json;
   }
   if (!extra.is_null()) summary.update(extra);
+  remove_what_shows_another_plan(folder, summary);
   write_plan_folder(folder, plan, scene, bodies, summary);
   write_volume_plot(folder, scene, world, figures, plan.settings.frames_per_second);
   write_file(folder / "tree.svg", tree_svg(scene, world, plan));

@@ -1,4 +1,5 @@
 #include <atomic>
+#include <chrono>
 #include <mutex>
 #include <thread>
 
@@ -9,9 +10,11 @@
 #include "app/scene_world.h"
 #include "app/shot.h"
 #include "core/error.h"
+#include "core/events.h"
 #include "core/hash.h"
 #include "core/log.h"
 #include "core/progress.h"
+#include "core/temporary_files.h"
 #include "core/threads.h"
 #include "render/film.h"
 #include "render/png_file.h"
@@ -59,14 +62,21 @@ std::vector<Failure> paint_all(const Shot& shot, const std::vector<int>& frames,
       while (stop_signal() == 0) {
         const std::size_t i = next++;
         if (i >= frames.size()) break;
+        const auto began = std::chrono::steady_clock::now();
+        Json event{{"event", "frame"}, {"frame", frames[i]}};
         try {
-          write(painter.paint(frames[i]), files, frames[i], shot.hash_of(frames[i]));
+          event["hash"] = shot.hash_of(frames[i]);
+          write(painter.paint(frames[i]), files, frames[i], event["hash"]);
         } catch (const InputError& error) {
+          event = {{"event", "frame_failed"}, {"frame", frames[i]}, {"error", error.what()}};
           const std::lock_guard lock(mutex);
           failures.push_back({frames[i], error.what()});
         }
         const std::lock_guard lock(mutex);
         progress.update(std::int64_t(++done));
+        event["seconds"] = std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count();
+        event["done"] = done.load(), event["total"] = frames.size();
+        events::tell(event);
       }
     } catch (...) {
       const std::lock_guard lock(mutex);
@@ -136,6 +146,7 @@ Outcome render(const RenderOptions& options) {
               frame_count - 1);
   const fs::path folder = options.folder / ("frames" + suffix);
   make_folder(folder);
+  remove_abandoned(folder), remove_abandoned(options.folder);
   const FrameFiles files{folder};
   const auto is_good = [&](int frame) {
     const std::string hash = shot.hash_of(frame);
@@ -148,6 +159,7 @@ Outcome render(const RenderOptions& options) {
 
   std::vector<int> missing = wanted;
   if (options.resume) std::erase_if(missing, is_good);
+  events::tell({{"event", "frames"}, {"wanted", wanted.size()}, {"kept", wanted.size() - missing.size()}});
   const double cpu_before = cpu_seconds();
   const std::vector<Failure> failures = paint_all(shot, missing, files);
   const double cpu_s = cpu_seconds() - cpu_before;
@@ -183,6 +195,7 @@ Outcome render(const RenderOptions& options) {
     }
     render::write_png(sheet, render::contact_sheet(shown, captions, {.columns = film.sheet_columns}));
     render::make_film(paths, film.frames_per_second, video);
+    events::tell({{"event", "film"}, {"file", video.string()}});
     // Frames of an earlier, longer motion would only confuse.
     for (int f = frame_count; fs::remove(files.of(f)); ++f) {
     }

@@ -9,6 +9,7 @@
 #include "core/error.h"
 #include "core/hash.h"
 #include "core/version.h"
+#include "fem/control_forces.h"
 #include "fem/observe.h"
 
 namespace limber::app {
@@ -210,9 +211,12 @@ Points Shot::arrows_at(int frame) const {
   const auto push =
       std::find_if(pushes_.rbegin(), pushes_.rend(), [&](const Push& p) { return p.first_frame <= frame; });
   if (push != pushes_.rend() && push->control.manipulation != Manipulation::none) {
-    const bool at_point = push->control.manipulation == Manipulation::control_point;
-    put(ends, 0, at_point ? Vec3(nodes.row(push->control.node).transpose()) : robot,
-        push->control.force_n.cast<double>());
+    const Control& control = push->control;
+    const bool at_point = control.manipulation == Manipulation::control_point;
+    Vec3 force_n = control.force_n.cast<double>();
+    if (control.manipulation == Manipulation::interpolation || control.manipulation == Manipulation::hold)
+      for (const Vec3& on_node : fem::control_forces_n(world_, state, control)) force_n += on_node;
+    put(ends, 0, at_point ? Vec3(nodes.row(control.node).transpose()) : robot, force_n);
   }
   // Each at the middle of its contacts, by their forces.
   std::vector<Vec3> force(std::size_t(bodies), Vec3::Zero()), place = force;
@@ -255,6 +259,14 @@ std::uint64_t Shot::hash_of_look() const {
   hasher.text(film.caption).value(int(film.color_by)).value(low_).value(high_).value(film.speed);
   hasher.value(film.frames_per_second).value(frames()).value(output_.bits);
   hasher.value(arrow_m_per_n_).matrix(way_m_).matrix(tree_m_);
+  for (const auto& [first_frame, control] : pushes_)
+    hasher.value(first_frame)
+        .value(int(control.manipulation))
+        .matrix(control.force_n)
+        .value(control.node)
+        .value(control.radius_m)
+        .matrix(control.target_m)
+        .value(control.max_force_n);
   const auto add_look = [&](const scenes::BodySpec& body) {
     hasher.matrix(body.color_srgb).value(body.opacity).value(body.roughness).value(body.metallic);
   };

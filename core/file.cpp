@@ -4,11 +4,11 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include <atomic>
 #include <cerrno>
 #include <cstring>
 
 #include "core/error.h"
+#include "core/temporary_files.h"
 
 namespace limber {
 
@@ -36,14 +36,6 @@ class Descriptor {
 void sync_folder(const fs::path& folder) {
   const Descriptor fd(::open(folder.empty() ? "." : folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
   if (fd >= 0) ::fsync(fd);
-}
-
-fs::path temporary_name(const fs::path& final_path) {
-  static std::atomic<unsigned> counter{0};
-  fs::path name = final_path;
-  name.replace_filename(fmt::format(".{}.{}.{}.tmp{}", final_path.stem().string(), ::getpid(), counter++,
-                                    final_path.extension().string()));
-  return name;
 }
 
 }  // namespace

@@ -7,9 +7,11 @@
 #include <algorithm>
 #include <atomic>
 #include <chrono>
+#include <cmath>
 #include <csignal>
 
 #include "core/error.h"
+#include "core/events.h"
 
 namespace limber {
 
@@ -36,17 +38,25 @@ std::string duration_text(double seconds) {
 }  // namespace
 
 Progress::Progress(std::string label, std::int64_t total)
-    : label_(std::move(label)), total_(total), started_(seconds_now()) {}
+    : label_(std::move(label)), total_(total), started_(seconds_now()) {
+  events::tell({{"event", "stage"}, {"stage", label_}, {"total", total_}});
+}
 
 Progress::~Progress() {
-  if (drawn_at_ >= 0) fmt::print(stderr, "\r\x1b[K");
+  if (drawn_at_ >= 0 && on_terminal()) fmt::print(stderr, "\r\x1b[K");
+  events::tell({{"event", "stage_end"}, {"stage", label_}, {"seconds", seconds_now() - started_}});
 }
 
 void Progress::update(std::int64_t done, const std::string& note) {
-  if (!on_terminal()) return;
+  if (!on_terminal() && !events::wanted()) return;
   const double now = seconds_now();
   if (drawn_at_ >= 0 && now - drawn_at_ < 0.1 && done < total_) return;
+  const bool another_second = std::floor(now) != std::floor(drawn_at_);
   drawn_at_ = now;
+  if (another_second)
+    events::tell(
+        {{"event", "progress"}, {"stage", label_}, {"done", done}, {"total", total_}, {"note", note}});
+  if (!on_terminal()) return;
   constexpr int width = 24;
   std::string line = fmt::format("\r\x1b[K{} ", label_);
   if (total_ > 0) {

@@ -230,6 +230,17 @@ void Stepper<Real>::find_pushes() {
 }
 
 template <class Real>
+std::vector<Vec3> Stepper<Real>::pushes_m_s2(int lane) {
+  find_pushes();
+  std::vector<Vec3> pushes;
+  for (int n = 0; n < world_.bodies[world_.robot].node_count(); ++n) {
+    const auto at = [&](int c) { return double(push_[std::size_t((3 * n + c) * lanes_ + lane)]); };
+    pushes.emplace_back(at(0), at(1), at(2));
+  }
+  return pushes;
+}
+
+template <class Real>
 void Stepper<Real>::add_elastic_forces() {
   for (std::size_t b = 0; b < world_.bodies.size(); ++b)
     if (world_.topology.bodies[b].moving && !all_asleep_[b])

@@ -37,6 +37,8 @@ class Stepper {
     Vec3 place, velocity;
   };
   Node node(int lane, int node) const;
+  std::vector<Vec3> pushes_m_s2(
+      int lane);  // of each node of the robot, by its control, in the step that begins
   const Cost& cost() const { return cost_; }
 
  private:

@@ -635,7 +635,8 @@ constexpr Key all_keys[] = {
      0,
      "false",
      "arrows where they leave the robot: the push that drives it, orange, as long as the robot where it is "
-     "strongest; what each body and the walls do to it, blue, at most twice as long",
+     "strongest (interpolation and holding: the sum over all nodes, along a line through the centre of "
+     "mass); what each body and the walls do to it, blue, at most twice as long",
      "",
      ""},
     {"film.path", Type::boolean, {}, 0, "false", "draw the way of the robot's centre of mass", "", ""},

@@ -185,6 +185,32 @@ TEST_F(ExportMotion, SameMotionSameBytesAndAnEarlierSeriesGoes) {
   EXPECT_EQ(formats.at("vtu").at("files"), 2 * 3 + 2);
 }
 
+// Of another plan only what limber made there; the same plan again leaves all as it is.
+TEST_F(ExportMotion, AnotherPlanRemovesWhatShowsTheOldOne) {
+  ASSERT_EQ(exported("gltf,pc2,usd,vtu").code, exit_done);
+  ASSERT_EQ(exported("gltf", {"-o", out("elsewhere")}).code, exit_done);
+  ASSERT_EQ(limber_program({"report", out()}).code, exit_done);
+  const fs::path report = fs::path(out()) / "report.html";
+  for (const char* of_the_user : {"notes.txt", "pc2/shot.blend", "vtu/cages/mine.vtu", "vtu/view.pvsm"})
+    std::ofstream(file(of_the_user)) << "mine";
+  const auto before = contents(file(""));
+  const auto planned_again = [&](const char* seed) {
+    return limber_program(
+        {"plan", scene(scene_with_rigid_bodies()), "-o", out(), "--iterations", "60", "--seed", seed});
+  };
+  planned_again("1");
+  EXPECT_TRUE(contents(file("")) == before);
+  EXPECT_TRUE(fs::exists(report));
+  const Result other = planned_again("2");
+  EXPECT_NE(other.err.find("of another plan are removed"), std::string::npos) << other.err;
+  EXPECT_FALSE(fs::exists(report));
+  std::vector<std::string> left;
+  for (const auto& [name, content] : contents(file(""))) left.push_back(name);
+  EXPECT_EQ(left, (std::vector<std::string>{"notes.txt", "pc2/shot.blend", "pc2/table.obj",
+                                            "vtu/cages/mine.vtu", "vtu/view.pvsm"}));
+  EXPECT_TRUE(fs::exists(fs::path(out("elsewhere")) / "motion.glb"));
+}
+
 TEST_F(ExportMotion, WrongInputIsToldAndNothingHalfWritten) {
   EXPECT_EQ(limber_program({"export", out(), "--format", "fbx"}).code, exit_bad_input);
   EXPECT_EQ(limber_program({"export", out()}).code, exit_bad_input);

@@ -2,8 +2,11 @@
 #include <gmock/gmock.h>
 
 #include <cmath>
+#include <map>
 #include <set>
+#include <sstream>
 
+#include "app/plan_folder.h"
 #include "render/png_file.h"
 #include "tests/app/program.h"
 
@@ -134,6 +137,80 @@ TEST_F(FilmedSlowly, SceneryIsSeenAndOtherCamerasHaveTheirOwnFilm) {
   const Result broken = limber_program({"render", out()});
   EXPECT_EQ(broken.code, exit_bad_input);
   EXPECT_THAT(broken.err, HasSubstr("limber plan"));
+}
+
+std::vector<Json> events_of(const std::string& text) {
+  std::vector<Json> events;
+  std::istringstream lines(text);
+  for (std::string line; std::getline(lines, line);) events.push_back(Json::parse(line));
+  return events;
+}
+
+// Every line is an event; the frames told are those on the disk, and stdout has what it has without.
+TEST_F(Filmed, ProgressTellsEveryFrameWithItsHash) {
+  ASSERT_EQ(limber_program({"render", out(), "--frames", "1"}).code, exit_done);
+  const std::string file = out("progress.jsonl");
+  const std::vector<std::string> words{"render", out(), "--resume", "--json", "--frames", "0-4,9999"};
+  for (const std::string& where : {std::string("json"), file}) {
+    SCOPED_TRACE(where);
+    fs::remove(fs::path(out()) / "frames" / "0002.png");
+    std::vector<std::string> told = words;
+    told.insert(told.end(), {"--progress", where});
+    const Result result = limber_program(told);
+    ASSERT_EQ(result.code, exit_done) << result.err;
+    const bool on_stderr = where == "json";
+    const std::vector<Json> events = events_of(on_stderr ? result.err : read_file(file));
+    EXPECT_EQ(result.err.find("left out") == std::string::npos, false);
+    std::map<int, std::string> hashes;
+    std::set<std::string> kinds;
+    for (const Json& event : events) {
+      kinds.insert(event.at("event"));
+      if (event.at("event") == "frames") {
+        EXPECT_EQ(event.at("wanted"), 5);
+      }
+      if (event.at("event") != "frame") continue;
+      hashes[event.at("frame")] = event.at("hash");
+      EXPECT_EQ(event.at("done"), hashes.size());
+      EXPECT_GE(event.at("seconds"), 0);
+    }
+    EXPECT_EQ(kinds.contains("warning"), on_stderr);
+    EXPECT_THAT(kinds, testing::IsSupersetOf({"frames", "stage", "frame", "stage_end", "end"}));
+    EXPECT_EQ(events.back().at("event"), "end");
+    EXPECT_EQ(events.back().at("exit_code"), exit_done);
+    EXPECT_EQ(int(hashes.size()), result.json().at("painted"));
+    EXPECT_EQ(hashes.size(), on_stderr ? 4u : 1u);  // the second time only the missing one
+    for (const auto& [frame, hash] : hashes)
+      EXPECT_EQ(render::frame_hash(fs::path(out()) / "frames" / fmt::format("{:04}.png", frame)), hash);
+  }
+  EXPECT_EQ(limber_program(words).err.find('{'), std::string::npos);
+  EXPECT_EQ(limber_program({"render", out(), "--progress", "yes"}).code, exit_bad_input);
+  EXPECT_EQ(limber_program({"render", out(), "--progress", out("no/such.jsonl")}).code, exit_disk);
+  const Result failed = limber_program({"render", out("none"), "--progress", "json"});
+  EXPECT_EQ(failed.code, exit_bad_input);
+  EXPECT_EQ(events_of(failed.err).back().at("exit_code"), exit_bad_input);
+}
+
+// Nothing touches the robot in the goal, so what the forces add to the pictures of the settle is its own
+// arrow.
+TEST_F(Filmed, TheSettleHasAnArrow) {
+  const plan::Trajectory path = read_plan_folder(out()).plan.trajectory;
+  int first_of_settle = 0;
+  while (path.frames[std::size_t(first_of_settle)].step < path.end.step - path.settle_steps)
+    ++first_of_settle;
+  ASSERT_LT(first_of_settle, frames - 2);
+  const std::string settle = fmt::format("{}-{}", first_of_settle, frames - 1);
+  for (const char* forces : {"false", "true"})
+    ASSERT_EQ(limber_program({"render", out(), "--frames", settle, "--as", forces, "--set",
+                              fmt::format("film.forces={}", forces)})
+                  .code,
+              exit_done);
+  int changed = 0;
+  for (int f = first_of_settle; f < frames; ++f) {
+    const std::string name = fmt::format("{:04}.png", f);
+    changed += render::read_png(fs::path(out()) / "frames-true" / name).rgb !=
+               render::read_png(fs::path(out()) / "frames-false" / name).rgb;
+  }
+  EXPECT_GT(changed, (frames - first_of_settle) / 2);
 }
 
 // A scene whose film changed is filmed anew, not planned anew.

@@ -12,7 +12,8 @@ namespace {
 TEST(FrameList, ReadsFramesRangesAndSteps) {
   EXPECT_EQ(parse_frames("3", 10), (std::vector<int>{3}));
   EXPECT_EQ(parse_frames("1-3,5-9:2", 10), (std::vector<int>{1, 2, 3, 5, 7, 9}));
-  EXPECT_EQ(parse_frames("9,2-3,3", 10), (std::vector<int>{2, 3, 9}));  // ascending, each once
+  EXPECT_EQ(parse_frames("1-3,5-9x2", 10), (std::vector<int>{1, 2, 3, 5, 7, 9}));  // as OpenCue writes it
+  EXPECT_EQ(parse_frames("9,2-3,3", 10), (std::vector<int>{2, 3, 9}));             // ascending, each once
   EXPECT_EQ(parse_frames("", 3), (std::vector<int>{0, 1, 2}));
 }
 
@@ -31,7 +32,8 @@ TEST(FrameList, SeedsHaveTheSameFormAndNoEnd) {
 }
 
 TEST(FrameList, RefusesWhatItCannotRead) {
-  for (const char* text : {"a", "1-", "-3", "5-3", "1-3:0", "1-3:x", "1,,2", "1 2", "99999999999999"})
+  for (const char* text :
+       {"a", "1-", "-3", "5-3", "1-3:0", "1-3:x", "1-9x2:2", "1-9x", "1,,2", "1 2", "99999999999999"})
     EXPECT_THROW(parse_frames(text, 100), InputError) << text;
 }
 

@@ -1,7 +1,9 @@
 #include <gtest/gtest.h>
 #include <sys/stat.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
+#include <chrono>
 #include <fstream>
 
 #include "core/error.h"
@@ -10,6 +12,7 @@
 #include "core/mesh_files.h"
 #include "core/npz.h"
 #include "core/random.h"
+#include "core/temporary_files.h"
 #include "tests/core/temporary_folder.h"
 
 namespace limber {
@@ -196,6 +199,64 @@ TEST(Json, ComplaintNamesTheLine) {
     EXPECT_NE(std::string(error.what()).find("report.json:3: is not valid JSON"), std::string::npos)
         << error.what();
   }
+}
+
+// A process that writes, and waits to be killed in the middle of it.
+struct Writer {
+  explicit Writer(const fs::path& file) {
+    int ready[2];
+    LIMBER_CHECK(::pipe(ready) == 0, errno);
+    process = ::fork();
+    if (process == 0) {
+      PendingFile pending(file);
+      std::ofstream(pending.temporary()) << "half";
+      [[maybe_unused]] const auto told = ::write(ready[1], "!", 1);
+      ::pause();
+    }
+    char byte;
+    LIMBER_CHECK(::read(ready[0], &byte, 1) == 1, errno);
+    ::close(ready[0]), ::close(ready[1]);
+  }
+  void kill() const { ::kill(process, SIGKILL), ::waitpid(process, nullptr, 0); }
+  pid_t process;
+};
+
+std::vector<fs::path> files_in(const fs::path& folder) {
+  std::vector<fs::path> files;
+  for (const auto& entry : fs::directory_iterator(folder)) files.push_back(entry.path());
+  return files;
+}
+
+TEST(File, OnlyWhatKilledProcessesLeftIsRemoved) {
+  const TemporaryFolder folder;
+  const Writer writer(folder / "0007.png");
+  PendingFile ours(folder / "0008.png");
+  std::ofstream(ours.temporary()) << "half";
+  for (const char* name : {".notes.tmp", ".0007.12.0.tmp.png", "0007.png", ".x.00c0ffee.tmp.png"})
+    std::ofstream(folder / name) << "the user's";
+  EXPECT_EQ(remove_abandoned(folder.path()), 0);
+  writer.kill();
+  const fs::path left = [&] {
+    for (const fs::path& file : files_in(folder.path()))
+      if (file.filename().string().starts_with(".0007.") && file != folder / ".0007.12.0.tmp.png")
+        return file;
+    return fs::path();
+  }();
+  ASSERT_FALSE(left.empty());
+
+  // As a process of another machine would have left it: only its age tells.
+  std::string name = left.filename().string();
+  const auto place = std::string(".0007.").size();
+  name.replace(place, 8, name.substr(place, 8) == "00000000" ? "00000001" : "00000000");
+  fs::copy(left, folder / name);
+  EXPECT_EQ(remove_abandoned(folder.path()), 1);
+  EXPECT_FALSE(fs::exists(left));
+  EXPECT_TRUE(fs::exists(folder / name));
+  fs::last_write_time(folder / name, fs::last_write_time(folder / name) - std::chrono::hours(25));
+  EXPECT_EQ(remove_abandoned(folder.path()), 1);
+  EXPECT_EQ(files_in(folder.path()).size(), 5u);
+  EXPECT_TRUE(fs::exists(ours.temporary()));
+  EXPECT_EQ(remove_abandoned(folder / "missing"), 0);
 }
 
 }  // namespace

@@ -1,5 +1,6 @@
 // What observables say, against what moves the bodies and against closed forms.
 #include "fem/observe.h"
+#include "fem/control_forces.h"
 
 #include <gtest/gtest.h>
 
@@ -153,6 +154,44 @@ TEST(Observe, ContactForcesAreWhatMovesTheBodies) {
   EXPECT_GT(contacts, 100);
   EXPECT_GT(walls, 10);
   EXPECT_GT(between_moving, 10);
+}
+
+// So does each kind of control: the robot's momentum gains h times the sum of what it does to the nodes, and
+// no node gets more than its share of the most that is allowed.
+TEST(Observe, ControlForcesAreWhatMovesTheRobot) {
+  const World world = pile();
+  const Body& robot = world.bodies[std::size_t(world.robot)];
+  Control control;
+  control.force_n = {3, -2, 40}, control.node = 5, control.radius_m = 0.6f;
+  control.target_m = {-0.4f, 0.5f, 2}, control.max_force_n = 60;
+  for (const Manipulation manipulation : {Manipulation::none, Manipulation::body, Manipulation::control_point,
+                                          Manipulation::interpolation, Manipulation::hold}) {
+    SCOPED_TRACE(int(manipulation));
+    control.manipulation = manipulation;
+    control.steps = 60;
+    const State state = propagate(world, rest_state(world), control).end;
+    control.steps = 1;
+    const State next = propagate(world, state, control).end;
+    Vec3 sum = Vec3::Zero(), gained = Vec3::Zero();
+    const std::vector<Vec3> forces = control_forces_n(world, state, control);
+    ASSERT_EQ(int(forces.size()), robot.node_count());
+    for (int n = 0; n < robot.node_count(); ++n) {
+      sum += forces[std::size_t(n)];
+      EXPECT_LE(forces[std::size_t(n)].norm(),
+                1.00001 * largest_force(control) * robot.node_mass_kg[n] / robot.mass_kg);
+      for (int c = 0; c < 3; ++c) {
+        const std::size_t k = std::size_t(3 * (robot.first_node + n) + c);
+        gained[c] += robot.node_mass_kg[n] * (double(next.velocities[k]) - double(state.velocities[k]));
+      }
+    }
+    EXPECT_EQ(sum.norm() > 1, manipulation != Manipulation::none);
+    for (const PairForce& pair : pair_forces(contact_forces(world, state))) {
+      if (pair.body == world.robot) sum += pair.force_n;
+      if (pair.other == world.robot) sum -= pair.force_n;
+    }
+    const Vec3 expected = world.dt_s * (sum + robot.mass_kg * world.gravity_m_s2);
+    EXPECT_LT((gained - expected).norm(), 1e-5 * robot.mass_kg);
+  }
 }
 
 // The bodies' energies are those of the world, each that of the body alone.

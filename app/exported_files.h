@@ -1,0 +1,12 @@
+#pragma once
+
+#include <vector>
+
+#include "core/file.h"
+
+namespace limber::app {
+
+// Those of the files in a folder that `limber export` may have written there, ordered.
+std::vector<fs::path> exported_files(const fs::path& folder);
+
+}  // namespace limber::app
