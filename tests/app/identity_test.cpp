@@ -36,8 +36,8 @@ bool touches(const fem::World& world, const State& state) {
   return deepest.depth_m > 0 && deepest.other >= 0;
 }
 
-// Pushed towards the goal, or else towards one of the other bodies, until something is in the way, and a
-// little further; then on in many ways.
+// Pushed towards the goal, or else towards one of the other bodies, until something is in the way, and still
+// is a little further; then on in many ways.
 Cases pressed_cases(const fem::World& world, const scenes::Scene& scene) {
   Cases cases;
   const State rest = rest_state(world);
@@ -55,10 +55,10 @@ Cases pressed_cases(const fem::World& world, const scenes::Scene& scene) {
     cases.start = rest;
     towards = (place - from).normalized();
     for (int i = 0; i < 100 && !touches(world, cases.start); ++i) go_on();
+    for (int i = 0; i < 4; ++i) go_on();
     if (touches(world, cases.start)) break;
   }
   EXPECT_TRUE(touches(world, cases.start));
-  for (int i = 0; i < 4; ++i) go_on();
   Rng rng(61, 0);
   for (int i = 0; i < rollouts; ++i) {
     Control control = push(force_n * (0.7 * towards + 0.3 * rng.direction()), 400 + rng.below(200));
