@@ -114,6 +114,20 @@ TEST_F(Habits, ARigidWallIsFoundToForbidThePlanAndTheNearestIsFilmed) {
   EXPECT_GT(plan.at("frames").get<int>(), 1);  // the nearest is not the start
 }
 
+// A robot whose volume must hardly change cannot be pushed at all, and the program says what refuses it.
+TEST_F(Habits, WhatRefusesMostPushesIsNamed) {
+  const std::vector<std::string> words{"plan", scene(), "-o", out(), "--iterations", "30", "--json", "--set"};
+  for (const auto& [most, named] : {std::pair("1e-6", true), {"1", false}}) {
+    std::vector<std::string> limited = words;
+    limited.push_back(std::string("bodies.robot.max_volume_change=") + most);
+    const Json plan = limber_program(limited).json();
+    EXPECT_EQ(
+        plan.at("explanation").get<std::string>().find("a larger max_volume_change") != std::string::npos,
+        named)
+        << most;
+  }
+}
+
 // A soft block that fills the way stands in it: it is named, and geometry is not to blame.
 TEST_F(Habits, TheBodyThatBlocksIsNamed) {
   const Result planned = limber_program(
