@@ -27,25 +27,30 @@ function(limber_module NAME)
   set_property(GLOBAL PROPERTY LIMBER_OWNS_${NAME} "${M_OWNS}")
 endfunction()
 
-# limber_tests(NAME SOURCES … USES module …): the executable NAME_tests; one ctest a TEST, labelled NAME. A suite whose name
-# ends in _slow stays out of the sanitizer runs.
+# limber_tests(NAME SOURCES … USES module …): the executable NAME_tests; one ctest a TEST, labelled NAME, or NAME_slow where
+# the TEST's suite ends in _slow. What is labelled _slow stays out of the sanitizer runs, and is
+# not built for them either where the whole executable is slow.
 function(limber_tests NAME)
   cmake_parse_arguments(T "" "" "SOURCES;USES" ${ARGN})
   add_executable(${NAME}_tests ${T_SOURCES})
   foreach(module ${T_USES})
     target_link_libraries(${NAME}_tests PRIVATE limber_${module})
   endforeach()
-  target_link_libraries(${NAME}_tests PRIVATE GTest::gtest_main GTest::gmock)
-  target_compile_definitions(${NAME}_tests PRIVATE
-    LIMBER_SHARED_DATA="${LIMBER_SHARED_DATA}" LIMBER_SOURCE_DIR="${PROJECT_SOURCE_DIR}"
-    LIMBER_BINARY_DIR="${PROJECT_BINARY_DIR}")
+  target_link_libraries(${NAME}_tests PRIVATE limber_places GTest::gtest_main GTest::gmock)
+  if(LIMBER_SANITIZE AND NAME MATCHES "_slow$")
+    set_target_properties(${NAME}_tests PROPERTIES EXCLUDE_FROM_ALL ON)
+    return()
+  endif()
   include(GoogleTest)
   set(environment)
   if(LIMBER_SANITIZE MATCHES address)
     set(environment ENVIRONMENT "LSAN_OPTIONS=suppressions=${PROJECT_SOURCE_DIR}/tools/lsan.supp:print_suppressions=0")
   endif()
-  gtest_discover_tests(${NAME}_tests TEST_PREFIX ${NAME}. DISCOVERY_TIMEOUT 60
-                       PROPERTIES LABELS ${NAME} TIMEOUT 600 ${environment})
+  foreach(part "-*_slow.*|${NAME}" "*_slow.*|${NAME}_slow")
+    string(REGEX MATCH "^(.*)[|](.*)$" part "${part}")
+    gtest_discover_tests(${NAME}_tests TEST_PREFIX ${NAME}. TEST_FILTER "${CMAKE_MATCH_1}" DISCOVERY_TIMEOUT 60
+                         PROPERTIES LABELS ${CMAKE_MATCH_2} TIMEOUT 600 ${environment})
+  endforeach()
 endfunction()
 
 # Writes the module map where the layering test reads it.

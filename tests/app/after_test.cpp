@@ -4,7 +4,7 @@
 namespace limber::app {
 namespace {
 
-TEST_F(Program, AShortenedPathIsAPlanLikeAnyOther) {
+TEST_F(Program_slow, AShortenedPathIsAPlanLikeAnyOther) {
   const Json plain = limber_program({"plan", scene(), "-o", out(), "--json"}).json();
   EXPECT_FALSE(plain.contains("shortcut"));
   const Json two = limber_program({"plan", scene(), "-o", out(), "--shortcut", "2", "--json"}).json();
@@ -28,7 +28,7 @@ TEST_F(Program, AShortenedPathIsAPlanLikeAnyOther) {
             effort.at("shortcut").at("before").at("effort_n_s").get<double>());
 }
 
-TEST_F(Program, ImprovingKeepsTheBestPathWithinItsIterations) {
+TEST_F(Program_slow, ImprovingKeepsTheBestPathWithinItsIterations) {
   const Json plain = limber_program({"plan", scene(), "-o", out(), "--seed", "3", "--json"}).json();
   const Result improved = limber_program(
       {"plan", scene(), "-o", out("more"), "--seed", "3", "--improve", "--iterations", "400", "--json"});
@@ -42,7 +42,7 @@ TEST_F(Program, ImprovingKeepsTheBestPathWithinItsIterations) {
   EXPECT_EQ(limber_program({"verify", out("more")}).code, exit_done);
 }
 
-TEST_F(Program, APlanThatIsNotPerturbedIsItself) {
+TEST_F(Program_slow, APlanThatIsNotPerturbedIsItself) {
   ASSERT_EQ(limber_program({"plan", scene(), "-o", out()}).code, exit_done);
   const Json exact = limber_program({"robust", out(), "-n", "5", "--materials", "0", "--forces", "0",
                                      "--turn", "0", "--json"})
@@ -61,7 +61,7 @@ TEST_F(Program, APlanThatIsNotPerturbedIsItself) {
   EXPECT_NE(reports[0], limber_program({"robust", out(), "-n", "6", "--seed", "2", "--json"}).json());
 }
 
-TEST_F(Program, APlanIsCarriedToFinerCages) {
+TEST_F(Program_slow, APlanIsCarriedToFinerCages) {
   const Json coarse = limber_program({"plan", scene(), "-o", out(), "--json"}).json();
   const Json same =
       limber_program({"refine", out(), "-o", out("same"), "--tets-factor", "1", "--json"}).json();

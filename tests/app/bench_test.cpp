@@ -189,7 +189,7 @@ std::vector<std::string> bench_of(const std::string& scene, const std::string& o
 
 // Two machines share the work; one table comes of it, the same as one machine's. Each run is what `plan`
 // plans.
-TEST_F(Program, ChunksOfABenchmarkMergeToTheWholeAndARunIsWhatPlanPlans) {
+TEST_F(Program_slow, ChunksOfABenchmarkMergeToTheWholeAndARunIsWhatPlanPlans) {
   const Result whole = limber_program(bench_of(scene(), out("whole")));
   ASSERT_EQ(whole.code, exit_done) << whole.err;
   const Json groups = whole.json().at("groups");
@@ -229,7 +229,7 @@ TEST_F(Program, ChunksOfABenchmarkMergeToTheWholeAndARunIsWhatPlanPlans) {
     EXPECT_NEAR(way.back()[std::size_t(axis)].get<double>(), (Vec3(3.2, 1, 1))[axis], 0.3 + 1e-3);
 }
 
-TEST_F(Program, ABenchmarkStartedAgainRunsOnlyWhatIsMissing) {
+TEST_F(Program_slow, ABenchmarkStartedAgainRunsOnlyWhatIsMissing) {
   ASSERT_EQ(limber_program(bench_of(scene(), out())).code, exit_done);
   const auto before = contents(fs::path(out()) / "runs");
   ASSERT_EQ(before.size(), 4u);

@@ -15,6 +15,7 @@
 #include "core/progress.h"
 #include "render/png_file.h"
 #include "tests/app/program.h"
+#include "tests/places.h"
 
 namespace limber::app {
 namespace {
@@ -43,7 +44,7 @@ TEST_F(Program, RunFilmsASceneVerifyAgreesAndASecondRunChangesNothing) {
 
 // One row a frame, as many numbers as the head has names, and their extremes are those that verify and plan
 // tell.
-TEST_F(Program, ObservablesOfAPathAgreeWithItsSummary) {
+TEST_F(Program_slow, ObservablesOfAPathAgreeWithItsSummary) {
   const Result planned = limber_program({"plan", scene(), "-o", out(), "--json"});
   ASSERT_EQ(planned.code, exit_done) << planned.err;
   const std::string csv = out("observables.csv");
@@ -105,7 +106,7 @@ TEST_F(Program, ARigidRobotIsPlannedAndVerified) {
 }
 
 // The shells that `info` lists are those that a scene may name as parts; together they have all tets.
-TEST_F(Program, PartsAreChosenByTheShellsThatInfoLists) {
+TEST_F(Program_slow, PartsAreChosenByTheShellsThatInfoLists) {
   std::ofstream(folder / "ell.obj")
       << "v 0 0 0\nv 1 0 0\nv 1 0.3 0\nv 0.3 0.3 0\nv 0.3 1 0\nv 0 1 0\n"
          "v 0 0 0.4\nv 1 0 0.4\nv 1 0.3 0.4\nv 0.3 0.3 0.4\nv 0.3 1 0.4\nv 0 1 0.4\n"
@@ -153,7 +154,7 @@ TEST_F(Program, PartsAreChosenByTheShellsThatInfoLists) {
   EXPECT_NE(empty.err.find("no tet of the cage has its middle in that box"), std::string::npos) << empty.err;
 }
 
-TEST_F(Program, TheSameSeedGivesTheSameBytesForAnyThreadCount) {
+TEST_F(Program_slow, TheSameSeedGivesTheSameBytesForAnyThreadCount) {
   std::vector<Json> results;
   for (const char* threads : {"1", "2", "2"})
     results.push_back(limber_program({"plan", scene(), "-o", out(threads + std::to_string(results.size())),
@@ -186,7 +187,7 @@ TEST_F(Program, ASignalKeepsThePlanSoFar) {
   EXPECT_EQ(stopped.code, 130) << stopped.err;
 }
 
-TEST_F(Program, ChunksOfFramesAreTheFramesOfOneRun) {
+TEST_F(Program_slow, ChunksOfFramesAreTheFramesOfOneRun) {
   ASSERT_EQ(limber_program({"run", scene(), "-o", out("whole")}).code, exit_done);
   ASSERT_EQ(limber_program({"plan", scene(), "-o", out("parts")}).code, exit_done);
   for (const char* chunk : {"2/3", "1/3", "3/3"}) {
@@ -197,7 +198,7 @@ TEST_F(Program, ChunksOfFramesAreTheFramesOfOneRun) {
   EXPECT_EQ(contents(fs::path(out("whole")) / "frames"), contents(fs::path(out("parts")) / "frames"));
 }
 
-TEST_F(Program, ResumePaintsOnlyFramesThatAreMissingOrDamaged) {
+TEST_F(Program_slow, ResumePaintsOnlyFramesThatAreMissingOrDamaged) {
   ASSERT_EQ(limber_program({"run", scene(), "-o", out()}).code, exit_done);
   const fs::path frames = fs::path(out()) / "frames";
   const auto good = contents(frames);
@@ -281,7 +282,7 @@ TEST_F(Program, ADiskThatFillsUpLeavesNothingHalfWritten) {
             exit_done);  // with room, the same command goes through
 }
 
-TEST_F(Program, FilesThatDoNotBelongTogetherAreRefused) {
+TEST_F(Program_slow, FilesThatDoNotBelongTogetherAreRefused) {
   ASSERT_EQ(limber_program({"plan", scene(), "-o", out()}).code, exit_done);
   const fs::path cage = fs::path(out()) / "bodies" / "robot" / "cage.msh";
   const std::string content = read_file(cage);
@@ -341,7 +342,7 @@ TEST_F(Program, ExportsAreWrittenAlsoOfABodyThatIsUpToDateAndGoWithIt) {
   EXPECT_EQ(files.size(), 7);
   for (const Json& name : files) EXPECT_TRUE(fs::exists(fs::path(out()) / name)) << name;
 
-  const std::string command = LIMBER_SOURCE_DIR "/tools/check_exports '" + out() + "'";
+  const std::string command = std::string(limber_source_dir) + "/tools/check_exports '" + out() + "'";
   const int status = std::system(command.c_str());
   ASSERT_TRUE(WIFEXITED(status));
 

@@ -14,6 +14,7 @@
 #include "app/scene_world.h"
 #include "fem/observe.h"
 #include "tests/app/program.h"
+#include "tests/places.h"
 
 namespace limber::app {
 namespace {
@@ -243,7 +244,7 @@ TEST_F(ExportMotion, WrongInputIsToldAndNothingHalfWritten) {
 TEST_F(ExportMotion, OtherProgramsReadersAgree) {
   ASSERT_EQ(exported("gltf,pc2,usd,vtu").code, exit_done);
   const int status =
-      std::system((std::string(LIMBER_SOURCE_DIR "/tools/check_exports '") + out() + "'").c_str());
+      std::system((std::string(limber_source_dir) + "/tools/check_exports '" + out() + "'").c_str());
   ASSERT_TRUE(WIFEXITED(status));
   if (WEXITSTATUS(status) == 77)
     GTEST_SKIP()

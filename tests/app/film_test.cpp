@@ -35,8 +35,9 @@ class Filmed : public Program {
   fs::path picture(const std::string& name) const { return fs::path(out()) / "frames-try" / name; }
   int frames = 0;
 };
+using Filmed_slow = Filmed;  // stays out of the sanitizer runs
 
-TEST_F(Filmed, EveryKeyOfTheFilmChangesThePicture) {
+TEST_F(Filmed_slow, EveryKeyOfTheFilmChangesThePicture) {
   const render::Image8 plain = frame_3({});
   for (const char* set :
        {"film.color_by=strain",     "film.color_by=volume",       "film.color_by=speed",
@@ -50,7 +51,7 @@ TEST_F(Filmed, EveryKeyOfTheFilmChangesThePicture) {
   EXPECT_EQ(frame_3({}), plain);
 }
 
-TEST_F(Filmed, WhatWouldChangeTheMotionIsRefused) {
+TEST_F(Filmed_slow, WhatWouldChangeTheMotionIsRefused) {
   for (const char* set : {"film.frames_per_second=10", "film.speed=0.5", "planner.seed=3", "goal.radius_m=1",
                           "bodies.robot.material.density_kg_m3=7"}) {
     const Result refused = limber_program({"render", out(), "--set", set});
@@ -65,7 +66,7 @@ TEST_F(Filmed, WhatWouldChangeTheMotionIsRefused) {
 }
 
 // The range of colours is that of the whole motion, so a part of the frames, or a chunk, has the same.
-TEST_F(Filmed, AFrameIsTheSameByItself) {
+TEST_F(Filmed_slow, AFrameIsTheSameByItself) {
   const render::Image8 alone = frame_3({"--set", "film.color_by=strain"});
   ASSERT_EQ(limber_program({"render", out(), "--as", "whole", "--set", "film.color_by=strain"}).code,
             exit_done);
@@ -103,7 +104,7 @@ TEST_F(Filmed, PassesAgreeWithOneAnother) {
   EXPECT_GT(high, 0);
 }
 
-TEST_F(Filmed, AFrameWithoutItsPassIsNotWhole) {
+TEST_F(Filmed_slow, AFrameWithoutItsPassIsNotWhole) {
   const std::vector<std::string> words{"render", out(), "--resume", "--json", "--passes", "depth"};
   ASSERT_EQ(limber_program(words).json().at("painted"), frames);
   EXPECT_EQ(limber_program(words).json().at("painted"), 0);
@@ -111,7 +112,7 @@ TEST_F(Filmed, AFrameWithoutItsPassIsNotWhole) {
   EXPECT_EQ(limber_program(words).json().at("painted"), 1);
 }
 
-class FilmedSlowly : public Filmed {
+class SlowMotion_slow : public Filmed {
   std::string text() const override {
     std::string edited = replaced("frames_per_second = 5\n", "frames_per_second = 5\nspeed = 0.5\n");
     return edited +
@@ -121,13 +122,13 @@ class FilmedSlowly : public Filmed {
   }
 };
 
-TEST_F(FilmedSlowly, HasTwiceTheFramesOfTheSameMotion) {
+TEST_F(SlowMotion_slow, HasTwiceTheFramesOfTheSameMotion) {
   const Result normal = limber_program({"plan", scene(), "-o", out("normal"), "--json"});
   const int usual = normal.json().at("frames");
   EXPECT_NEAR(frames, 2 * usual, 1);
 }
 
-TEST_F(FilmedSlowly, SceneryIsSeenAndOtherCamerasHaveTheirOwnFilm) {
+TEST_F(SlowMotion_slow, SceneryIsSeenAndOtherCamerasHaveTheirOwnFilm) {
   const render::Image8 seen = frame_3({});
   EXPECT_NE(frame_3({"--set", "bodies.veil.color=#00ff00"}), seen);
   const Result above = limber_program({"render", out(), "--camera", "above", "--frames", "3"});
@@ -147,7 +148,7 @@ std::vector<Json> events_of(const std::string& text) {
 }
 
 // Every line is an event; the frames told are those on the disk, and stdout has what it has without.
-TEST_F(Filmed, ProgressTellsEveryFrameWithItsHash) {
+TEST_F(Filmed_slow, ProgressTellsEveryFrameWithItsHash) {
   ASSERT_EQ(limber_program({"render", out(), "--frames", "1"}).code, exit_done);
   const std::string file = out("progress.jsonl");
   const std::vector<std::string> words{"render", out(), "--resume", "--json", "--frames", "0-4,9999"};
@@ -192,7 +193,7 @@ TEST_F(Filmed, ProgressTellsEveryFrameWithItsHash) {
 
 // Nothing touches the robot in the goal, so what the forces add to the pictures of the settle is its own
 // arrow.
-TEST_F(Filmed, TheSettleHasAnArrow) {
+TEST_F(Filmed_slow, TheSettleHasAnArrow) {
   const plan::Trajectory path = read_plan_folder(out()).plan.trajectory;
   int first_of_settle = 0;
   while (path.frames[std::size_t(first_of_settle)].step < path.end.step - path.settle_steps)
@@ -214,7 +215,7 @@ TEST_F(Filmed, TheSettleHasAnArrow) {
 }
 
 // A scene whose film changed is filmed anew, not planned anew.
-TEST_F(Program, RunFilmsAnewWhatIsFilmedOtherwise) {
+TEST_F(Program_slow, RunFilmsAnewWhatIsFilmedOtherwise) {
   ASSERT_EQ(limber_program({"run", scene(), "-o", out()}).code, exit_done);
   const std::string plan = limber_program({"info", out(), "--json"}).out;
   const auto before = render::read_png(fs::path(out()) / "frames" / "0003.png");

@@ -9,6 +9,7 @@
 #include "core/random.h"
 #include "render/png_file.h"
 #include "tests/app/program.h"
+#include "tests/places.h"
 
 namespace limber::app {
 namespace {
@@ -62,7 +63,7 @@ void expect_resumes_at_three_points(const std::string& scene, const fs::path& fo
 // Starts the program, sends it the signal as soon as `is_time`, and returns its exit code.
 int exit_code_after_signal(const std::vector<std::string>& arguments, int signal_number,
                            const std::function<bool()>& is_time) {
-  const std::string program = LIMBER_BINARY_DIR "/app/limber";
+  const std::string program = std::string(limber_binary_dir) + "/app/limber";
   std::vector<char*> argv{const_cast<char*>(program.c_str())};
   for (const std::string& a : arguments) argv.push_back(const_cast<char*>(a.c_str()));
   argv.push_back(nullptr);

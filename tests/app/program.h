@@ -85,6 +85,7 @@ class Program : public testing::Test {
   std::string out(const std::string& name = "out") const { return (folder / name).string(); }
   TemporaryFolder folder;
 };
+using Program_slow = Program;  // stays out of the sanitizer runs
 
 inline std::vector<std::pair<std::string, std::string>> contents(const fs::path& folder) {
   std::vector<std::pair<std::string, std::string>> files;

@@ -9,6 +9,7 @@
 #include "app/scene_world.h"
 #include "fem/observe.h"
 #include "tests/app/program.h"
+#include "tests/places.h"
 
 namespace limber::app {
 namespace {
@@ -139,8 +140,8 @@ TEST_F(Report, WrongInputIsTold) {
 TEST_F(Report, ABrowserPlaysIt) {
   ASSERT_EQ(limber_program({"run", scene(), "-o", out()}).code, exit_done);
   ASSERT_EQ(limber_program({"report", out()}).code, exit_done);
-  const int status =
-      std::system((std::string(LIMBER_SOURCE_DIR "/tools/check_report '") + out() + "/report.html'").c_str());
+  const int status = std::system(
+      (std::string(limber_source_dir) + "/tools/check_report '" + out() + "/report.html'").c_str());
   ASSERT_TRUE(WIFEXITED(status));
   if (WEXITSTATUS(status) == 77)
     GTEST_SKIP() << "chromium or playwright-core (tools/install-node-tools) is missing";

@@ -26,6 +26,7 @@ class ViaProgram : public Program {
     return none;
   }
 };
+using ViaProgram_slow = ViaProgram;  // stays out of the sanitizer runs
 
 TEST_F(ViaProgram, GoalsAreReachedInTheirOrderAndVerified) {
   const std::string file = with_goals(out_and_back);
@@ -58,7 +59,7 @@ TEST_F(ViaProgram, GoalsAreReachedInTheirOrderAndVerified) {
 }
 
 // The second goal cannot be reached: the way to the first is kept, and who fails is named.
-TEST_F(ViaProgram, TheLegThatFailsIsNamedAndTheFirstIsKept) {
+TEST_F(ViaProgram_slow, TheLegThatFailsIsNamedAndTheFirstIsKept) {
   const std::string file =
       with_goals(out_and_back + "clear_of = \"block\"\nbelow = \"block\"\n");  // under the floor
   const std::vector<std::string> words{"plan", file, "-o", out(), "--json", "--iterations", "120"};
@@ -81,7 +82,7 @@ TEST_F(ViaProgram, TheLegThatFailsIsNamedAndTheFirstIsKept) {
 }
 
 // Replays with nothing changed pass the via, some with quite other forces do not and count as missed.
-TEST_F(ViaProgram, ReplaysThatMissTheViaAreCounted) {
+TEST_F(ViaProgram_slow, ReplaysThatMissTheViaAreCounted) {
   const std::string passed = std::string(out_and_back).replace(out_and_back.find("rest = true"), 11, "");
   ASSERT_EQ(limber_program({"plan", with_goals(passed), "-o", out(), "--preset", "fast", "-q"}).code,
             exit_done);
@@ -98,7 +99,7 @@ TEST_F(ViaProgram, ReplaysThatMissTheViaAreCounted) {
   EXPECT_LE(perturbed.at("reached").get<int>(), 8 - missed);
 }
 
-TEST_F(ViaProgram, APathByWayOfViaPointsIsNotCarriedToFinerCages) {
+TEST_F(ViaProgram_slow, APathByWayOfViaPointsIsNotCarriedToFinerCages) {
   const std::string file = with_goals(out_and_back);
   ASSERT_EQ(limber_program({"plan", file, "-o", out(), "--preset", "fast", "-q"}).code, exit_done);
   const Result refined = limber_program({"refine", out(), "-o", out("fine"), "--tets-factor", "2"});

@@ -7,6 +7,7 @@
 #include "meshing/import.h"
 #include "scenes/shapes.h"
 #include "tests/fem/laws.h"
+#include "tests/places.h"
 
 namespace limber::fem {
 namespace {
@@ -31,7 +32,7 @@ TEST(Cages, OfARabbitObeysTheLaws) {
 // Organs of a body of 1.7 m, in millimetres.
 TEST(Cages, OfOrgansObeyTheLaws) {
   for (const char* name : {"heart", "liver"}) {
-    const fs::path file = fs::path(LIMBER_SHARED_DATA) / "organs" / (std::string(name) + ".obj");
+    const fs::path file = fs::path(limber_shared_data) / "organs" / (std::string(name) + ".obj");
     if (!fs::exists(file)) GTEST_SKIP() << file << " is not here: nothing proved of organs";
     testing::prove_laws_of_any_mesh(std::string("cage of a ") + name,
                                     cage_of(meshing::import_model(file, {.scale = 0.001}).surface, 600),

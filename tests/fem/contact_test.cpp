@@ -211,7 +211,7 @@ Tally expect_brute_force(const Lane& lane, const std::vector<detail::Touch<float
 
 // Two bodies that wander through one another and change shape: at each of 1,000 places, the touches found
 // through lists that are many places old are those of brute force.
-TEST(Contact, FindsWhatBruteForceFinds) {
+TEST(Contact_slow, FindsWhatBruteForceFinds) {
   Rng rng(41, 0);
   Tally touches;
   int pierced = 0;

@@ -38,7 +38,7 @@ TetMesh one_tet() {
 }
 
 // Meshes of every kind: a grid with symmetry, one without, a ball.
-TEST(Elastic, LawsOfAnyMeshOnGridsAndABall) {
+TEST(Elastic_slow, LawsOfAnyMeshOnGridsAndABall) {
   testing::prove_laws_of_any_mesh("cube of 5 tets a cell", cube({0, 0, 0}, 1, 2), 10);
   testing::prove_laws_of_any_mesh("bar of 6 tets a cell",
                                   testing::leaning_grid({0, 0, 0}, {2, 0.7, 0.5}, 4, 2, 2), 2);

@@ -69,7 +69,7 @@ BodySpec plate(int nx, int ny, int nz, const Material& material) {
 
 // Barriers1 and Barriers2 are one material: 270 tets and 1,100 sag alike under the same load. Without the law
 // they do not, by far.
-TEST(Locking, ThePlatesOfBothBarriersSagAlike) {
+TEST(Locking_slow, ThePlatesOfBothBarriersSagAlike) {
   for (const MaterialModel model : both_models) {
     SCOPED_TRACE(int(model));
     Material material;
@@ -89,7 +89,7 @@ TEST(Locking, ThePlatesOfBothBarriersSagAlike) {
 // (Timoshenko, κ = 5/6): w(x) under its own weight, averaged over the length. What the beam leaves out: its
 // root cannot bulge, so over about a quarter of the edge bending is stiffer by 1/(1 − ν²), and with moments
 // that grow as (L − x)² that is 5 · (¼/4) ν² of the sag, 2 % at ν = ¼. One more per cent is for the share.
-TEST(Locking, ACantileverSagsAsABeam) {
+TEST(Locking_slow, ACantileverSagsAsABeam) {
   constexpr double length = 4, edge = 1, gravity = 0.02;
   for (const MaterialModel model : both_models)
     for (const int cells : {2, 3}) {
@@ -110,7 +110,7 @@ TEST(Locking, ACantileverSagsAsABeam) {
 }
 
 // The finer the mesh, the less there is to mend.
-TEST(Locking, FineMeshesNeedLess) {
+TEST(Locking_slow, FineMeshesNeedLess) {
   for (const MaterialModel model : both_models) {
     double before = 0.6;
     for (const int cells : {3, 5, 8}) {

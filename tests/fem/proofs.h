@@ -12,6 +12,7 @@
 #include <string>
 
 #include "core/file.h"
+#include "tests/places.h"
 
 namespace limber::fem::testing {
 
@@ -69,7 +70,7 @@ class TableOfProofs : public ::testing::Environment {
     const std::string table = table_of_proofs();
     fmt::print("\n{}\n", table);
     if (!std::getenv("LIMBER_WRITE_DOCS")) return;
-    const fs::path page = fs::path(LIMBER_SOURCE_DIR) / "docs/dynamics.md";
+    const fs::path page = fs::path(limber_source_dir) / "docs/dynamics.md";
     std::string text = read_file(page);
     const std::string suite = program_invocation_short_name,
                       from = fmt::format("<!-- proofs: written by LIMBER_WRITE_DOCS=1 {} -->\n", suite),

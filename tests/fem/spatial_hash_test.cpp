@@ -14,6 +14,7 @@
 #include "scenes/shapes.h"
 #include "tests/fem/proofs.h"
 #include "tests/fem/worlds.h"
+#include "tests/places.h"
 
 namespace limber::fem {
 namespace {
@@ -163,18 +164,18 @@ int compare(const char* name, const TetMesh& a, const TetMesh& b, int count, std
   return pairs;
 }
 
-TEST(SpatialHash, ListsAndBruteForceAgreeInAThousandScenes) {
+TEST(SpatialHash_slow, ListsAndBruteForceAgreeInAThousandScenes) {
   const int pairs =
       compare("ball and cube", testing::ball({0, 0, 0}, 0.5, 3), testing::cube({0, 0, 0}, 1, 3), 1000, 3);
   EXPECT_GT(pairs, 10000);
 }
 
-TEST(SpatialHash, AgreesOnCagesOfRealModels) {
+TEST(SpatialHash_slow, AgreesOnCagesOfRealModels) {
   meshing::CageOptions options;
   options.tets = 300;
   const TetMesh rabbit = meshing::build_cage(scenes::make_bunny(), {}, options).mesh;
   EXPECT_GT(compare("rabbit and cube", rabbit, testing::cube({0, 0, 0}, 1, 3), 50, 4), 300);
-  const auto heart = std::filesystem::path(LIMBER_SHARED_DATA) / "organs/heart.obj";
+  const auto heart = std::filesystem::path(limber_shared_data) / "organs/heart.obj";
   if (!std::filesystem::exists(heart))
     GTEST_SKIP() << "SKIPPED: no " << heart << "; configure with -DLIMBER_SHARED_DATA=";
   const TetMesh cage = meshing::build_cage(meshing::import_model(heart).surface, {}, options).mesh;

@@ -63,7 +63,7 @@ double torque_nm(MaterialModel model, double length, int cells, double angle) {
 
 // GJ of a square is 0.1406 G a⁴. Two lengths, so that the ends, which cannot warp, cancel out; two meshes, so
 // that what falls with the square of their cells does.
-TEST(Twist, ABarTurnsAsSaintVenantSays) {
+TEST(Twist_slow, ABarTurnsAsSaintVenantSays) {
   constexpr double angle = 0.02;
   for (const MaterialModel model : both_models) {
     const auto stiffness = [&](int cells) {

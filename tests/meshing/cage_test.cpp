@@ -57,7 +57,7 @@ TEST(Cage, MeetsTheBudgetWithinTenPercentOrSaysSo) {
   EXPECT_LE(noted, asked / 10);
 }
 
-TEST(Cage, SaysWhenTheLatticeCannotMeetTheBudget) {
+TEST(Cage_slow, SaysWhenTheLatticeCannotMeetTheBudget) {
   // A needle along the diagonal of its box: as many tets as asked would need a lattice of too many cells.
   SurfaceMesh needle = box_at_origin({0.01, 0.01, 5});
   needle.positions.col(0) += needle.positions.col(2), needle.positions.col(1) += needle.positions.col(2);
@@ -68,7 +68,7 @@ TEST(Cage, SaysWhenTheLatticeCannotMeetTheBudget) {
   EXPECT_TRUE(certify(needle, cage.mesh).holds());
 }
 
-TEST(Cage, DihedralsStayWithinTheirBounds) {
+TEST(Cage_slow, DihedralsStayWithinTheirBounds) {
   for (const auto& [name, m] : models()) {
     SCOPED_TRACE(name);
     CageOptions options;
@@ -148,7 +148,7 @@ TEST(Cage, FillsTheInsideOfAClosedModelAndOfOneWithAnOpening) {
   EXPECT_EQ(cage.volume_ratio, 0);
 }
 
-TEST(Cage, SameBytesForAnyOrderOfTheTriangles) {
+TEST(Cage_slow, SameBytesForAnyOrderOfTheTriangles) {
   for (const auto& [name, m] : models()) {
     SCOPED_TRACE(name);
     SurfaceMesh shuffled = m;

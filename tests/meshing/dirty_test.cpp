@@ -9,11 +9,12 @@
 
 #include "core/error.h"
 #include "meshing/import.h"
+#include "tests/places.h"
 
 namespace limber::meshing {
 namespace {
 
-const fs::path dirty = fs::path(LIMBER_SHARED_DATA) / "dirty";
+const fs::path dirty = fs::path(limber_shared_data) / "dirty";
 
 struct Row {
   std::string file;

@@ -158,7 +158,7 @@ TEST(Laws, AHopelessPushIsShorter) {
 }
 
 // The law whose worth the table of docs/planning.md shows, on a point before a wall with a gap.
-TEST(Laws, GuidanceFindsTheGapSooner) {
+TEST(Laws_slow, GuidanceFindsTheGapSooner) {
   Toy toy(1, true, false, 99);
   std::int64_t with = 0, without = 0;
   for (std::uint64_t seed = 1; seed <= 10; ++seed) {

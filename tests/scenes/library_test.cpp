@@ -9,6 +9,7 @@
 #include "scenes/models.h"
 #include "scenes/scene.h"
 #include "tests/core/temporary_folder.h"
+#include "tests/places.h"
 
 namespace limber::scenes {
 namespace {
@@ -183,7 +184,7 @@ int run_setup(const TemporaryFolder& folder, const std::string& apt_get) {
   put(folder / "bin/apt-get", "#!/bin/sh\n" + apt_get + "\n");
   fs::permissions(folder / "bin/apt-get", fs::perms::owner_all);
   return std::system(fmt::format("PATH={}:$PATH LIMBER_MODELS={} {}/scenes/bunny_gate/setup > {} 2>&1",
-                                 (folder / "bin").string(), (folder / "models").string(), LIMBER_SOURCE_DIR,
+                                 (folder / "bin").string(), (folder / "models").string(), limber_source_dir,
                                  (folder / "said").string())
                          .c_str());
 }

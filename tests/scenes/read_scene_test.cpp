@@ -10,6 +10,7 @@
 #include "scenes/library.h"
 #include "scenes/models.h"
 #include "scenes/scene.h"
+#include "tests/places.h"
 
 namespace limber::scenes {
 namespace {
@@ -553,7 +554,7 @@ TEST(Keys, DefaultsAreInTheirRanges) {
 
 // LIMBER_WRITE_DOCS=1 writes the page anew.
 TEST(Keys, ReferencePageIsWhatTheReaderReads) {
-  const fs::path page = fs::path(LIMBER_SOURCE_DIR) / "docs" / "scene.md";
+  const fs::path page = fs::path(limber_source_dir) / "docs" / "scene.md";
   const std::string from = "<!-- keys: written by LIMBER_WRITE_DOCS=1 scenes_tests -->\n",
                     to = "<!-- end of keys -->\n";
   const std::string text = read_file(page);

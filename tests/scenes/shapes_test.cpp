@@ -82,7 +82,7 @@ double area_of(const SurfaceMesh& mesh, Eigen::Index f) {
   return 0.5 * (p(1) - p(0)).cross(p(2) - p(0)).norm();
 }
 
-TEST(Shapes, AreClosedManifoldsThatFaceOutward) {
+TEST(Shapes_slow, AreClosedManifoldsThatFaceOutward) {
   for (const Shape& shape : shapes()) {
     SCOPED_TRACE(shape.name);
     ASSERT_NO_THROW(validate(shape.mesh, shape.name));
@@ -103,7 +103,7 @@ TEST(Shapes, AreClosedManifoldsThatFaceOutward) {
   }
 }
 
-TEST(Shapes, HaveTheVolumeOfTheClosedForm) {
+TEST(Shapes_slow, HaveTheVolumeOfTheClosedForm) {
   for (const Shape& shape : shapes()) {
     SCOPED_TRACE(shape.name);
     if (shape.volume == 0) continue;
@@ -111,7 +111,7 @@ TEST(Shapes, HaveTheVolumeOfTheClosedForm) {
   }
 }
 
-TEST(Shapes, AreMadeTheSameTwice) {
+TEST(Shapes_slow, AreMadeTheSameTwice) {
   const auto once = shapes(), twice = shapes();
   for (std::size_t i = 0; i < once.size(); ++i)
     EXPECT_EQ(hash_of(once[i].mesh), hash_of(twice[i].mesh)) << once[i].name;

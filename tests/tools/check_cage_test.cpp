@@ -14,12 +14,14 @@
 #include "meshing/quality.h"
 #include "tests/core/temporary_folder.h"
 #include "tests/meshing/cage_models.h"
+#include "tests/places.h"
 
 namespace limber::meshing {
 namespace {
 
 Json run_checker(const std::string& arguments, int expected_exit) {
-  FILE* pipe = popen((std::string(CHECK_CAGE) + " " + arguments + " 2>&1").c_str(), "r");
+  FILE* pipe = popen(
+      (std::string(limber_binary_dir) + "/tools/check_cage/check_cage " + arguments + " 2>&1").c_str(), "r");
   std::string text;
   for (int c = fgetc(pipe); c != EOF; c = fgetc(pipe)) text += char(c);
   const int status = pclose(pipe);
