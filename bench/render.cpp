@@ -299,6 +299,7 @@ void run(const std::string& model, const std::vector<int>& sizes, int frames, in
              coarse.triangles.rows());
   SurfaceMesh body = coarsened(source, 35000);
   if (!out.empty()) {
+    fs::create_directories(out);
     const Camera camera = frame_automatically(look_of(1920, 1080, false).stage, toward_eye, 16.0 / 9);
     const auto numbers = [](const Vec3& p) { return Json{p.x(), p.y(), p.z()}; };
     write_json(
