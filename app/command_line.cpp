@@ -1,5 +1,6 @@
 #include <CLI/CLI.hpp>
 
+#include <algorithm>
 #include <cstdio>
 #include <new>
 
@@ -22,6 +23,19 @@ struct GlobalOptions {
   std::string progress;
   int threads = 0;
 };
+
+// CLI::Range, which takes nan.
+CLI::Validator within(double low, double high) {
+  return CLI::Validator(
+      [low, high](std::string& text) {
+        double value = 0;
+        const bool is_number = CLI::detail::lexical_cast(text, value);
+        return is_number && value >= low && value <= high
+                   ? std::string()
+                   : fmt::format("{} is no number from {:.17g} to {:.17g}", text, low, high);
+      },
+      fmt::format("FLOAT in [{:g} - {:g}]", low, high));
+}
 
 void add_global(CLI::App& command, GlobalOptions& options) {
   command.add_flag("--json", options.json, "print one JSON document on stdout, and nothing else there");
@@ -75,7 +89,7 @@ template <class Options>
 void add_limits(CLI::App& command, Options& options) {
   command
       .add_option("--iterations", options.iterations, "limit of the search, 0 … 1e9; default: the scene's")
-      ->check(CLI::Range(0.0, 1e9));
+      ->check(within(0.0, 1e9));
   command
       .add_option("--time-limit", options.time_limit_s,
                   "wall time of the search: 30, 30s, 5min or 1h; the best so far is kept; default: none")
@@ -94,7 +108,7 @@ void add_plan(CLI::App& command, PlanOptions& options) {
       ->required()
       ->type_name("DIR");
   command.add_option("--seed", options.seed, "seed of the random numbers, 0 … 2^53; default: the scene's")
-      ->check(CLI::Range(0.0, 0x1p53));
+      ->check(within(0.0, 0x1p53));
   command
       .add_option("--preset", options.preset,
                   "paper: Algorithm 1 of Rodriguez, Lien and Amato 2006; fast: what we found to be better; "
@@ -234,12 +248,12 @@ int run_command_line(int argc, const char* const* argv) {
       .add_option(
           "--concavity", prepare_options.concavity,
           "cut no further below this overshoot, share of the model's diagonal, 0 … 1; 0: only --shells rules")
-      ->check(CLI::Range(0.0, 1.0))
+      ->check(within(0.0, 1.0))
       ->capture_default_str();
   prepare_command
       .add_option("--inflate", prepare_options.inflate,
                   "inflate the shells by this share of the model's diagonal, 0 … 1")
-      ->check(CLI::Range(0.0, 1.0))
+      ->check(within(0.0, 1.0))
       ->capture_default_str();
   prepare_command.add_flag(
       "--exact", prepare_options.exact,
@@ -257,7 +271,7 @@ int run_command_line(int argc, const char* const* argv) {
       ->capture_default_str();
   prepare_command
       .add_option("--scale", prepare_options.scale, "metres a file unit, 1e-9 … 1e9; 0.001 for millimetres")
-      ->check(CLI::Range(1e-9, 1e9))
+      ->check(within(1e-9, 1e9))
       ->capture_default_str();
   prepare_command.add_flag("--y-up", prepare_options.y_up, "the model has +Y up; turn it to +Z");
   prepare_command.add_flag(
@@ -367,21 +381,21 @@ int run_command_line(int argc, const char* const* argv) {
       ->check(CLI::Range(1, 10000))
       ->capture_default_str();
   robust_command.add_option("--seed", robust_options.seed, "seed of the perturbations, 0 … 2^53")
-      ->check(CLI::Range(0.0, 0x1p53))
+      ->check(within(0.0, 0x1p53))
       ->capture_default_str();
   robust_command
       .add_option("--materials", robust_options.material_share,
                   "Young's modulus, density and friction of each body change by up to this share, 0 … 0.9")
-      ->check(CLI::Range(0.0, 0.9))
+      ->check(within(0.0, 0.9))
       ->capture_default_str();
   robust_command
       .add_option("--forces", robust_options.force_share,
                   "each control's force changes by up to this share, 0 … 0.9")
-      ->check(CLI::Range(0.0, 0.9))
+      ->check(within(0.0, 0.9))
       ->capture_default_str();
   robust_command
       .add_option("--turn", robust_options.force_deg, "and is turned by up to so many degrees, 0 … 90")
-      ->check(CLI::Range(0.0, 90.0))
+      ->check(within(0.0, 90.0))
       ->capture_default_str();
   add_global(robust_command, global), add_threads(robust_command, global);
   robust_command.callback([&] { chosen = [&] { return robust(robust_options); }; });
@@ -398,7 +412,7 @@ int run_command_line(int argc, const char* const* argv) {
       .add_option(
           "--tets-factor", refine_options.tets_factor,
           "tets of each cage, about, as a multiple of the coarse one's; 0.1 … 1000; 1: only --set counts")
-      ->check(CLI::Range(0.1, 1000.0))
+      ->check(within(0.1, 1000.0))
       ->capture_default_str();
   add_edits(refine_command, refine_options.sets, refine_options.data);
   add_limits(refine_command, refine_options);
@@ -438,13 +452,13 @@ int run_command_line(int argc, const char* const* argv) {
   names("--rigid", new_options.rigid,
         "bones, besides those called spine, rib, skull, pelvis, bone, vertebra, sternum, femur");
   new_command.add_option("--scale", new_options.scale, "metres a file unit, 1e-9 … 1e9")
-      ->check(CLI::Range(1e-9, 1e9))
+      ->check(within(1e-9, 1e9))
       ->capture_default_str();
   new_command
       .add_option(
           "--shrink", new_options.shrink,
           "largest share of its true size that an organ may have, 0.3 … 1; as much less as cages need")
-      ->check(CLI::Range(0.3, 1.0))
+      ->check(within(0.3, 1.0))
       ->capture_default_str();
   new_command
       .add_option("--goal", new_options.goal,
@@ -472,7 +486,10 @@ int run_command_line(int argc, const char* const* argv) {
   try {
     program.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
-    return program.exit(error) == 0 ? exit_done : exit_bad_input;
+    if (program.exit(error) == 0) return exit_done;
+    const bool json = std::any_of(argv, argv + argc, [](std::string_view word) { return word == "--json"; });
+    if (json) fmt::print("{}\n", Json{{"error", error.what()}, {"exit_code", exit_bad_input}}.dump(2));
+    return exit_bad_input;
   }
 
   log::set_up(global.quiet ? -1 : global.verbose ? 1 : 0);
@@ -490,6 +507,9 @@ int run_command_line(int argc, const char* const* argv) {
     return report_failure(exit_disk, error.what(), global.json);
   } catch (const Interrupted& stop) {
     return report_failure(exit_signal + stop.signal_number, stop.what(), global.json);
+  } catch (const fs::filesystem_error& error) {  // where it may not even be asked what is there
+    return report_failure(exit_disk, fmt::format("{}: {}", error.path1().string(), error.code().message()),
+                          global.json);
   } catch (const std::bad_alloc&) {
     return report_failure(
         exit_bad_input,

@@ -129,7 +129,6 @@ std::vector<Organ> read_organs(const NewSceneOptions& options) {
     for (const auto& [list, flag] :
          {std::pair(&options.see_through, &organ.see_through), {&options.rigid, &organ.bone}})
       if (std::count(list->begin(), list->end(), organ.name) > 0) *flag = true;
-    if (organ.name == options.robot) organ.see_through = organ.bone = false;
     organs.push_back(std::move(organ));
   }
   return organs;
@@ -273,15 +272,16 @@ Vec3 center_of_mass(const TetMesh& cage) {
   return sum / all;
 }
 
-// How far the robot goes along `direction` until it is past all that lies in its way, and one and a half
-// times its length at least.
+// How far the robot goes along `direction` until it is past all that lies in its way, and at least one and a
+// half times its length there and once its largest.
 double way_to_goal(const std::vector<Organ>& organs, const Organ& robot, double scale,
                    const Vec3& direction) {
   const Box box = bounding_box(placed(robot, scale).positions);
   const Vec3 along = direction.cwiseAbs();
   const double from = direction.dot(box.center()) - along.dot(box.size()) / 2;
   const double length = scale * along.dot(robot.box.size());
-  double way = 1.5 * length;
+  double way =
+      std::max(1.5 * length, scale * robot.box.size().maxCoeff());  // the goal's radius is 0.4 of that
   for (const std::size_t i : simulated(organs)) {
     if (&organs[i] == &robot) continue;
     const Box other = bounding_box(placed(organs[i], scale).positions);
@@ -370,15 +370,29 @@ bool overlap(const scenes::Scene& scene, const std::vector<PreparedBody>& bodies
   return false;
 }
 
+double longest(const std::vector<Organ>& organs, const std::string& name) {
+  return std::find_if(organs.begin(), organs.end(), [&](const Organ& organ) { return organ.name == name; })
+      ->box.size()
+      .maxCoeff();
+}
+
 // The scene, its organs parted. The cages that limber plan makes of organs of that size, at that place,
 // differ a little from those that were parted: where they overlap, they are parted once more.
 scenes::Scene laid_out(const NewSceneOptions& options, std::vector<Organ>& organs, double scale) {
   for (int round = 0;; ++round) {
-    scenes::Scene scene = scenes::read_scene(scene_text(organs, options, scale), options.out.string());
-    const std::vector<PreparedBody> bodies = bodies_of(scene, organs);
-    if (round == most_rounds || !overlap(scene, bodies)) {
-      build_world(scene, bodies);  // says what limber plan would say
-      return scene;
+    scenes::Scene scene;
+    std::vector<PreparedBody> bodies;
+    try {
+      scene = scenes::read_scene(scene_text(organs, options, scale), options.out.string());
+      bodies = bodies_of(scene, organs);
+      if (round == most_rounds || !overlap(scene, bodies)) {
+        build_world(scene, bodies);  // says what limber plan would say
+        return scene;
+      }
+    } catch (const InputError& error) {
+      throw InputError(
+          fmt::format("no scene is made of these ({} is {:.3g} m long with --scale {:g}; is that right?): {}",
+                      options.robot, longest(organs, options.robot), options.scale, error.what()));
     }
     for (std::size_t b = 0; b < bodies.size(); ++b) {
       Organ& organ = *std::find_if(organs.begin(), organs.end(),
@@ -399,11 +413,13 @@ Outcome new_scene(const NewSceneOptions& options) {
   if (fs::exists(options.out))
     throw InputError(
         fmt::format("{}: is there already; choose another name, or remove it", options.out.string()));
+  if (options.up.back() == options.front.back())
+    throw InputError(fmt::format("--up {} and --front {} are the same axis; a body's front is across it",
+                                 options.up, options.front));
   std::vector<Organ> organs = read_organs(options);
   std::vector<std::string> deformable, notes;
   for (Organ& organ : organs) {
-    if (organ.thickness_m < least_thickness * organ.box.diagonal() && !organ.see_through && !organ.bone &&
-        organ.name != options.robot) {
+    if (organ.thickness_m < least_thickness * organ.box.diagonal() && !organ.see_through && !organ.bone) {
       organ.see_through = true;
       notes.push_back(
           fmt::format("{} is only seen: it is a sheet, {:.2g} m thick", organ.name, organ.thickness_m));
@@ -411,8 +427,9 @@ Outcome new_scene(const NewSceneOptions& options) {
     if (!organ.see_through && !organ.bone) deformable.push_back(organ.name);
   }
   if (std::count(deformable.begin(), deformable.end(), options.robot) == 0)
-    throw InputError(fmt::format("--robot {}: {} has no such soft body; there are: {}", options.robot,
-                                 options.from.string(), fmt::join(deformable, ", ")));
+    throw InputError(
+        fmt::format("--robot {}: {} has no such soft body (bones, hulls and sheets are none); there are: {}",
+                    options.robot, options.from.string(), fmt::join(deformable, ", ")));
   if (options.only.empty()) leave_out_doubles(organs, notes);
   log::info("making cages");
   for (Organ& organ : organs)

@@ -38,6 +38,18 @@ void sync_folder(const fs::path& folder) {
   if (fd >= 0) ::fsync(fd);
 }
 
+// Where a file is to be renamed to: a link stays, and what it leads to is replaced. Devices and pipes are not
+// replaced.
+fs::path destination(const fs::path& path) {
+  std::error_code error;
+  const fs::file_status status = fs::status(path, error);
+  if (!fs::exists(status)) return path;
+  if (!fs::is_regular_file(status) && !fs::is_directory(status))
+    throw DiskError(
+        fmt::format("{}: is a device or a pipe; files are written whole, so name a file", path.string()));
+  return fs::is_symlink(fs::symlink_status(path, error)) ? fs::canonical(path) : path;
+}
+
 }  // namespace
 
 std::string read_file(const fs::path& path) {
@@ -94,7 +106,7 @@ void FileWriter::commit() {
 }
 
 PendingFile::PendingFile(fs::path final_path)
-    : final_(std::move(final_path)), temporary_(temporary_name(final_)) {}
+    : final_(destination(final_path)), temporary_(temporary_name(final_)) {}
 
 PendingFile::~PendingFile() {
   if (committed_) return;

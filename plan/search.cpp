@@ -444,7 +444,7 @@ std::string explain(const Plan& plan) {
       break;
     case Ending::iterations:
       text += fmt::format(
-          "The limit of {} iterations ended the search; try a larger max_iterations, max_force_n or "
+          "The limit of {} iterations ended the search; try more iterations, a larger max_force_n or "
           "goal_bias.",
           s.max_iterations);
       break;

@@ -243,6 +243,9 @@ TEST_F(Program, UsageErrorsAreBadInput) {
   EXPECT_EQ(limber_program({"prepare", "x.obj", "-o", out(), "--tets", "3"}).code, exit_bad_input);
   EXPECT_EQ(limber_program({"plan", scene(), "-o", out(), "--set", "planner.iteration=5"}).code,
             exit_bad_input);
+  EXPECT_NE(limber_program({"refine", out(), "-o", out("fine"), "--tets-factor", "nan"})
+                .err.find("nan is no number"),
+            std::string::npos);
   EXPECT_EQ(limber_program({"plan", "no_such_scene", "-o", out()}).code, exit_bad_input);
   EXPECT_EQ(limber_program({"render", out("nothing")}).code, exit_bad_input);
   EXPECT_EQ(limber_program({"verify", folder.path().string()}).code, exit_bad_input);
@@ -257,6 +260,9 @@ TEST_F(Program, AnErrorIsOneJsonDocumentToo) {
   const Result run = limber_program({"plan", "no_such_scene", "-o", out(), "--json"});
   EXPECT_EQ(run.json().at("exit_code"), exit_bad_input);
   EXPECT_NE(run.json().at("error").get<std::string>().find("no_such_scene"), std::string::npos);
+  const Result usage = limber_program({"plan", "barriers1", "-o", out(), "--json", "--seed", "abc"});
+  EXPECT_EQ(usage.json().at("exit_code"), exit_bad_input);
+  EXPECT_NE(usage.json().at("error").get<std::string>().find("abc"), std::string::npos);
 }
 
 TEST_F(Program, AnUnwritableFolderIsADiskError) {

@@ -138,6 +138,9 @@ TEST_F(NewScene, WhatIsNotThereIsRefusedWithWhatIs) {
   EXPECT_THAT(limber_program(words({"--robot", "heart", "--rigid", "liver"})).err,
               HasSubstr("--rigid liver: "));
   EXPECT_THAT(limber_program(words({"--robot", "heart", "--goal", "away"})).err, HasSubstr("front"));
+  EXPECT_THAT(limber_program(words({"--robot", "spine"})).err, HasSubstr("there are: heart, lung"));
+  EXPECT_THAT(limber_program(words({"--robot", "heart", "--up", "+z", "--front", "-z"})).err,
+              HasSubstr("same axis"));
   EXPECT_FALSE(fs::exists(folder / "chest.toml"));
   ASSERT_EQ(limber_program(words()).code, exit_done);
   EXPECT_THAT(limber_program(words()).err, HasSubstr("is there already"));

@@ -175,6 +175,18 @@ TEST(Files, ANameThatIsTakenByAFolderIsADiskError) {
 }
 
 // A shell less at the end, with the end mark in place: only the counts can tell.
+TEST(Files, ALinkStaysAndAPipeIsNotReplaced) {
+  const TemporaryFolder folder;
+  write_file(folder / "real", "old");
+  fs::create_symlink("real", folder / "link");
+  write_file(folder / "link", "new");
+  EXPECT_TRUE(fs::is_symlink(folder / "link"));
+  EXPECT_EQ(read_file(folder / "real"), "new");
+  ASSERT_EQ(mkfifo((folder / "pipe").c_str(), 0600), 0);
+  EXPECT_THROW(write_file(folder / "pipe", "x"), DiskError);
+  EXPECT_TRUE(fs::is_fifo(folder / "pipe"));
+}
+
 TEST(Files, ShellsAreCountedByTheFirstLine) {
   const TemporaryFolder folder;
   write_obj(folder / "a.obj", shells());

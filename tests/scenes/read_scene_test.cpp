@@ -333,6 +333,7 @@ TEST(Sets, EditBeforeReading) {
   EXPECT_EQ(std::get<BoxModel>(read_scene(good, "s", {"bodies.robot.bevel_m=0.2"}).bodies[0].model).bevel_m,
             0.2);
   EXPECT_EQ(read_scene(good, "s", {"film.frames_per_second=60"}).film.frames_per_second, 60);
+  EXPECT_THROW(read_scene(good, "s", {"film.caption=\"Größe\""}), InputError);
   EXPECT_EQ(read_scene(good, "s", {"description=two words"}).description, "two words");
   EXPECT_EQ(read_scene(good, "s", {"planner.seed=1", "planner.seed=2"}).planner.seed, 2);
   EXPECT_EQ(read_scene(good, "s", {"camera.keyframes.0.eye_m=[1,2,3]"}).cameras[0].keyframes[0].eye_m,
