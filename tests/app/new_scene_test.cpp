@@ -66,7 +66,7 @@ TEST_F(NewScene, OrgansAreInTheirPlacesAndRoles) {
   EXPECT_LT((scene.goal.center_of_mass_m - Vec3(0.12, 0, 1)).norm(), 0.005);
 }
 
-TEST_F(NewScene, IsPlannedAsItIs) {
+TEST_F(NewScene_slow, IsPlannedAsItIs) {
   ASSERT_EQ(limber_program(words()).code, exit_done);
   const Result planned = limber_program(
       {"plan", (folder / "chest.toml").string(), "--data", models().string(), "-o", out(), "--json"});
@@ -123,7 +123,7 @@ TEST_F(NewScene, SheetsAreOnlySeenAndDoublesLeftOut) {
   EXPECT_EQ(scene.bodies.size(), 3u);
 }
 
-TEST_F(NewScene, OrgansWithinOneAnotherAreRefused) {
+TEST_F(NewScene_slow, OrgansWithinOneAnotherAreRefused) {
   cube("liver", {0, 0, 1000}, 70);
   const Result made = limber_program(words());
   EXPECT_EQ(made.code, exit_bad_input);
