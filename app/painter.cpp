@@ -291,9 +291,24 @@ Picture Shot::Painter::paint(int frame) {
   const render::Camera camera = shot_.camera_of(frame);
   const Output& output = shot_.output_;
   views_[0]->show(frame);
+  const bool transparent = shot_.scene_.film.transparent;
+  render::Renderer& renderer = views_[0]->renderer;
   render::Passes passes;
-  const render::Image image = views_[0]->renderer.draw(camera, output.passes.empty() ? nullptr : &passes);
+  render::Passes* const wanted = output.passes.empty() ? nullptr : &passes;
+  const auto linear = [&] { return renderer.draw(camera, wanted); };
   Picture picture;
+  if (output.bits == 16)
+    picture.frame = transparent ? render::tone_mapped_alpha_16(linear()) : render::tone_mapped_16(linear());
+  else if (transparent)
+    picture.frame = render::tone_mapped_alpha(linear());
+  else {
+    render::Image8 image = renderer.draw_shown(camera, wanted);
+    if (views_.size() > 1) {
+      views_[1]->show(frame);
+      image = beside(image, views_[1]->renderer.draw_shown(camera));
+    }
+    picture.frame = annotated(std::move(image), frame);
+  }
   for (const std::string& name : output.passes) {
     const bool depth = name == "depth";
     const double low = depth ? shot_.near_m_ : shot_.low_, high = depth ? shot_.far_m_ : shot_.high_;
@@ -301,18 +316,6 @@ Picture Shot::Painter::paint(int frame) {
       picture.passes[name] = encoded<std::uint8_t>(passes, name, low, high);
     else
       picture.passes[name] = encoded<std::uint16_t>(passes, name, low, high);
-  }
-  const bool transparent = shot_.scene_.film.transparent;
-  if (output.bits == 16)
-    picture.frame = transparent ? render::tone_mapped_alpha_16(image) : render::tone_mapped_16(image);
-  else if (transparent)
-    picture.frame = render::tone_mapped_alpha(image);
-  else if (views_.size() == 1)
-    picture.frame = annotated(render::tone_mapped(image), frame);
-  else {
-    views_[1]->show(frame);
-    picture.frame = annotated(
-        beside(render::tone_mapped(image), render::tone_mapped(views_[1]->renderer.draw(camera))), frame);
   }
   return picture;
 }

@@ -115,7 +115,7 @@ render::Image8 picture_of_shells(const PreparedBody& body, const std::vector<Con
         {.name = "shell", .color_srgb = shell_color(s), .roughness = 0.6, .crease_angle_deg = 8});
   const Json& figures = body.report.at("shells");
   return render::with_caption(
-      render::tone_mapped(renderer.draw(camera_for(box))),
+      renderer.draw_shown(camera_for(box)),
       {fmt::format("{}: {} convex shells, drawn apart", name_of(body), shells.size()),
        fmt::format(
            "overshoot mean {:.3f} %, largest {:.3f} % of the diagonal; {} of {} triangles not covered",
@@ -146,7 +146,7 @@ render::Image8 picture_of_cage(const PreparedBody& body) {
                      {.color_srgb = line_srgb, .width_px = 1, .opacity = 0.22});
   renderer.add_lines(lines_between(front, body.cage.positions, camera.eye),
                      {.color_srgb = line_srgb, .width_px = 1.8, .opacity = 0.9});
-  return render::with_caption(render::tone_mapped(renderer.draw(camera)),
+  return render::with_caption(renderer.draw_shown(camera),
                               {fmt::format("{}: the cage over the surface of {} triangles", name_of(body),
                                            body.surface.triangles.rows()),
                                tets_caption(body), fit_caption(body)});
@@ -197,7 +197,7 @@ render::Image8 picture_of_cut(const PreparedBody& body) {
   renderer.add_lines(lines_between(edges, cage.positions, camera.eye),
                      {.color_srgb = {0.12, 0.12, 0.15}, .width_px = 1.3, .opacity = 0.8});
   return render::with_caption(
-      render::tone_mapped(renderer.draw(camera)),
+      renderer.draw_shown(camera),
       {fmt::format("{}: tets behind a cut, coloured by their smallest dihedral", name_of(body)),
        tets_caption(body), fit_caption(body)},
       legend());

@@ -99,7 +99,7 @@ void draw(const std::string& model, int tets, const fs::path& out, bool y_up) {
     const render::Camera camera = render::frame_automatically(close.value_or(look.stage), {-0.5, 1, 0.12},
                                                               double(look.width) / look.height, 30, 1);
     const fs::path file = fmt::format("{}.{}.png", out.string(), name);
-    render::write_png(file, render::tone_mapped(renderer.draw(camera)));
+    render::write_png(file, renderer.draw_shown(camera));
     return file;
   };
   const std::vector<fs::path> parts{

@@ -76,17 +76,21 @@ double tone_unmapped(double shown) {
   return shown <= knee ? shown : knee - (1 - knee) * std::log((1 - std::min(shown, 0.9999)) / (1 - knee));
 }
 
-Image8 tone_mapped(const Image& image) {
+void tone_mapped(std::span<const float> rgba, std::uint8_t* rgb) {
   const auto& table = level_table();
-  Image8 shown{image.width, image.height,
-               std::vector<std::uint8_t>(std::size_t(image.width) * image.height * 3)};
   const auto lookup = [&](float x) {
     // Not (x > first) also catches NaN, which a shader may leave but must not spread.
     if (!(x > 0x1p-13f)) return table[0];
     return table[std::min(std::bit_cast<std::uint32_t>(x) >> dropped_bits, last_key) - first_key];
   };
-  for (std::size_t p = 0; p < std::size_t(image.width) * image.height; ++p)
-    for (int c = 0; c < 3; ++c) shown.rgb[3 * p + c] = lookup(image.rgba[4 * p + c]);
+  for (std::size_t p = 0; p < rgba.size() / 4; ++p)
+    for (std::size_t c = 0; c < 3; ++c) rgb[3 * p + c] = lookup(rgba[4 * p + c]);
+}
+
+Image8 tone_mapped(const Image& image) {
+  Image8 shown{image.width, image.height,
+               std::vector<std::uint8_t>(std::size_t(image.width) * image.height * 3)};
+  tone_mapped(image.rgba, shown.rgb.data());
   return shown;
 }
 

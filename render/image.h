@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "core/types.h"
@@ -47,6 +48,8 @@ double tone_unmapped(double shown);  // inverse, for colours that must come out 
 
 // Tone map, then sRGB; within one level of the formulas (a table over the bits of the float).
 Image8 tone_mapped(const Image&);
+// A row of that: four floats a pixel to three levels a pixel.
+void tone_mapped(std::span<const float> rgba, std::uint8_t* rgb);
 // The same to 16 bit; and with alpha, for images with a transparent background.
 Raster16 tone_mapped_16(const Image&);
 Raster8 tone_mapped_alpha(const Image&);

@@ -6,11 +6,14 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <numbers>
+#include <span>
 #include <utility>
 
 #include "core/error.h"
 #include "core/progress.h"
+#include "render/detail/finish.h"
 #include "render/detail/gl_context.h"
 #include "render/detail/ground_shade.h"
 #include "render/detail/layer_lists.h"
@@ -139,10 +142,13 @@ SampleGrid sample_grid(const Look& look) {
 
 }  // namespace
 
+// Given row by row, from the top: four floats a pixel.
+using RowReader = std::function<void(int y, std::span<const float> rgba)>;
+
 struct Renderer::Impl {
   explicit Impl(const Look& l);
 
-  Image draw(const Camera&, Passes*, StageTimes*);
+  void draw(const Camera&, const RowReader&, Passes*, StageTimes*);
 
   // The stages of a picture.
   Box shown() const;
@@ -159,7 +165,7 @@ struct Renderer::Impl {
   // Where there are veils: first what lies before one is put into the lists, then the rest is drawn.
   enum class LinePass { draw_all, put, draw_rest };
   void draw_lines(LinePass);
-  Image finish();
+  void finish(const RowReader&);
   Passes finish_passes();
 
   std::vector<Plane> planes_of(const Mesh&) const;
@@ -175,9 +181,8 @@ struct Renderer::Impl {
   Variants mesh_programs{mesh_vertex_shader, mesh_fragment_shader};
   Variants depth_programs{depth_vertex_shader, depth_fragment_shader};
   Variants line_programs{line_vertex_shader, line_fragment_shader};
-  Variants picture_programs{picture_vertex_shader, picture_fragment_shader};
-  Variants passes_programs{picture_vertex_shader, passes_fragment_shader};
-  Variants layers_programs{picture_vertex_shader, layers_fragment_shader};
+  Variants passes_programs{whole_picture_vertex_shader, passes_fragment_shader};
+  Variants layers_programs{whole_picture_vertex_shader, layers_fragment_shader};
   std::string samples;  // defines
   const std::string veiled = std::string("#define VEILED\n") + layer_lists;
   Targets targets;
@@ -197,6 +202,7 @@ struct Renderer::Impl {
   Plane ground_plane;
   bool ground_seen = false;  // there is one, and the eye is above it
   ShadeMap key_shade, sky_shade;
+  std::vector<std::uint16_t> halves;  // the samples, read back
 };
 
 Renderer::Impl::Impl(const Look& l)
@@ -310,7 +316,6 @@ void Renderer::Impl::shade_ground_maps() {
   const double key_spreads[] = {0.5 * std::tan(look.key_size_deg * std::numbers::pi / 180)};
   key_shade = shade_ground(casters, ground, look.toward_key, key_spreads, box, ground_key_cells, clip_planes);
   sky_shade = shade_ground(casters, ground, look.up, sky_spreads, box, ground_sky_cells, clip_planes);
-  fill(targets.ground_key_map, key_shade.columns, key_shade.rows, key_shade.blocked.data());
   fill(targets.ground_sky_map, sky_shade.columns, sky_shade.rows, sky_shade.blocked.data());
 }
 
@@ -358,7 +363,7 @@ const Program& Renderer::Impl::use_mesh(const Mesh& mesh, const std::string& def
   p.set("clip_from_world", clip_from_world);
   p.set("shadow_from_world", shadow_from_world);
   p.set("shadow_offset_m", 2.0 * shadow_texel_m);
-  p.set("shadow_step", 1.7 / shadow_size);
+  p.set("shadow_step", 1.15 / shadow_size);
   p.set("ground_x", Vec3(ground.plane_from_world.row(0)));
   p.set("ground_y", Vec3(ground.plane_from_world.row(1)));
   p.set("ground_lower", sky_shade.lower);
@@ -404,8 +409,13 @@ void Renderer::Impl::draw_opaque(bool passes) {
   glDisable(GL_BLEND);
   const float nothing[4] = {0, 0, 0, 0}, no_scalar[4] = {0, 0, 0, NAN}, far[1] = {1};
   const int no_object[4] = {-1, 0, 0, 0};
-  glClearBufferfv(GL_COLOR, 0, nothing);
-  glClearBufferfv(GL_DEPTH, 0, far);
+  if (look.multisampling) {
+    glClearBufferfv(GL_COLOR, 0, nothing);
+    glClearBufferfv(GL_DEPTH, 0, far);
+  } else {  // row by row: llvmpipe clears buffers tile by tile, which takes five times as long
+    glClearTexImage(targets.samples.id, 0, GL_RGBA, GL_FLOAT, nothing);
+    glClearTexImage(targets.samples_depth.id, 0, GL_DEPTH_COMPONENT, GL_FLOAT, far);
+  }
   if (passes) {
     glClearBufferfv(GL_COLOR, 1, no_scalar);
     glClearBufferiv(GL_COLOR, 2, no_object);
@@ -528,57 +538,44 @@ void Renderer::Impl::draw_lines(LinePass pass) {
   glDepthMask(GL_TRUE);
 }
 
-Image Renderer::Impl::finish() {
-  glBindFramebuffer(GL_FRAMEBUFFER, targets.picture_frame);
-  glViewport(0, 0, look.width, look.height);
-  glDisable(GL_DEPTH_TEST);
-  const Program& p =
-      picture_programs.with(samples + (look.transparent_background ? "#define TRANSPARENT\n" : ""));
-  p.use();
+void Renderer::Impl::finish(const RowReader& read) {
+  const SampleGrid grid = sample_grid(look);
+  const int per_side = look.multisampling ? 1 : look.supersampling;
+  const unsigned frame = look.multisampling ? targets.resolved_frame() : targets.samples_frame;
+  if (look.multisampling) {
+    glBindFramebuffer(GL_READ_FRAMEBUFFER, targets.samples_frame);
+    glBindFramebuffer(GL_DRAW_FRAMEBUFFER, frame);
+    glBlitFramebuffer(0, 0, grid.width, grid.height, 0, 0, grid.width, grid.height, GL_COLOR_BUFFER_BIT,
+                      GL_NEAREST);
+  }
+  glBindFramebuffer(GL_FRAMEBUFFER, frame);
+  halves.resize(4 * std::size_t(grid.width) * std::size_t(grid.height));
+  glReadPixels(0, 0, grid.width, grid.height, GL_RGBA, GL_HALF_FLOAT, halves.data());
+  const GLenum error = glGetError();
+  LIMBER_CHECK(error == GL_NO_ERROR, error);
 
-  const double tangent = std::tan(0.5 * camera.fov_deg * std::numbers::pi / 180);
-  const Eigen::Matrix3d axes = camera_from_world(camera).topLeftCorner<3, 3>().transpose();
-  Eigen::Matrix3d ray;
-  ray << axes.col(0) * (tangent * look.width / look.height), axes.col(1) * tangent, -axes.col(2);
   const auto shown_as = [](const Vec3& srgb) {
     return Vec3(linear_from_srgb(srgb).unaryExpr(&tone_unmapped));
   };
   const double key_share = key_light.y() * look.toward_key.dot(look.up);
-  p.set("ray_from_screen", ray);
-  p.set("samples", 0);
-  p.set("last_row", look.height - 1);
-  p.set("background_bottom", shown_as(look.background_bottom_srgb));
-  p.set("background_top", shown_as(look.background_top_srgb));
-  p.set("eye", camera.eye);
-  p.set("ground", ground_plane);
-  p.set("ground_x", Vec3(ground.plane_from_world.row(0)));
-  p.set("ground_y", Vec3(ground.plane_from_world.row(1)));
-  p.set("ground_color", shown_as(look.ground_srgb));
-  p.set("ground_shown", ground_seen ? 1.0 : 0.0);
-  p.set("key_share", key_share / (key_share + sky_light.y()));
-  p.set("sky_darkening", 0.85);
-  p.set("fade_middle", Eigen::Vector2d(ground.plane_from_world * stage_box.center()));
-  p.set("fade_begin", 0.7 * stage_box.diagonal());
-  p.set("fade_end", 2.6 * stage_box.diagonal() + 1e-6);
-  p.set("ground_key_map", 1);
-  p.set("ground_sky_map", 2);
-  const auto place = [&](const ShadeMap& map, const char* lower, const char* scale) {
-    p.set(lower, map.lower);
-    p.set(scale, Eigen::Vector2d(1 / (map.cell_m * map.columns), 1 / (map.cell_m * map.rows)));
-  };
-  place(key_shade, "key_lower", "key_scale");
-  place(sky_shade, "sky_lower", "sky_scale");
-  targets.samples.bind(0);
-  targets.ground_key_map.bind(1);
-  targets.ground_sky_map.bind(2);
-  glBindVertexArray(empty_array);
-  glDrawArrays(GL_TRIANGLES, 0, 3);
-
-  Image image{look.width, look.height, std::vector<float>(std::size_t(look.width) * look.height * 4)};
-  glReadPixels(0, 0, look.width, look.height, GL_RGBA, GL_FLOAT, image.rgba.data());
-  const GLenum error = glGetError();
-  LIMBER_CHECK(error == GL_NO_ERROR, error);
-  return image;
+  const Backdrop backdrop{.background_top = shown_as(look.background_top_srgb),
+                          .background_bottom = shown_as(look.background_bottom_srgb),
+                          .ground_seen = ground_seen,
+                          .ground = ground,
+                          .ground_color = shown_as(look.ground_srgb),
+                          .key_shade = &key_shade,
+                          .sky_shade = &sky_shade,
+                          .key_share = key_share / (key_share + sky_light.y()),
+                          .fade_middle = stage_box.center(),
+                          .fade_begin_m = 0.7 * stage_box.diagonal(),
+                          .fade_end_m = 2.6 * stage_box.diagonal() + 1e-6,
+                          .transparent = look.transparent_background};
+  const Finish finished(backdrop, camera, look.width, look.height);
+  std::vector<float> row(4 * std::size_t(look.width));
+  for (int y = 0; y < look.height; ++y) {
+    finished.row(y, halves.data(), per_side, row.data());
+    read(y, row);
+  }
 }
 
 Passes Renderer::Impl::finish_passes() {
@@ -706,7 +703,7 @@ void Renderer::set_lines(int number, const Points& ends) {
   impl_->lines[std::size_t(number)].ends = ends;
 }
 
-Image Renderer::Impl::draw(const Camera& from, Passes* passes, StageTimes* times) {
+void Renderer::Impl::draw(const Camera& from, const RowReader& read, Passes* passes, StageTimes* times) {
   render::validate(from);
   context.make_current();
   double before = times ? cpu_seconds() : 0;
@@ -731,13 +728,31 @@ Image Renderer::Impl::draw(const Camera& from, Passes* passes, StageTimes* times
     done(&StageTimes::lines_s);
   }
   if (passes) *passes = finish_passes();
-  const Image image = finish();
+  finish(read);
   done(&StageTimes::finish_s);
-  return image;
 }
 
 Image Renderer::draw(const Camera& camera, Passes* passes, StageTimes* times) {
-  return impl_->draw(camera, passes, times);
+  const int width = impl_->look.width, height = impl_->look.height;
+  Image image{width, height, {}};
+  image.rgba.reserve(4 * std::size_t(width) * std::size_t(height));
+  impl_->draw(
+      camera,
+      [&](int, std::span<const float> row) { image.rgba.insert(image.rgba.end(), row.begin(), row.end()); },
+      passes, times);
+  return image;
+}
+
+Image8 Renderer::draw_shown(const Camera& camera, Passes* passes, StageTimes* times) {
+  const int width = impl_->look.width, height = impl_->look.height;
+  Image8 image{width, height, std::vector<std::uint8_t>(3 * std::size_t(width) * std::size_t(height))};
+  impl_->draw(
+      camera,
+      [&](int y, std::span<const float> row) {
+        tone_mapped(row, &image.rgb[3 * std::size_t(width) * std::size_t(y)]);
+      },
+      passes, times);
+  return image;
 }
 
 }  // namespace limber::render

@@ -9,7 +9,7 @@ namespace limber::render::detail {
 
 class GlContext {
  public:
-  GlContext();  // OpenGL 4.3 core, current; throws InputError when the library refuses
+  GlContext();  // OpenGL 4.4 core, current; throws InputError when the library refuses
   ~GlContext();
   GlContext(const GlContext&) = delete;
   GlContext& operator=(const GlContext&) = delete;

@@ -44,13 +44,13 @@ GlContext::GlContext() : backend_(std::make_unique<Backend>()) {
   const EGLint attributes[] = {EGL_CONTEXT_MAJOR_VERSION,
                                4,
                                EGL_CONTEXT_MINOR_VERSION,
-                               3,
+                               4,
                                EGL_CONTEXT_OPENGL_PROFILE_MASK,
                                EGL_CONTEXT_OPENGL_CORE_PROFILE_BIT,
                                EGL_NONE};
   if (!eglBindAPI(EGL_OPENGL_API)) refuse("has no OpenGL");
   backend_->context = eglCreateContext(display(), EGL_NO_CONFIG_KHR, EGL_NO_CONTEXT, attributes);
-  if (backend_->context == EGL_NO_CONTEXT) refuse("gives no OpenGL 4.3 context");
+  if (backend_->context == EGL_NO_CONTEXT) refuse("gives no OpenGL 4.4 context");
   make_current();
 }
 

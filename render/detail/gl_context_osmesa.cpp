@@ -43,11 +43,11 @@ GlContext::GlContext() : backend_(std::make_unique<Backend>()) {
                             OSMESA_CONTEXT_MAJOR_VERSION,
                             4,
                             OSMESA_CONTEXT_MINOR_VERSION,
-                            3,
+                            4,
                             0};
   backend_->context = OSMesaCreateContextAttribs(attributes, nullptr);
   if (!backend_->context)
-    throw InputError("OSMesa gives no OpenGL 4.3 context; is libosmesa6 of Mesa 22 installed?");
+    throw InputError("OSMesa gives no OpenGL 4.4 context; is libosmesa6 of Mesa 22 installed?");
   make_current();
 }
 

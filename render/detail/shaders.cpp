@@ -94,12 +94,13 @@ layout(early_fragment_tests) in;
 layout(location = 0) out vec4 color;
 #endif
 
+// Four bilinear taps: 4 × 4 texels, of even weight but for a soft rim.
 float key_visibility() {
   float sum = 0.0;
-  for (int y = -1; y <= 1; ++y)
-    for (int x = -1; x <= 1; ++x)
+  for (int y = -1; y <= 1; y += 2)
+    for (int x = -1; x <= 1; x += 2)
       sum += texture(shadow_map, vec3(shadow_place.xy + shadow_step * vec2(x, y), shadow_place.z));
-  return sum * (1.0 / 9.0);
+  return 0.25 * sum;
 }
 
 void main() {
@@ -238,57 +239,8 @@ void main() {
 }
 )";
 
-const char* const picture_vertex_shader = R"(
-uniform mat3 ray_from_screen;   // columns: right, up, forward; scaled so that (x, y, 1) of the screen gives the ray
-out vec3 ray;
-out float height;               // 0 at the bottom, 1 at the top
-void main() {
-  vec2 place = vec2(gl_VertexID == 1 ? 3.0 : -1.0, gl_VertexID == 2 ? 3.0 : -1.0);
-  // Upside down: rows are read from the top.
-  ray = ray_from_screen * vec3(place.x, -place.y, 1.0);
-  height = 0.5 - 0.5 * place.y;
-  gl_Position = vec4(place, 0.0, 1.0);
-}
-)";
-const char* const picture_fragment_shader = R"(
-in vec3 ray;
-in float height;
-uniform SAMPLER samples;
-uniform int last_row;
-uniform vec3 background_bottom, background_top;
-uniform vec3 eye;
-uniform vec4 ground;
-uniform vec3 ground_x, ground_y, ground_color;
-uniform float ground_shown;      // 1, or 0: no ground, or the eye is below it
-uniform float key_share;         // of the light on open ground
-uniform float sky_darkening;     // 1: as much as the map says
-uniform vec2 fade_middle;        // ground coordinates
-uniform float fade_begin, fade_end;
-uniform sampler2D ground_key_map, ground_sky_map;
-uniform vec2 key_lower, key_scale, sky_lower, sky_scale;
-out vec4 color;
-void main() {
-  ivec2 pixel = ivec2(gl_FragCoord.x, last_row - int(gl_FragCoord.y));
-  vec4 sum = vec4(0.0);
-  for (int i = 0; i < SAMPLES; ++i) sum += FETCH(samples, pixel, i);
-  sum *= 1.0 / float(SAMPLES);
-
-  vec3 background = mix(background_bottom, background_top, height);
-  float down = -dot(ground.xyz, ray);
-  float distance = dot(ground, vec4(eye, 1.0)) / max(down, 1e-6);
-  vec3 place = eye + distance * ray;
-  vec2 uv = vec2(dot(ground_x, place), dot(ground_y, place));
-  float key = 1.0 - texture(ground_key_map, (uv - key_lower) * key_scale).r;
-  float sky = 1.0 - sky_darkening * texture(ground_sky_map, (uv - sky_lower) * sky_scale).r;
-  float light = key_share * key + (1.0 - key_share) * sky;
-  float shown = ground_shown * step(1e-6, down) * (1.0 - smoothstep(fade_begin, fade_end, length(uv - fade_middle)));
-#ifdef TRANSPARENT
-  color = vec4(sum.rgb, sum.a + (1.0 - sum.a) * shown * max(1.0 - light, 0.0));
-#else
-  background = mix(background, ground_color * light, shown);
-  color = vec4(sum.rgb + (1.0 - sum.a) * background, sum.a);
-#endif
-}
+const char* const whole_picture_vertex_shader = R"(
+void main() { gl_Position = vec4(gl_VertexID == 1 ? 3.0 : -1.0, gl_VertexID == 2 ? 3.0 : -1.0, 0.0, 1.0); }
 )";
 
 // Of each pixel the sample nearest to the eye.

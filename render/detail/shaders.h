@@ -2,7 +2,7 @@
 // white, matt surface square to the key light sends.
 //
 // Defines of mesh and depth: PLANES (how many cut it). Of the mesh: TINTED (a colour a vertex and its open
-// share of the sky), PASSES, FLAT_INSIDE. Of the picture: TRANSPARENT. Of mesh and lines: VEILED (what is
+// share of the sky), PASSES, FLAT_INSIDE. Of mesh and lines: VEILED (what is
 // drawn goes into lists: layer_lists.h). How samples are read: SAMPLER,
 // INTEGER_SAMPLER, SAMPLES (a pixel), FETCH(sampler, pixel, i); of a texel, SAMPLES_A_TEXEL and SAMPLE (the
 // one being drawn).
@@ -16,11 +16,9 @@ extern const char* const depth_vertex_shader;   // depth only: shadow map
 extern const char* const depth_fragment_shader;
 extern const char* const line_vertex_shader;  // quads already in clip space
 extern const char* const line_fragment_shader;
-extern const char* const picture_vertex_shader;    // one triangle over everything
-extern const char* const picture_fragment_shader;  // averages the samples over background and ground
+extern const char* const whole_picture_vertex_shader;  // one triangle over everything
 extern const char* const passes_fragment_shader;
-extern const char* const layer_lists;  // put(colour, depth) and what reads it: detail/layer_lists.h
-extern const char* const layer_lists;  // goes before a text with VEILED, and this one:
+extern const char* const layer_lists;             // goes before a text with VEILED, and this one:
 extern const char* const layers_fragment_shader;  // what a list adds up to, front to back
 
 }  // namespace limber::render::detail

@@ -81,9 +81,6 @@ Targets::Targets(int width, int height, SampleGrid grid) : width_(width), height
   samples = new_target(GL_RGBA16F, grid);
   samples_depth = new_target(GL_DEPTH_COMPONENT32F, grid);
   samples_frame = new_framebuffer({samples}, samples_depth);
-  picture = new_target(GL_RGBA32F, {width, height, 0});
-  picture_frame = new_framebuffer({picture}, {});
-  ground_key_map = new_texture(GL_LINEAR, GL_CLAMP_TO_EDGE);
   ground_sky_map = new_texture(GL_LINEAR, GL_CLAMP_TO_EDGE);
 }
 
@@ -100,6 +97,12 @@ const Targets::Passes& Targets::passes() {
         new_framebuffer({passes_.pixel_normal_scalar, passes_.pixel_depth, passes_.pixel_object}, {});
   }
   return passes_;
+}
+
+unsigned Targets::resolved_frame() {
+  if (resolved_frame_ == 0)
+    resolved_frame_ = new_framebuffer({new_target(GL_RGBA16F, {grid_.width, grid_.height, 0})}, {});
+  return resolved_frame_;
 }
 
 void fill(const Texture& texture, int columns, int rows, const float* values) {

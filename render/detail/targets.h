@@ -27,9 +27,7 @@ class Targets {
   // Colour (premultiplied, linear), and the depth of the opaque.
   Texture samples, samples_depth;
   unsigned samples_frame;
-  Texture picture;  // (height × width), four floats
-  unsigned picture_frame;
-  Texture ground_key_map, ground_sky_map;
+  Texture ground_sky_map;
 
   // Beside the colours of the opaque: normal and scalar, number of the mesh; and the same once a pixel.
   struct Passes {
@@ -40,10 +38,14 @@ class Targets {
   };
   const Passes& passes();
 
+  // Where several samples a texel are averaged.
+  unsigned resolved_frame();
+
  private:
   int width_, height_;
   SampleGrid grid_;
   Passes passes_{};
+  unsigned resolved_frame_ = 0;
 };
 
 // A channel a texel, replaced as a whole.

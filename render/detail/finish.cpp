@@ -1,0 +1,183 @@
+#include "render/detail/finish.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+#include <cstring>
+#include <numbers>
+
+namespace limber::render::detail {
+
+namespace {
+
+constexpr double sky_darkening = 0.85;  // of what the map says
+
+using Halves = std::uint16_t __attribute__((vector_size(8)));
+using Words = std::uint32_t __attribute__((vector_size(16)));
+using Floats = float __attribute__((vector_size(16)));
+
+// A half's exponent is biased by 15, a float's by 127. Infinity becomes 65536, and what is not a number 0.
+Floats floats_of(const std::uint16_t* four) {
+  Halves halves;
+  std::memcpy(&halves, four, sizeof halves);
+  const Words bits = __builtin_convertvector(halves, Words);
+  Words size = bits & 0x7fff;
+  size &= Words(size <= 0x7c00);
+  return std::bit_cast<Floats>((size << 13) | ((bits & 0x8000) << 16)) * 0x1p112f;
+}
+
+bool is_zero(const std::uint16_t* one_sample) {
+  std::uint64_t bits;
+  std::memcpy(&bits, one_sample, sizeof bits);
+  return bits == 0;
+}
+
+Floats clamped(Floats x, float low, float high) {
+  x = x > low ? x : Floats{} + low;
+  return x < high ? x : Floats{} + high;
+}
+
+bool any(Words mask) {
+  const auto halves = std::bit_cast<std::array<std::uint64_t, 2>>(mask);
+  return (halves[0] | halves[1]) != 0;
+}
+
+// Not Eigen's, which begins with an estimate that differs between makes of CPU.
+Floats root(const Floats& x) {
+  return Floats{std::sqrt(x[0]), std::sqrt(x[1]), std::sqrt(x[2]), std::sqrt(x[3])};
+}
+
+// Two cells side by side at each of two places.
+Floats pairs(const float* one, const float* other) {
+  std::array<double, 2> bits;
+  std::memcpy(&bits[0], one, sizeof(double)), std::memcpy(&bits[1], other, sizeof(double));
+  return std::bit_cast<Floats>(bits);
+}
+
+// Bilinear, from a map of shade, at (u, v) m from `origin`; nothing beyond its border, where it has faded
+// out.
+class Lookup {
+ public:
+  Lookup(const ShadeMap& map, const Eigen::Vector2d& origin)
+      : map_(map),
+        per_m_(float(1 / map.cell_m)),
+        u0_(float((origin - map.lower).x() / map.cell_m - 0.5)),
+        v0_(float((origin - map.lower).y() / map.cell_m - 0.5)) {}
+
+  Floats operator()(Floats u, Floats v) const {
+    const float last_column = float(map_.columns - 1), last_row = float(map_.rows - 1);
+    const Floats column = u * per_m_ + u0_, row = v * per_m_ + v0_;
+    const Words inside =
+        Words(column > 0) & Words(column < last_column) & Words(row > 0) & Words(row < last_row);
+    if (!any(inside)) return Floats{};
+    using Ints = std::int32_t __attribute__((vector_size(16)));
+    const Floats in_column = clamped(column, 0, last_column), in_row = clamped(row, 0, last_row);
+    const Ints c = __builtin_convertvector(clamped(in_column, 0, last_column - 1), Ints),
+               r = __builtin_convertvector(clamped(in_row, 0, last_row - 1), Ints);
+    const Floats right = in_column - __builtin_convertvector(c, Floats),
+                 up = in_row - __builtin_convertvector(r, Floats);
+    std::array<const float*, 4> cell;
+    for (int i = 0; i < 4; ++i) cell[std::size_t(i)] = &map_.blocked[std::size_t(r[i] * map_.columns + c[i])];
+    const Floats low_01 = pairs(cell[0], cell[1]), low_23 = pairs(cell[2], cell[3]),
+                 high_01 = pairs(cell[0] + map_.columns, cell[1] + map_.columns),
+                 high_23 = pairs(cell[2] + map_.columns, cell[3] + map_.columns);
+    const Floats pairs_01 = low_01 + __builtin_shufflevector(up, up, 0, 0, 1, 1) * (high_01 - low_01),
+                 pairs_23 = low_23 + __builtin_shufflevector(up, up, 2, 2, 3, 3) * (high_23 - low_23);
+    const Floats lefts = __builtin_shufflevector(pairs_01, pairs_23, 0, 2, 4, 6),
+                 rights = __builtin_shufflevector(pairs_01, pairs_23, 1, 3, 5, 7);
+    return lefts + right * (rights - lefts);
+  }
+
+ private:
+  const ShadeMap& map_;
+  float per_m_, u0_, v0_;
+};
+
+}  // namespace
+
+Finish::Finish(const Backdrop& backdrop, const Camera& camera, int width, int height)
+    : backdrop_(backdrop), camera_(camera), width_(width), height_(height) {}
+
+void Finish::row(int y, const std::uint16_t* samples, int per_side, float* rgba) const {
+  const std::size_t texels = std::size_t(width_) * std::size_t(per_side);
+  const std::uint16_t* lowest = samples + 4 * texels * std::size_t(height_ - 1 - y) * std::size_t(per_side);
+  const float share = 1 / float(per_side * per_side);
+  for (int x = 0; x < width_; ++x) {
+    Floats sum{};
+    for (int j = 0; j < per_side; ++j) {
+      const std::uint16_t* sample =
+          lowest + 4 * (texels * std::size_t(j) + std::size_t(x) * std::size_t(per_side));
+      for (int i = 0; i < per_side; ++i, sample += 4)
+        if (!is_zero(sample)) sum += floats_of(sample);
+    }
+    sum *= share;
+    std::memcpy(rgba + 4 * x, &sum, sizeof sum);
+  }
+  put_over_ground(y, rgba);
+}
+
+void Finish::put_over_ground(int y, float* rgba) const {
+  const Backdrop& b = backdrop_;
+  const double tangent = std::tan(0.5 * camera_.fov_deg * std::numbers::pi / 180);
+  const Eigen::Matrix3d axes = camera_from_world(camera_).topLeftCorner<3, 3>().transpose();
+  // The ray through a pixel is first + x × step; where it meets the ground follows from its parts along the
+  // ground and downward.
+  const double height = 1 - 2 * (y + 0.5) / height_;  // −1 … 1, upward
+  const double pixel = 2 * tangent / height_;
+  const Vec3 step = pixel * axes.col(0),
+             first = 0.5 * (1 - width_) * step + height * tangent * axes.col(1) - axes.col(2);
+  const auto along_ground = [&](const Vec3& v) { return Eigen::Vector2d(b.ground.plane_from_world * v); };
+  const Eigen::Vector2d middle = along_ground(b.fade_middle), eye = along_ground(camera_.eye) - middle;
+  const float eye_u = float(eye.x()), step_u = float(along_ground(step).x()),
+              first_u = float(along_ground(first).x()), eye_v = float(eye.y()),
+              step_v = float(along_ground(step).y()), first_v = float(along_ground(first).y());
+  const float step_down = float(-b.ground.up.dot(step)), first_down = float(-b.ground.up.dot(first));
+  const float eye_height = float(b.ground.up.dot(camera_.eye) - b.ground.height_m);
+  const Lookup key_shade(*b.key_shade, middle), sky_shade(*b.sky_shade, middle);
+  const float key_share = float(b.key_share), sky_share = float((1 - b.key_share) * sky_darkening);
+  const float fade_begin = float(b.fade_begin_m), per_fade = float(1 / (b.fade_end_m - b.fade_begin_m));
+
+  const float share = float(0.5 + 0.5 * height);
+  Floats background, ground;
+  for (int c = 0; c < 3; ++c) {
+    background[c] =
+        float(b.background_bottom[c] + double(share) * (b.background_top[c] - b.background_bottom[c]));
+    ground[c] = float(b.ground_color[c]);
+  }
+  background[3] = ground[3] = 0;
+
+  for (int x0 = 0; x0 < width_; x0 += 4) {
+    const int count = std::min(4, width_ - x0);
+    float* block = rgba + 4 * x0;
+    bool covered = true;
+    for (int i = 0; i < count; ++i) covered &= block[4 * i + 3] >= 1;
+    if (covered) continue;
+    Floats shown{}, light{};
+    const Floats x = float(x0) + Floats{0, 1, 2, 3}, down = first_down + x * step_down;
+    const Words downward = Words(down > 1e-6f);
+    if (b.ground_seen && any(downward)) {
+      const Floats way = eye_height / clamped(down, 1e-6f, INFINITY);
+      const Floats u = eye_u + way * (first_u + x * step_u), v = eye_v + way * (first_v + x * step_v);
+      const Floats distance_2 = u * u + v * v;
+      Floats fade{};
+      if (any(Words(distance_2 > fade_begin * fade_begin)))
+        fade = clamped((root(distance_2) - fade_begin) * per_fade, 0, 1);
+      shown = std::bit_cast<Floats>(downward & std::bit_cast<Words>(1 - fade * fade * (3 - 2 * fade)));
+      if (any(Words(shown > 0))) light = 1 - key_share * key_shade(u, v) - sky_share * sky_shade(u, v);
+    }
+    for (int i = 0; i < count; ++i) {
+      Floats pixel_rgba;
+      std::memcpy(&pixel_rgba, block + 4 * i, sizeof pixel_rgba);
+      const float open = 1 - pixel_rgba[3];
+      if (b.transparent)
+        pixel_rgba[3] += open * shown[i] * std::max(1 - light[i], 0.0f);
+      else
+        pixel_rgba += open * (background + shown[i] * (ground * light[i] - background));
+      std::memcpy(block + 4 * i, &pixel_rgba, sizeof pixel_rgba);
+    }
+  }
+}
+
+}  // namespace limber::render::detail

@@ -1,0 +1,44 @@
+// From samples to pixels: the average of a pixel's samples, over background and ground. On the CPU, row by
+// row: a quarter of what it costs llvmpipe, most of whose samples show nothing but background.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "render/camera.h"
+#include "render/detail/ground_shade.h"
+
+namespace limber::render::detail {
+
+// What is seen behind meshes and lines. Colours are linear, as the tone map takes them.
+struct Backdrop {
+  Vec3 background_top, background_bottom;
+  bool ground_seen = false;
+  GroundFrame ground;
+  Vec3 ground_color;
+  const ShadeMap *key_shade, *sky_shade;
+  double key_share = 1;                     // of the light on open ground
+  Vec3 fade_middle;                         // round it the ground fades out into the background,
+  double fade_begin_m = 0, fade_end_m = 1;  // between these
+  // Pixels hold what meshes and lines add, and the ground's shadows as alpha; see Look.
+  bool transparent = false;
+};
+
+class Finish {
+ public:
+  // Shade maps must outlive it.
+  Finish(const Backdrop&, const Camera&, int width, int height);
+
+  // Row y, 0 at the top, of pixels of `per_side`² samples each. `samples` is the lower left corner of the
+  // whole picture: rows upward, four half floats a sample, premultiplied. Writes width × 4 floats.
+  void row(int y, const std::uint16_t* samples, int per_side, float* rgba) const;
+
+ private:
+  void put_over_ground(int y, float* rgba) const;
+
+  Backdrop backdrop_;
+  Camera camera_;
+  int width_, height_;
+};
+
+}  // namespace limber::render::detail
