@@ -64,6 +64,13 @@ void add_progress(CLI::App& command, GlobalOptions& options) {
           ""));
 }
 
+// A variable that a farm's script has not set must not mean all.
+CLI::Validator no_empty_list() {
+  return {
+      [](const std::string& text) { return text.empty() ? "names no frame; write for example 0-30" : ""; },
+      ""};
+}
+
 void add_edits(CLI::App& command, std::vector<std::string>& sets, std::vector<fs::path>& data) {
   command
       .add_option("--set", sets,
@@ -139,9 +146,11 @@ void add_shortcut(CLI::App& command, PlanOptions& options) {
 }
 
 void add_render(CLI::App& command, RenderOptions& options) {
-  command.add_option(
-      "--frames", options.frames,
-      "frames to render: 0-30,47-327:2 (or x2); beyond the last is left out with a warning; default: all");
+  command
+      .add_option(
+          "--frames", options.frames,
+          "frames to render: 0-30,47-327:2 (or x2); beyond the last is left out with a warning; default: all")
+      ->check(no_empty_list());
   command.add_option("--chunk", options.chunk, "render the i-th of n parts of these frames, 1 ≤ i ≤ n")
       ->type_name("I/N");
   command.add_option("--size", options.size, "pixels of a frame, 16x16 … 8192x8192; default: the scene's")
@@ -331,9 +340,10 @@ int run_command_line(int argc, const char* const* argv) {
   export_command
       .add_option("-o,--out", export_options.out, "folder for them; default: export in the work folder")
       ->type_name("DIR");
-  export_command.add_option(
-      "--frames", export_options.frames,
-      "frames to export: 0-300:2; beyond the last is left out with a warning; default: all");
+  export_command
+      .add_option("--frames", export_options.frames,
+                  "frames to export: 0-300:2; beyond the last is left out with a warning; default: all")
+      ->check(no_empty_list());
   add_global(export_command, global);
   export_command.callback([&] { chosen = [&] { return export_motion(export_options); }; });
 

@@ -8,6 +8,7 @@
 
 #include "app/commands.h"
 #include "app/layout.h"
+#include "app/line_of_sight.h"
 #include "app/scene_world.h"
 #include "core/error.h"
 #include "core/log.h"
@@ -62,6 +63,7 @@ constexpr double reach = 0.03;
 constexpr double room = 0.005;  // cages are parted by so much larger than they are, and by more in each round
 constexpr int most_rounds = 8;
 constexpr int most_triangles_seen_through = 30'000;
+constexpr int points_looked_at = 150;  // of the robot
 
 struct Organ {
   std::string name, file;
@@ -231,10 +233,12 @@ std::string body_text(const Organ& organ, const NewSceneOptions& options, double
   if (organ.see_through) {
     const bool hull = begins_with_one_of(organ.name, hulls);
     text += fmt::format("color = \"{}\"\nopacity = {}\n",
-                        organ.bone ? "#e8dfc8"
-                        : hull     ? "#e6c3ad"
+                        organ.bone ? "#efe6d0"
+                        : hull     ? "#c98f70"
                                    : u.color,
-                        organ.bone ? 0.35 : 0.15);
+                        organ.bone ? 0.35
+                        : hull     ? 0.22
+                                   : 0.15);
     if (organ.surface.triangles.rows() > most_triangles_seen_through)
       text += fmt::format("triangles = {}\n", most_triangles_seen_through);
     return text;
@@ -294,6 +298,44 @@ double way_to_goal(const std::vector<Organ>& organs, const Organ& robot, double 
   return way;
 }
 
+struct Views {
+  Vec3 best, side;  // from the scene to the camera
+};
+
+// Directions from which most of the robot is seen past the other organs, at the start, on the way and at the
+// goal: of those from before the body, or from above it, and of those square to the way.
+Views views_of(const std::vector<Organ>& organs, const Organ& robot, double scale, const Vec3& way) {
+  std::vector<SurfaceMesh> hiding;
+  for (const std::size_t i : simulated(organs)) {
+    if (&organs[i] == &robot) continue;
+    const TetMesh cage = placed(organs[i], scale);
+    hiding.push_back({cage.positions, boundary_triangles(cage.tets)});
+  }
+  const Points all = placed(robot, scale).positions;
+  const Eigen::Index step = std::max<Eigen::Index>(1, all.rows() / points_looked_at);
+  constexpr int stops = 4;  // of the way
+  Points points(stops * (all.rows() / step), 3);
+  for (Eigen::Index p = 0; p < points.rows(); ++p)
+    points.row(p) = all.row(p / stops * step) + double(p % stops) / (stops - 1) * way.transpose();
+  // A way that leads to or from the eye looks short.
+  const auto worth = [&](const Vec3& direction) {
+    return share_in_sight(points, direction, hiding) -
+           0.4 * std::abs(direction.normalized().dot(way.normalized()));
+  };
+  const auto best_of = [&](const std::vector<Vec3>& directions) {
+    return *std::max_element(directions.begin(), directions.end(),
+                             [&](const Vec3& a, const Vec3& b) { return worth(a) < worth(b); });
+  };
+  std::vector<Vec3> before;
+  for (const double to_the_left : {-1.5, -1.0, -0.6, -0.3, 0.3, 0.6, 1.0, 1.5})
+    for (const double up : {0.15, 0.35, 0.7}) before.push_back({1, to_the_left, up});
+  Vec3 across = way.cross(Vec3::UnitZ());
+  if (across.norm() < 1e-9 * way.norm()) across = Vec3::UnitY();
+  across.normalize();
+  const Vec3 up(0, 0, 0.12);
+  return {best_of(before), best_of({across + up, up - across})};
+}
+
 std::string scene_text(const std::vector<Organ>& organs, const NewSceneOptions& options, double scale) {
   const Organ& robot = *std::find_if(organs.begin(), organs.end(),
                                      [&](const Organ& organ) { return organ.name == options.robot; });
@@ -316,6 +358,8 @@ std::string scene_text(const std::vector<Organ>& organs, const NewSceneOptions& 
   const std::string of_true_size = scale < 1
                                        ? fmt::format("{:g} of its true size, about its own middle", scale)
                                        : std::string("of its true size");
+  const std::string description = fmt::format("{} moves to the {} among {} bodies", robot.name, options.goal,
+                                              simulated(organs).size() - 1);
   std::string text = fmt::format(
       "# Made by limber scene new. In a body organs touch, and cages are larger than what they enclose. So "
       "every "
@@ -323,10 +367,10 @@ std::string scene_text(const std::vector<Organ>& organs, const NewSceneOptions& 
       "# cages overlap at the start. Materials are usual ones. Edit what is to be otherwise: docs/scene.md "
       "has all "
       "keys.\n"
-      "name = \"{}\"\ndescription = \"{} moves to the {} among {} bodies\"\n\n[world]\nbounds_m = [{}, "
+      "name = \"{}\"\ndescription = \"{}\"\n\n[world]\nbounds_m = [{}, "
       "{}]\ngravity_m_s2 = [0, 0, 0]\n",
-      of_true_size, options.out.stem().string(), robot.name, options.goal, simulated(organs).size() - 1,
-      vector_text(bounds.lower), vector_text(bounds.upper));
+      of_true_size, options.out.stem().string(), description, vector_text(bounds.lower),
+      vector_text(bounds.upper));
   for (const Organ& organ : organs) text += body_text(organ, options, scale);
   text +=
       fmt::format("\n[goal]\ncenter_of_mass_m = {}\nradius_m = {:.3g}\n", vector_text(goal), 0.4 * length);
@@ -334,15 +378,18 @@ std::string scene_text(const std::vector<Organ>& organs, const NewSceneOptions& 
       "\n[planner]\npreset = \"fast\"\nmax_force_n = {:.2g}\nduration_s = [{:.2g}, {:.2g}]\n"
       "control_point_radius_m = {:.2g}\nsettle_speed_m_s = {:.2g}\n",
       5 * mass, 0.2 * time, time, 0.35 * length, 0.02 * time);
-  text += "\n[camera]\ndirection = [1, -0.5, 0.3]\nfov_deg = 24\n";
-  text += "\n[[cameras]]\nname = \"side\"\ndirection = [0.1, -1, 0.15]\nfov_deg = 24\n";
-  text += fmt::format(
-      "\n[[cameras]]\nname = \"follow\"\nfollow = \"{}\"\ndirection = [1, 0.6, 0.25]\nfov_deg = 24\n",
-      robot.name);
+  const Views views = views_of(organs, robot, scale, goal - start);
+  const std::string subject = fmt::format("fov_deg = 24\nsubject = \"{}\"\nfill = 0.45\n", robot.name);
+  text += fmt::format("\n[camera]   # from where most of the way is seen\ndirection = {}\n{}",
+                      vector_text(views.best), subject);
+  text += fmt::format("\n[[cameras]]\nname = \"side\"\ndirection = {}\n{}", vector_text(views.side), subject);
+  text += fmt::format("\n[[cameras]]\nname = \"follow\"\nfollow = \"{}\"\ndirection = {}\nfov_deg = 24\n",
+                      robot.name, vector_text(views.best));
+  text += "\n[[cameras]]\nname = \"whole\"\ndirection = [1, -0.5, 0.3]\nfov_deg = 24\n";
   text += fmt::format(
       "\n[film]\nframes_per_second = 30\nspeed = {:.2g}   # slow motion: what is small moves "
       "quickly\nbounds_lines = false\nclock = true\ncaption = \"{}\"\n",
-      std::clamp(time, 0.05, 1.0), options.out.stem().string());
+      std::clamp(time, 0.05, 1.0), description);
   return text;
 }
 

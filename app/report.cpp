@@ -364,9 +364,16 @@ Json motion_meta(const Findings& f, Json bodies) {
   }
   for (const PreparedBody& body : f.bodies) everything.include(bounding_box(body.surface.positions));
   Box shown = everything;
-  if (scene.film.bounds_lines) shown.include(scene.bounds_m);
-  render::Camera camera =
-      render::frame_automatically(shown, scene.cameras[0].direction, 16.0 / 9, scene.cameras[0].fov_deg);
+  const int subject = scene.cameras[0].subject;
+  if (subject >= 0) {
+    shown = bounding_box(f.bodies[std::size_t(subject)].surface.positions);
+    for (const State& state : f.frames())
+      shown.include(bounding_box(fem::body_positions(f.world, state, subject)));
+  } else if (scene.film.bounds_lines) {
+    shown.include(scene.bounds_m);
+  }
+  render::Camera camera = render::frame_automatically(shown, scene.cameras[0].direction, 16.0 / 9,
+                                                      scene.cameras[0].fov_deg, scene.cameras[0].fill);
   if (!scene.cameras[0].keyframes.empty())
     camera.eye = scene.cameras[0].keyframes[0].eye_m, camera.target = scene.cameras[0].keyframes[0].target_m;
   Json goal{{"center", json_of(f.plan().settings.goal.center_of_mass_m)},

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "app/node_values.h"
 #include "core/error.h"
@@ -16,6 +17,8 @@ namespace limber::app {
 
 namespace {
 
+constexpr int generation =
+    2;  // of pictures: raised when the same film comes out otherwise, so that it is painted anew
 constexpr double longest_arrow = 2;  // times that of the strongest push, which is as long as the robot
 constexpr int most_edges_of_tree = 4000;
 
@@ -35,6 +38,23 @@ Box turned_any_way(const Box& box) {
   const Vec3 half = 0.5 * box.size();
   const Vec3 reach(std::hypot(half.x(), half.y()), std::hypot(half.x(), half.y()), half.z());
   return {box.center() - reach, box.center() + reach};
+}
+
+// The vertices beyond which none lies in one of many directions, evenly over the sphere: a spiral whose turns
+// are a golden angle apart.
+std::vector<Eigen::Index> outermost_of(const Points& positions) {
+  constexpr int directions = 200;
+  std::vector<Eigen::Index> outermost;
+  for (int i = 0; i < directions; ++i) {
+    const double z = 1 - 2 * (i + 0.5) / directions, r = std::sqrt(1 - z * z),
+                 turn = i * std::numbers::pi * (3 - std::sqrt(5));
+    Eigen::Index farthest = 0;
+    (positions * Vec3(r * std::cos(turn), r * std::sin(turn), z)).maxCoeff(&farthest);
+    outermost.push_back(farthest);
+  }
+  std::sort(outermost.begin(), outermost.end());
+  outermost.erase(std::unique(outermost.begin(), outermost.end()), outermost.end());
+  return outermost;
 }
 
 }  // namespace
@@ -104,9 +124,43 @@ Box Shot::box_of_motion() const {
   return box;
 }
 
+Points Shot::outline_of_motion(int subject) const {
+  std::vector<Vec3> points;
+  const bool cages = scene_.film.cages || scene_.film.side_by_side;
+  for (std::size_t b = 0; b < bodies_.size(); ++b) {
+    if (subject >= 0 && int(b) != subject) continue;
+    const PreparedBody& body = bodies_[b];
+    const std::vector<Eigen::Index> outermost = outermost_of(body.surface.positions);
+    for (const State& state : plan_.trajectory.frames) {
+      const Points nodes = fem::body_positions(world_, state, int(b));
+      for (const Eigen::Index v : outermost) {
+        Vec3 place = Vec3::Zero();
+        for (int i = 0; i < 4; ++i)
+          place += body.binding.weights(v, i) *
+                   nodes.row(body.cage.tets(body.binding.tet_from_vertex[v], i)).transpose();
+        points.push_back(place);
+      }
+      for (Eigen::Index n = 0; cages && n < nodes.rows(); ++n) points.push_back(nodes.row(n));
+      if (!world_.bodies[b].moving) break;
+    }
+  }
+  if (scene_.film.bounds_lines && subject < 0) {
+    const Points edges = render::edges_of(scene_.bounds_m);
+    for (Eigen::Index row = 0; row < edges.rows(); ++row) points.push_back(edges.row(row));
+  }
+  Points outline(Eigen::Index(points.size()), 3);
+  for (std::size_t i = 0; i < points.size(); ++i) outline.row(Eigen::Index(i)) = points[i].transpose();
+  return outline;
+}
+
 void Shot::lay_out_camera(double aspect) {
-  Box shown = box_of_motion();  // a skin is not what the film is about
-  if (scene_.film.bounds_lines) shown.include(scene_.bounds_m);
+  for (const scenes::Keyframe& key : camera_->keyframes)
+    path_.push_back({key.at, {.eye = key.eye_m, .target = key.target_m, .fov_deg = camera_->fov_deg}});
+  const auto frame = [&](const auto& shown) {
+    if (path_.empty())
+      path_.push_back({0, render::frame_automatically(shown, camera_->direction, aspect, camera_->fov_deg,
+                                                      camera_->fill)});
+  };
   if (camera_->follow >= 0) {
     followed_m_.resize(frames(), 3);
     for (int f = 0; f < frames(); ++f)
@@ -116,13 +170,14 @@ void Shot::lay_out_camera(double aspect) {
     const Vec3 reach = Vec3::Constant(
         room * bounding_box(bodies_[std::size_t(camera_->follow)].surface.positions).diagonal());
     const Vec3 center = followed_m_.row(0).transpose();
-    shown = {center - reach, center + reach};
+    frame(Box{center - reach, center + reach});
   }
-  for (const scenes::Keyframe& key : camera_->keyframes)
-    path_.push_back({key.at, {.eye = key.eye_m, .target = key.target_m, .fov_deg = camera_->fov_deg}});
-  if (path_.empty())
-    path_.push_back({0, render::frame_automatically(camera_->turn_deg == 0 ? shown : turned_any_way(shown),
-                                                    camera_->direction, aspect, camera_->fov_deg)});
+  if (!path_.empty()) return;
+  const Points outline = outline_of_motion(camera_->subject);  // a skin is not what the film is about
+  if (camera_->turn_deg == 0)
+    frame(outline);
+  else
+    frame(turned_any_way(bounding_box(outline)));
 }
 
 render::Camera Shot::camera_of(int frame) const {
@@ -250,7 +305,7 @@ void Shot::find_tree() {
 std::uint64_t Shot::hash_of_look() const {
   const scenes::FilmSpec& film = scene_.film;
   Hasher hasher;
-  hasher.text(version).value(look_.width).value(look_.height).matrix(film.background_srgb);
+  hasher.text(version).value(generation).value(look_.width).value(look_.height).matrix(film.background_srgb);
   hasher.matrix(look_.stage.lower).matrix(look_.stage.upper).matrix(scene_.bounds_m.lower);
   hasher.matrix(scene_.bounds_m.upper);
   for (const bool flag : {film.bounds_lines, film.transparent, film.clock, film.cages, film.forces, film.path,

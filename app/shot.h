@@ -62,6 +62,8 @@ class Shot {
   };
   render::Camera camera_of(int frame) const;
   Box box_of_motion() const;
+  // What the camera is to hold: of the subject, or of all bodies (−1) and the bounds where they are drawn.
+  Points outline_of_motion(int subject) const;
   void lay_out_camera(double aspect);
   void check() const;
   void measure_depths();

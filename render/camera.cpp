@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include "core/error.h"
+#include "core/mesh.h"
 
 namespace limber::render {
 
@@ -62,11 +63,11 @@ Vec3 pixel_from_world(const Camera& camera, const Vec3& point, int width, int he
 }
 
 // In camera axes, a point p is within the slope t of an eye e when |p.x − e.x| ≤ t (e.z − p.z). Each side
-// bounds e.x + t e.z or e.x − t e.z by the extreme of a linear function of the corners; so the least e.z is
+// bounds e.x + t e.z or e.x − t e.z by the extreme of a linear function of the points; so the least e.z is
 // known in closed form.
-Camera frame_automatically(const Box& everything, const Vec3& toward_eye, double aspect, double fov_deg,
+Camera frame_automatically(const Points& everything, const Vec3& toward_eye, double aspect, double fov_deg,
                            double fill) {
-  LIMBER_CHECK(!everything.empty() && fill > 0 && fill <= 1 && aspect > 0, fill, aspect);
+  LIMBER_CHECK(everything.rows() > 0 && fill > 0 && fill <= 1 && aspect > 0, fill, aspect);
   Camera camera;
   camera.fov_deg = fov_deg;
   if (std::abs(toward_eye.normalized().z()) > 0.999) camera.up = {0, 1, 0};
@@ -75,23 +76,33 @@ Camera frame_automatically(const Box& everything, const Vec3& toward_eye, double
 
   struct Side {
     double low = 1e300, high = -1e300;
-  } x, y;
-  double nearest_z = -1e300, middle_z = (r * everything.center()).z();
-  for (int i = 0; i < 8; ++i) {
-    const Vec3 p =
-        r * Vec3(everything.lower + Vec3(i & 1, i >> 1 & 1, i >> 2).cwiseProduct(everything.size()));
-    x.low = std::min(x.low, p.x() - slope_x * p.z()), x.high = std::max(x.high, p.x() + slope_x * p.z());
-    y.low = std::min(y.low, p.y() - slope_y * p.z()), y.high = std::max(y.high, p.y() + slope_y * p.z());
-    nearest_z = std::max(nearest_z, p.z());
+    void include(double farther, double nearer) {
+      low = std::min(low, farther), high = std::max(high, nearer);
+    }
+    double middle() const { return 0.5 * (low + high); }
+  } x, y, z;
+  for (Eigen::Index row = 0; row < everything.rows(); ++row) {
+    const Vec3 p = r * everything.row(row).transpose();
+    x.include(p.x() - slope_x * p.z(), p.x() + slope_x * p.z());
+    y.include(p.y() - slope_y * p.z(), p.y() + slope_y * p.z());
+    z.include(p.z(), p.z());
   }
-  // A box without size: stand off by a metre.
-  const double least =
-      nearest_z + std::max(1e-3 * everything.diagonal(), everything.diagonal() > 0 ? 0.0 : 1.0);
-  const double z = std::max({(x.high - x.low) / (2 * slope_x), (y.high - y.low) / (2 * slope_y), least});
-  const Vec3 eye(0.5 * (x.high + x.low), 0.5 * (y.high + y.low), z);
+  // What has no size: stand off by a metre.
+  const double size = bounding_box(everything).diagonal();
+  const double least = z.high + (size > 0 ? 1e-3 * size : 1.0);
+  const Vec3 eye(x.middle(), y.middle(),
+                 std::max({(x.high - x.low) / (2 * slope_x), (y.high - y.low) / (2 * slope_y), least}));
   camera.eye = r.transpose() * eye;
-  camera.target = r.transpose() * Vec3(eye.x(), eye.y(), std::min(middle_z, z - 1e-3));
+  camera.target = r.transpose() * Vec3(eye.x(), eye.y(), std::min(z.middle(), eye.z() - 1e-3));
   return camera;
+}
+
+Camera frame_automatically(const Box& everything, const Vec3& toward_eye, double aspect, double fov_deg,
+                           double fill) {
+  Points corners(8, 3);
+  for (int i = 0; i < 8; ++i)
+    corners.row(i) = everything.lower + Vec3(i & 1, i >> 1 & 1, i >> 2).cwiseProduct(everything.size());
+  return frame_automatically(corners, toward_eye, aspect, fov_deg, fill);
 }
 
 Camera camera_at(const std::vector<CameraKey>& keys, double time_s) {

@@ -26,11 +26,12 @@ Mat4 clip_from_camera(double fov_deg, double aspect, double near_m, double far_m
 // the eye.
 Vec3 pixel_from_world(const Camera&, const Vec3& point, int width, int height);
 
-// The nearest camera, looking along −toward_eye, that has all 8 corners of the box within the picture's
-// middle `fill` (0 … 1) part. Exact: two opposite edges are touched. Pass the box over the whole motion: then
-// it need not move.
+// The nearest camera, looking along −toward_eye, that has all points within the picture's middle `fill` (0 …
+// 1) part. Exact: two opposite edges are touched. Pass the points of the whole motion: then it need not move.
+Camera frame_automatically(const Points& everything, const Vec3& toward_eye, double aspect,
+                           double fov_deg = 30, double fill = 0.88);
 Camera frame_automatically(const Box& everything, const Vec3& toward_eye, double aspect, double fov_deg = 30,
-                           double fill = 0.88);
+                           double fill = 0.88);  // its 8 corners
 
 struct CameraKey {
   double time_s;

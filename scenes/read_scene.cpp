@@ -570,7 +570,7 @@ std::vector<Via> read_via(const Node& root, const Scene& scene) {
 PlannerSpec read_planner(const Node& table) {
   PlannerSpec planner;
   planner.preset = text(table, "preset");
-  planner.seed = integer(table, "seed");
+  planner.seed = std::int64_t(number(table, "seed"));
   planner.iterations = integer(table, "iterations");
   planner.goal_bias = number(table, "goal_bias");
   const Node& weights = child(table, "weights");
@@ -628,7 +628,13 @@ CameraSpec read_camera(const Node& table, const Scene& scene, const std::string&
       complain(child(node, "target_m"), "the camera looks at the place where it is; move target_m or eye_m");
     camera.keyframes.push_back(frame);
   }
+  camera.fill = number(table, "fill");
   if (const Node* follow = table.find("follow")) camera.follow = body_called(*follow, scene, "follow");
+  if (const Node* subject = table.find("subject")) {
+    camera.subject = body_called(*subject, scene, "subject");
+    if (camera.follow >= 0 || !camera.keyframes.empty())
+      complain(*subject, "a camera with follow or keyframes frames no subject; remove one of them");
+  }
   return camera;
 }
 

@@ -64,6 +64,31 @@ TEST_F(NewScene, OrgansAreInTheirPlacesAndRoles) {
   EXPECT_LT(scene.scenery[0].opacity, 0.5);
   // One and a half lengths of the heart to the front of the middle of its cage.
   EXPECT_LT((scene.goal.center_of_mass_m - Vec3(0.12, 0, 1)).norm(), 0.005);
+  ASSERT_EQ(scene.cameras.size(), 4u);
+  EXPECT_EQ(scene.cameras[0].subject, scene.robot);
+  EXPECT_LT(scene.cameras[0].fill, 0.6);
+}
+
+// Behind a wall that ends at its left side.
+TEST_F(NewScene, TheCameraStandsWhereTheRobotIsSeen) {
+  fs::remove(models() / "lung.obj");
+  for (const double side : {1.0, -1.0}) {
+    box("stomach", {-155 * side, -100, 1000}, {390, 40, 700});
+    ASSERT_EQ(limber_program(words({"--robot", "heart", "--goal", "up"})).code, exit_done);
+    const scenes::Scene scene = scenes::read_scene_file(folder / "chest.toml");
+    const Vec3 direction = scene.cameras[0].direction;
+    EXPECT_GT(side * direction.y(), 0.8 * direction.x());
+    fs::remove(folder / "chest.toml");
+  }
+}
+
+// 20 mm deep, 100 mm wide: one and a half times its depth would be within its goal's radius.
+TEST_F(NewScene, AFlatRobotsGoalIsOutOfItsReachAtTheStart) {
+  box("heart", {0, 0, 1000}, {100, 20, 100});
+  ASSERT_EQ(limber_program(words()).code, exit_done);
+  const scenes::Scene scene = scenes::read_scene_file(folder / "chest.toml");
+  EXPECT_NEAR(scene.goal.center_of_mass_m.x(), 0.1, 0.005);
+  EXPECT_NEAR(scene.goal.radius_m, 0.04, 1e-9);
 }
 
 TEST_F(NewScene_slow, IsPlannedAsItIs) {

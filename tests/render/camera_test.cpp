@@ -41,6 +41,28 @@ TEST(Camera, FramingHoldsEveryCornerAndTouchesTwoOppositeEdges) {
   }
 }
 
+TEST(Camera, FramingPointsIsTighterThanFramingTheirBox) {
+  Rng rng(14, 0);
+  const int width = 900, height = 1600;
+  for (int trial = 0; trial < 100; ++trial) {
+    Points points(40, 3);
+    for (int i = 0; i < 40; ++i) points.row(i) = 2 * rng.direction();
+    const Vec3 toward_eye = rng.direction();
+    const Camera camera = frame_automatically(points, toward_eye, double(width) / height, 40, 0.7);
+    Vec3 low(1e9, 1e9, 1e9), high(-1e9, -1e9, -1e9);
+    for (int i = 0; i < 40; ++i) {
+      const Vec3 p = pixel_from_world(camera, points.row(i), width, height);
+      low = low.cwiseMin(p), high = high.cwiseMax(p);
+    }
+    EXPECT_GT(low.z(), 0);
+    EXPECT_NEAR(std::max((high.x() - low.x()) / width, (high.y() - low.y()) / height), 0.7, 1e-9);
+    EXPECT_LT(std::max(std::abs(low.x() + high.x() - width), std::abs(low.y() + high.y() - height)), width);
+    const Camera of_box =
+        frame_automatically(bounding_box(points), toward_eye, double(width) / height, 40, 0.7);
+    EXPECT_LT((camera.eye - camera.target).norm(), (of_box.eye - of_box.target).norm());
+  }
+}
+
 TEST(Camera, TheTwoWaysToProjectAgree) {
   Rng rng(12, 0);
   const int width = 640, height = 480;

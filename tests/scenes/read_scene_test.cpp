@@ -168,7 +168,7 @@ TEST(ReadScene, ComplainsWithLineAndColumn) {
       {"pose = { position_m = [1, 1.5, 1.5] }", "pose = 1", "1\n[[bodies]]\nname = \"gate",
        "must be a table"},
       {"density_kg_m3 = 100", "density_kg_m3 = -1", "-1 }",
-       "is -1, out of its range; it must be > 0 and ≤ 100000"},
+       "is -1, out of its range; it must be ≥ 1e-06 and ≤ 100000"},
       {"density_kg_m3 = 100", "density_kg_m3 = nan", "nan", "write a finite number"},
       {"density_kg_m3 = 100", "density_kg_m3 = inf", "inf", "write a finite number"},
       {"density_kg_m3 = 100", "density_kg_m3 = 100, poisson_ratio = 0.5", "0.5 }", "must be ≥ 0 and ≤ 0.495"},
@@ -290,6 +290,7 @@ TEST(ReadScene, ComplainsWithLineAndColumn) {
        "both 0"},
       {"at = 1,", "at = 0,", "0, eye_m = [9", "put them in order"},
       {"name = \"side\"", "name = \"main\"", "\"main\"", "two cameras are called \"main\""},
+      {"follow = \"gate\"", "follow = \"gate\"\nsubject = \"gate\"", "\"gate\"\nkey", "frames no subject"},
       {"follow = \"gate\"", "follow = \"robt\"", "\"robt\"", "a body that is not scenery: robot, gate"},
       {"role = \"obstacle\"", "triangles = 500\nrole = \"obstacle\"", "500",
        "bodies.gate is not scenery, so its surface is kept vertex by vertex; remove triangles"},
@@ -440,8 +441,10 @@ std::string another_value(const Key& key) {
       {"camera.keyframes[].target_m", "[0, 0.5, 1]"},
       {"camera.keyframes", "[]"},
       {"camera.follow", "\"robot\""},
+      {"camera.subject", "\"robot\""},
       {"cameras[].name", "\"other\""},
       {"cameras[].follow", "\"robot\""},
+      {"cameras[].subject", "\"robot\""},
       {"cameras[].keyframes[].at", "0.5"},
       {"cameras[].keyframes[].eye_m", "[0, -8, 1]"},
       {"cameras[].keyframes[].target_m", "[0, 0.5, 1]"},
@@ -513,6 +516,8 @@ TEST(Keys, EveryKeyChangesTheScene) {
     if (key.path == "bodies[].triangles")
       sets = {"cameras.side.follow=robot",
               "bodies.gate={ name = \"gate\", role = \"scenery\", model = { made = \"heart\" } }"};
+    if (key.path == "camera.subject") sets = {"camera.keyframes=[]"};
+    if (key.path == "cameras[].subject") sets = {"cameras=[{ name = \"side\" }]"};
     if (key.path == "bodies[].pose.axis") sets = {"bodies.robot.pose.angle_deg=90"};
     if (key.parent() == "bodies[].parts[]")
       sets = {key.name() == "box_m"
@@ -636,6 +641,7 @@ std::string all_of(const Scene& s) {
   t += fmt::format("{} {}\n", p.shortcut_rounds, p.settle_hold);
   for (const CameraSpec& c : s.cameras) {
     t += fmt::format("{} {} {} {} {}", c.name, v(c.direction), c.fov_deg, c.turn_deg, c.follow);
+    t += fmt::format(" {} {}", c.subject, c.fill);
     for (const Keyframe& k : c.keyframes) t += fmt::format(" {} {} {}", k.at, v(k.eye_m), v(k.target_m));
   }
   const FilmSpec& f = s.film;
