@@ -7,6 +7,7 @@
 #include "fem/observe.h"
 #include "render/annotate.h"
 #include "render/arrow.h"
+#include "render/caster.h"
 #include "render/color_map.h"
 #include "render/occlusion.h"
 
@@ -18,9 +19,8 @@ const Vec3 push_color(0.93, 0.52, 0.10), contact_color(0.16, 0.42, 0.62);
 const render::LineLook cage_lines{.color_srgb = {0.12, 0.14, 0.18}, .width_px = 1.2, .opacity = 0.55};
 const render::LineLook way_lines{.color_srgb = {0.85, 0.35, 0.05}, .width_px = 3, .opacity = 0.9};
 const render::LineLook tree_lines{.color_srgb = {0.25, 0.28, 0.36}, .width_px = 1, .opacity = 0.45};
-// Above this the cage casts the shadow of the surface: a shadow map of so many triangles costs as much as all
-// the rest of the picture.
-constexpr int most_triangles_that_cast = 60'000;
+// Above the first, a coarse stand-in of the second casts the shadow of a surface.
+constexpr int most_triangles_that_cast = 60'000, triangles_of_caster = 20'000;
 
 using Edges = Eigen::Matrix<int, Eigen::Dynamic, 2, Eigen::RowMajor>;
 
@@ -125,7 +125,7 @@ struct Shot::Painter::View {
             .opacity = body.opacity};
   }
 
-  bool cage_casts(std::size_t b) const {
+  bool has_caster(std::size_t b) const {
     return !cages && shot.bodies_[b].surface.triangles.rows() > most_triangles_that_cast;
   }
 
@@ -133,7 +133,7 @@ struct Shot::Painter::View {
     const PreparedBody& prepared = shot.bodies_[b];
     const Triangles& hull = shot.world_.bodies[b].surface;
     render::MeshLook look = look_of(shot.scene_.bodies[b]);
-    look.casts_shadow = !cage_casts(b);
+    look.casts_shadow = !has_caster(b);
     if (cages) look.crease_angle_deg = 0;
     meshes.push_back(cages ? renderer.add_mesh(hull, prepared.cage.positions, look)
                            : renderer.add_mesh(prepared.surface.triangles, prepared.surface.positions, look));
@@ -146,11 +146,14 @@ struct Shot::Painter::View {
 
   // After all that is seen, so that the numbers of meshes are those of bodies and scenery.
   void add_caster(std::size_t b) {
+    Caster& made = casters.emplace_back();
+    if (!has_caster(b)) return;
     render::MeshLook look = look_of(shot.scene_.bodies[b]);
     look.seen = false;
-    casters.push_back(
-        cage_casts(b) ? renderer.add_mesh(shot.world_.bodies[b].surface, shot.bodies_[b].cage.positions, look)
-                      : -1);
+    const SurfaceMesh& surface_at_rest = shot.bodies_[b].surface;
+    made.stand_in = render::coarse_caster(surface_at_rest, triangles_of_caster);
+    made.mesh =
+        renderer.add_mesh(made.stand_in.triangles, made.stand_in.positions(surface_at_rest.positions), look);
   }
 
   // From the nodes of a body's cage to the rows of its mesh, by the weights of the binding. Where only some
@@ -212,7 +215,6 @@ struct Shot::Painter::View {
   void move_body(std::size_t b) {
     const PreparedBody& prepared = shot.bodies_[b];
     const Points& hull = hulls[b];
-    if (casters[b] >= 0) renderer.set_positions(casters[b], hull);
     if (!cage_lines_of.empty()) renderer.set_lines(cage_lines_of[b], ends_of(cage_edges[b], hull));
     if (cages) {
       renderer.set_positions(meshes[b], hull);
@@ -223,6 +225,7 @@ struct Shot::Painter::View {
     ffd::deform(prepared.binding, prepared.cage.tets, hull, surface);
     ffd::deform_normals(prepared.binding, prepared.cage, hull, rest_normals[b], normals);
     renderer.set_positions(meshes[b], surface, normals);
+    if (casters[b].mesh >= 0) renderer.set_positions(casters[b].mesh, casters[b].stand_in.positions(surface));
   }
 
   void show(int frame) {
@@ -252,10 +255,15 @@ struct Shot::Painter::View {
     }
   }
 
+  struct Caster {
+    int mesh = -1;  // none
+    render::Caster stand_in;
+  };
   const Shot& shot;
   bool cages;
   render::Renderer renderer;
-  std::vector<int> meshes, casters, cage_lines_of, arrows;
+  std::vector<int> meshes, cage_lines_of, arrows;
+  std::vector<Caster> casters;              // a body
   std::vector<Points> hulls, rest_normals;  // a body; the cage's nodes as they are now
   std::vector<Edges> cage_edges;
   Points surface, normals;
