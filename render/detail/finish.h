@@ -1,5 +1,5 @@
 // From samples to pixels: the average of a pixel's samples, over background and ground. On the CPU, row by
-// row: a quarter of what it costs llvmpipe, most of whose samples show nothing but background.
+// row, for half of what it cost llvmpipe.
 #pragma once
 
 #include <cstdint>

@@ -70,7 +70,7 @@ TEST_F(NewScene, OrgansAreInTheirPlacesAndRoles) {
 }
 
 // Behind a wall that ends at its left side.
-TEST_F(NewScene, TheCameraStandsWhereTheRobotIsSeen) {
+TEST_F(NewScene_slow, TheCameraStandsWhereTheRobotIsSeen) {
   fs::remove(models() / "lung.obj");
   for (const double side : {1.0, -1.0}) {
     box("stomach", {-155 * side, -100, 1000}, {390, 40, 700});
@@ -83,7 +83,7 @@ TEST_F(NewScene, TheCameraStandsWhereTheRobotIsSeen) {
 }
 
 // 20 mm deep, 100 mm wide: one and a half times its depth would be within its goal's radius.
-TEST_F(NewScene, AFlatRobotsGoalIsOutOfItsReachAtTheStart) {
+TEST_F(NewScene_slow, AFlatRobotsGoalIsOutOfItsReachAtTheStart) {
   box("heart", {0, 0, 1000}, {100, 20, 100});
   ASSERT_EQ(limber_program(words()).code, exit_done);
   const scenes::Scene scene = scenes::read_scene_file(folder / "chest.toml");
