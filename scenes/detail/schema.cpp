@@ -404,7 +404,7 @@ constexpr Key all_keys[] = {
      "paper: the search of Rodriguez, Lien and Amato (ICRA 2006); fast: what we found to be better",
      "paper, fast",
      ""},
-    {"planner.seed", Type::integer, from_to(0, 0x1p53), 0, "1", "of all random numbers", "", ""},
+    {"planner.seed", Type::integer, from_to(0, 0x1p53 - 1), 0, "1", "of all random numbers", "", ""},
     {"planner.iterations", Type::integer, from_to(1, 1e7), 0, "1000", "gives up after so many expansions", "",
      ""},
     {"planner.goal_bias", Type::number, share, 0, "0.1", "share of the expansions that aim at the goal", "",
@@ -681,10 +681,12 @@ double checked_number(const Key& key, const std::string& shown, const Node& node
   else
     complain_of_type(key, shown, node);
   if (!std::isfinite(x)) complain(node.where, fmt::format("{} is {}; write a finite number", shown, x));
-  if (!key.interval.holds(x))
-    complain(node.where, fmt::format("{} is {}, out of its range; it must be {}", shown, x,
-                                     std::abs(x) > huge ? fmt::format("between {} and {}", -huge, huge)
-                                                        : key.interval.text()));
+  if (!key.interval.holds(x)) {
+    const bool slip = (x > huge && key.interval.upper == huge) || (x < -huge && key.interval.lower == -huge);
+    complain(node.where,
+             fmt::format("{} is {}, out of its range; it must be {}", shown, x,
+                         slip ? fmt::format("between {} and {}", -huge, huge) : key.interval.text()));
+  }
   if ((key.type == Type::integer || key.type == Type::integers) && x != std::floor(x))
     complain(node.where, fmt::format("{} is {}; it must be a whole number", shown, x));
   return x;

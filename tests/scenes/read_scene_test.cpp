@@ -290,6 +290,8 @@ TEST(ReadScene, ComplainsWithLineAndColumn) {
        "both 0"},
       {"at = 1,", "at = 0,", "0, eye_m = [9", "put them in order"},
       {"name = \"side\"", "name = \"main\"", "\"main\"", "two cameras are called \"main\""},
+      {"max_force_n = 500", "max_force_n = 500\nseed = 9007199254740993", "9007199254740993",
+       "out of its range; it must be ≥ 0 and ≤ 9007199254740991"},
       {"follow = \"gate\"", "follow = \"gate\"\nsubject = \"gate\"", "\"gate\"\nkey", "frames no subject"},
       {"follow = \"gate\"", "follow = \"robt\"", "\"robt\"", "a body that is not scenery: robot, gate"},
       {"role = \"obstacle\"", "triangles = 500\nrole = \"obstacle\"", "500",
