@@ -8,6 +8,7 @@
 
 #include "fem/detail/contact.h"
 #include "fem/detail/overlap.h"
+#include "fem/detail/surface_contact.h"
 #include "fem/reference.h"
 
 namespace limber::fem {
@@ -241,24 +242,19 @@ std::vector<ContactForce> contact_forces(const World& world, const State& state)
   const detail::LaneView<float> view{x.data(), v.data(),     f.data(),     rows,         rows,
                                      1,        lower.data(), upper.data(), travel.data()};
   std::vector<detail::Exerted<float>> exerted;
-  detail::Contacts<float> contacts(world, detail::kernels<float>(detail::best_isa(), 1), 1);
-  contacts.tell(&exerted);
-  contacts.add_forces(0, view);
-
-  const auto body_of = [&](int node) {
-    for (int b = 0;; ++b)
-      if (node < world.topology.bodies[std::size_t(b)].last_node &&
-          node >= world.topology.bodies[std::size_t(b)].first_node)
-        return b;
+  const auto ask = [&](auto contacts) {
+    contacts.tell(&exerted);
+    contacts.add_forces(0, view);
   };
+  const auto& kernels = detail::kernels<float>(detail::best_isa(), 1);
+  if (world.touches_on_surfaces())
+    ask(detail::SurfaceContacts<float>(world, kernels, 1));
+  else
+    ask(detail::Contacts<float>(world, kernels, 1));
   std::vector<ContactForce> forces;
   for (const auto& e : exerted) {
-    ContactForce force{body_of(e.node[0]), e.against < 0 ? -1 : body_of(e.against), Vec3::Zero(),
-                       Vec3::Zero(), double(e.depth)};
-    for (int c = 0; c < 3; ++c) {
-      force.force_n[c] = double(e.force[c]);
-      for (int i = 0; i < 2; ++i) force.place_m[c] += double(e.share[i] * x[3 * e.node[i] + c]);
-    }
+    ContactForce force{e.body, e.against, Vec3::Zero(), Vec3::Zero(), double(e.depth)};
+    for (int c = 0; c < 3; ++c) force.force_n[c] = double(e.force[c]), force.place_m[c] = double(e.place[c]);
     forces.push_back(force);
   }
   return forces;

@@ -11,6 +11,7 @@
 #include "core/error.h"
 #include "core/threads.h"
 #include "fem/detail/locking.h"
+#include "fem/detail/make_surface_tables.h"
 #include "fem/detail/overlap.h"
 #include "fem/detail/spring_weights.h"
 #include "fem/detail/timestep.h"
@@ -108,6 +109,7 @@ Body make_body(const BodySpec& spec) {
   body.fixed.assign(std::size_t(nodes), spec.kind == BodyKind::immovable);
   body.kind = spec.kind;
   body.max_volume_change = spec.max_volume_change;
+  body.shape = spec.shape;
   body.self_contact = spec.self_contact && spec.kind == BodyKind::deformable;
   for (int n : spec.fixed_nodes) body.fixed[n] = true;
   body.moving = std::find(body.fixed.begin(), body.fixed.end(), false) != body.fixed.end();
@@ -484,7 +486,7 @@ void check_places(const World& world) {
   for (std::size_t a = 0; a < world.bodies.size(); ++a)
     for (std::size_t b = a + 1; b < world.bodies.size(); ++b) {
       const Body &one = world.bodies[a], &two = world.bodies[b];
-      if (!one.moving && !two.moving) continue;
+      if ((!one.moving && !two.moving) || world.touches_on_surfaces()) continue;
       const auto overlap = detail::deepest_overlap({one.cage.positions, one.cage.tets, one.surface},
                                                    {two.cage.positions, two.cage.tets, two.surface});
       if (overlap.depth_m > 1e-6 * size)
@@ -592,6 +594,7 @@ World build_world(const WorldSpec& spec) {
   }
   world.tables = single_precision(tables);
   choose_step(spec.max_dt_s, world);
+  detail::make_surface_tables(spec.contact_offset_m, world);
   check_places(world);
   return world;
 }

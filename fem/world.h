@@ -3,11 +3,14 @@
 #pragma once
 
 #include <limits>
+#include <memory>
 #include <string>
 #include <vector>
 
+#include "core/contact_shape.h"
 #include "core/mesh.h"
 #include "core/state.h"
+#include "fem/detail/surface_tables.h"
 #include "fem/detail/tables.h"
 
 namespace limber::fem {
@@ -45,6 +48,9 @@ struct BodySpec {
   std::vector<double> youngs_modulus_from_tet_pa = {}, density_from_tet_kg_m3 = {};
   bool self_contact = false;  // parts of the body that are not neighbours push one another apart
   double max_volume_change = std::numeric_limits<double>::infinity();  // |V − V0|/V0 of a sound state, > 0
+  // Of the fine surface that the cage moves: contact is where that is. All bodies of a world have one, or
+  // none has: then contact is between the cages. Shared, for it is large and never changes.
+  std::shared_ptr<const ContactShape> shape = nullptr;
 };
 
 struct WorldSpec {
@@ -59,6 +65,7 @@ struct WorldSpec {
   // one that stands goes on standing until a node would gain as much in a tenth of a second. 0: only where
   // nothing would move.
   double rest_speed_m_s = 0;
+  double contact_offset_m = 0;  // ≥ 0: fine surfaces that near push each other
 };
 
 // The rest cage and what follows from it and the material; constant.
@@ -78,7 +85,8 @@ struct Body {
   std::vector<double> youngs_modulus_from_tet_pa,
       density_from_tet_kg_m3;  // (T) the material's, or a part's own
   double mass_kg, rest_volume_m3;
-  double max_volume_change;   // as asked for
+  std::shared_ptr<const ContactShape> shape;  // as given
+  double max_volume_change;                   // as asked for
   double stiffness_share;     // by which the elements' stiffness is multiplied; 1 unless mesh_independent
   double elastic_dt_limit_s;  // largest stable step of the damped elastic body; infinite unless deformable
   int node_count() const { return int(cage.positions.rows()); }
@@ -102,6 +110,9 @@ struct World {
   detail::Tables<float> tables;     // what the float32 steppers read
   detail::Tables<double> tables64;  // the same for the double reference
   detail::Topology topology;
+  detail::SurfaceTables<float> surfaces;  // without bodies where contact is between the cages
+  detail::SurfaceTables<double> surfaces64;
+  bool touches_on_surfaces() const { return !surfaces.bodies.empty(); }
   std::vector<detail::RigidTable> rigid_tables;  // a body; empty unless it is rigid
 };
 

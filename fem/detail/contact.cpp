@@ -16,18 +16,6 @@ constexpr float kept = 0.9f, rounding = 0.02f, certain = 0.004f;
 // The sides of a box that a node is beyond are bits; a place that is not finite, of a rollout that blows up:
 constexpr unsigned char lost = 64;
 
-template <class Real>
-Real dot(const Real a[3], const Real b[3]) {
-  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
-
-template <class Real>
-void cross(const Real a[3], const Real b[3], Real out[3]) {
-  out[0] = a[1] * b[2] - a[2] * b[1];
-  out[1] = a[2] * b[0] - a[0] * b[2];
-  out[2] = a[0] * b[1] - a[1] * b[0];
-}
-
 // det(a−p, b−p, c−p), computed from the same numbers in the same order whichever tet asks.
 template <class Real>
 Real det_from(const Real* p, const Real* a, const Real* b, const Real* c) {
@@ -78,34 +66,6 @@ void to_triangle(const Real p[3], const Real corner[3][3], const Real normal[3],
   Real height = 0;
   for (int k = 0; k < 3; ++k) height += normal[k] * (corner[0][k] - p[k]);
   for (int k = 0; k < 3; ++k) way[k] = height / size2 * normal[k];
-}
-
-template <class Real>
-Real damping_of(Real beta) {
-  return Real(2 * contact_damping_ratio) * std::sqrt(beta);
-}
-
-// Normal force k d − c ṙ·n, never pulling; friction against the slip, at most μ times that, and at most what
-// takes a share of the slip away in one step. `mass_along` a unit vector is what is set against a push.
-// False: no force.
-template <class Real, class Mass>
-bool penalty_force(Real beta, Real depth, const Real normal[3], const Real relative_velocity[3],
-                   const Mass& mass_along, Real step, Real friction, Real force[3]) {
-  const Real mass = mass_along(normal);
-  const Real damping = damping_of(beta);
-  const Real speed = dot(relative_velocity, normal);
-  const Real push = mass / step * (beta * depth / step - damping * speed);
-  if (!(push > 0)) return false;
-  Real slip[3];
-  for (int c = 0; c < 3; ++c) slip[c] = relative_velocity[c] - speed * normal[c];
-  const Real slip_speed = std::sqrt(dot(slip, slip));
-  Real slip_way[3];
-  for (int c = 0; c < 3; ++c) slip_way[c] = slip_speed > 0 ? slip[c] / slip_speed : Real(0);
-  const Real slip_mass = mass_along(slip_way);
-  const Real most = friction * push, stop = Real(contact_slip_stop) * slip_mass / step * slip_speed;
-  const Real drag = stop > most ? most / slip_speed : Real(contact_slip_stop) * slip_mass / step;
-  for (int c = 0; c < 3; ++c) force[c] = push * normal[c] - drag * slip[c];
-  return true;
 }
 
 // Whether the box of p and q meets a box. What is not finite, of a rollout that blows up, meets none.
@@ -888,7 +848,7 @@ void Contacts<Real>::respond(const LaneView<Real>& view, int a, int b, const Tou
       for (int c = 0; c < 3; ++c) view.f[view.force.at(node[i], c)] += share[i] * force[c];
   if (told_)
     told_->push_back(
-        {{node[0], node[1]}, {share[0], share[1]}, corner[0], touch.depth, {force[0], force[1], force[2]}});
+        {side[0], side[1], {place[0], place[1], place[2]}, touch.depth, {force[0], force[1], force[2]}});
 }
 
 // Calls each(node, axis, the wall's normal along it, depth).
@@ -926,7 +886,8 @@ void Contacts<Real>::add_wall_forces(const LaneView<Real>& view) const {
                          tables_.pair_friction[body * bodies_ + body], force))
         return;
       for (int c = 0; c < 3; ++c) view.f[view.force.at(n, c)] += force[c];
-      if (told_) told_->push_back({{n, n}, {1, 0}, -1, depth, {force[0], force[1], force[2]}});
+      if (told_)
+        told_->push_back({body, -1, {place[0], place[1], place[2]}, depth, {force[0], force[1], force[2]}});
     });
   }
 }

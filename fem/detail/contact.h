@@ -7,6 +7,7 @@
 #include "core/types.h"
 #include "fem/detail/bearing.h"
 #include "fem/detail/lane_view.h"
+#include "fem/detail/penalty.h"
 #include "fem/detail/tables.h"
 
 namespace limber::fem {
@@ -14,13 +15,6 @@ struct World;
 }
 
 namespace limber::fem::detail {
-
-// Penalty stiffness β m_eff/h², damping 2 ζ √(k m_eff), and the share of a slip that friction may stop in one
-// step.
-inline constexpr double contact_beta = 0.4;       // vertices
-inline constexpr double contact_edge_beta = 0.2;  // points of edges: a vertex has six of them
-inline constexpr double contact_damping_ratio = 0.3;
-inline constexpr double contact_slip_stop = 0.5;
 
 // A contact point inside a tet of another body: a vertex; the middle of an edge that has an end inside; or,
 // of an edge that passes through, the middle of the stretch inside. All follows from the present positions.
@@ -45,15 +39,6 @@ struct Span {
       upper[c] = view.upper[(3 * body + c) * view.stride];
     }
   }
-};
-
-// A force that a contact or a wall gave, for those who ask.
-template <class Real>
-struct Exerted {
-  int node[2];    // of the point it acts on, with
-  Real share[2];  // these shares
-  int against;    // a node of the other body; −1: a wall
-  Real depth, force[3];
 };
 
 template <class Real>

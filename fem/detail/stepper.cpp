@@ -31,7 +31,6 @@ Stepper<Real>::Stepper(const World& world, int lanes, Isa isa)
       tables_(tables_of<Real>(world)),
       kernels_(kernels<Real>(isa, lanes)),
       lanes_(lanes),
-      contacts_(world, kernels_, lanes),
       state_layout_(state_layout(lanes)),
       force_layout_(force_layout(lanes)),
       first_velocity_(lanes == 1 ? 4 : world.nodes * state_layout_.node),
@@ -41,6 +40,10 @@ Stepper<Real>::Stepper(const World& world, int lanes, Isa isa)
       rest_gain2_(rest_speed2_ * Real(world.dt_s * world.dt_s)),  // gained within a second
       still_gain2_(100 * rest_gain2_),                            // within a tenth of it
       speed2_before_(std::size_t(lanes), 0) {
+  if (world.touches_on_surfaces())
+    surface_contacts_.emplace(world, kernels_, lanes);
+  else
+    contacts_.emplace(world, kernels_, lanes);
   const std::size_t nodes = std::size_t(world.nodes), bodies = world.bodies.size() * std::size_t(lanes);
   state_.assign(nodes * std::size_t(lanes == 1 ? 8 : 6 * lanes), 0);
   f_.assign(nodes * std::size_t(force_layout_.node), 0);
@@ -87,7 +90,7 @@ void Stepper<Real>::load(int lane, const Real* positions, const Real* velocities
     speed2_[b * lanes_ + lane] = speed2;
     unchanged_[b * lanes_ + lane] = body.moving ? 0 : 1;
   }
-  contacts_.forget(lane);
+  surface_contacts_ ? surface_contacts_->forget(lane) : contacts_->forget(lane);
   contact_[lane] = contact;
   controls_[lane] = control;
 
@@ -217,8 +220,10 @@ void Stepper<Real>::find_sleepers() {
 template <class Real>
 void Stepper<Real>::add_contact_forces() {
   for (int lane = 0; lane < lanes_; ++lane)
-    if (contact_[lane]) contacts_.add_forces(lane, view(lane));
-  contacts_.add_forces_of_walls(view(0));
+    if (contact_[lane])
+      surface_contacts_ ? surface_contacts_->add_forces(lane, view(lane))
+                        : contacts_->add_forces(lane, view(lane));
+  if (contacts_) contacts_->add_forces_of_walls(view(0));
 }
 
 template <class Real>

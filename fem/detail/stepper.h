@@ -3,12 +3,14 @@
 #pragma once
 
 #include <new>
+#include <optional>
 #include <vector>
 
 #include "core/state.h"
 #include "fem/cost.h"
 #include "fem/detail/contact.h"
 #include "fem/detail/kernels.h"
+#include "fem/detail/surface_contact.h"
 
 namespace limber::fem::detail {
 
@@ -57,7 +59,9 @@ class Stepper {
   const Tables<Real>& tables_;
   const Kernels<Real>& kernels_;
   int lanes_;
-  Contacts<Real> contacts_;
+  // One of the two is there.
+  std::optional<Contacts<Real>> contacts_;
+  std::optional<SurfaceContacts<Real>> surface_contacts_;
   Layout state_layout_, force_layout_;
   int first_velocity_;
   using Numbers = std::vector<Real, LineAllocator<Real>>;

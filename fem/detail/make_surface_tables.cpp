@@ -1,0 +1,163 @@
+#include "fem/detail/make_surface_tables.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/error.h"
+#include "fem/detail/surface_contact.h"
+
+namespace limber::fem::detail {
+namespace {
+
+using Tables64 = SurfaceTables<double>;
+
+// The part of a tet that its row of least weights leaves, moved out by a distance.
+Tables64::Core core_of(const Points& x, const Tets& tets, int t, const Weights& least, double out_m) {
+  Tables64::Core core{{}, 1};
+  if (!(least.row(t).maxCoeff() <= 1)) return {{}, -1};
+  const auto corner = [&](int i) -> Vec3 { return x.row(tets(t, i)); };
+  const double volume6 = 6 * signed_volume(corner(0), corner(1), corner(2), corner(3));
+  for (int i = 0; i < 4; ++i) {
+    const Vec3 a = corner((i + 1) % 4), normal = (corner((i + 2) % 4) - a).cross(corner((i + 3) % 4) - a);
+    core.least[i] = least(t, i) - out_m * normal.norm() / volume6;
+    core.scale -= core.least[i];
+  }
+  constexpr double thinnest = 0.02;  // planes of what is thinner are not to be had in float32
+  if (const double lack = thinnest - core.scale; lack > 0) {
+    for (double& l : core.least) l -= lack / 4;
+    core.scale = thinnest;
+  }
+  return core;
+}
+
+// The largest sum of weights without their signs over the cores' corners and the samples: how far these may
+// move at most when nodes move by one.
+double reach_factor(const Tables64::Core& core) {
+  double sum = 0, most = 0;
+  for (const double l : core.least) sum += std::abs(l);
+  for (const double l : core.least) most = std::max(most, sum - std::abs(l) + std::abs(l + core.scale));
+  return most;
+}
+
+void append(const Body& body, double offset_m, const Topology& topology, Tables64& tables,
+            Tables64::Body& out) {
+  const ContactShape& shape = *body.shape;
+  const int tets = int(body.cage.tets.rows());
+  LIMBER_CHECK(shape.least_weight.rows() == tets, shape.least_weight.rows(), tets);
+  out.field = {shape.field.values.data(), {}, {}, 1 / shape.field.cell_m, shape.field.unit_m};
+  for (int c = 0; c < 3; ++c)
+    out.field.nodes[c] = shape.field.nodes[std::size_t(c)], out.field.lower[c] = shape.field.lower_m[c];
+  out.reach_factor = 1;
+  const SurfaceSamples& samples = shape.samples;
+  Eigen::Index s = 0;
+  for (int t = 0; t < tets; ++t) {
+    const int tet = body.first_tet + t;
+    const Tables64::Core& core = tables.cores.emplace_back(
+        core_of(body.cage.positions, body.cage.tets, t, shape.least_weight, 2 * offset_m));
+    if (core.scale > 0) {
+      out.cored_tets.push_back(tet);
+      out.reach_factor = std::max(out.reach_factor, reach_factor(core));
+    }
+    tables.first_sample.push_back(int(tables.samples.size()));
+    for (; s < samples.positions_m.rows() && samples.tet_from_sample[s] == t; ++s) {
+      Tables64::Sample& sample = tables.samples.emplace_back();
+      sample.tet = tet, sample.area = samples.area_m2[s];
+      std::copy_n(topology.tets[std::size_t(tet)].node, 4, sample.node);
+      std::copy_n(&samples.weights(s, 0), 4, sample.weight);
+      out.reach_factor = std::max(out.reach_factor, samples.weights.row(s).cwiseAbs().sum());
+    }
+    if (tables.first_sample.back() < int(tables.samples.size())) out.sampled_tets.push_back(tet);
+  }
+  LIMBER_CHECK(s == samples.positions_m.rows(), s, samples.positions_m.rows());
+}
+
+void append_tets_round_nodes(const Body& body, Tables64& tables) {
+  for (int t = 0; t < body.cage.tets.rows(); ++t)
+    for (int i = 0; i < 4; ++i)
+      tables.tets_round_node[std::size_t(body.first_node + body.cage.tets(t, i))].push_back(body.first_tet +
+                                                                                            t);
+}
+
+SurfaceTables<float> single_precision(const Tables64& t) {
+  SurfaceTables<float> out;
+  for (const auto& s : t.samples) {
+    auto& copy = out.samples.emplace_back();
+    std::copy_n(s.node, 4, copy.node), std::copy_n(s.weight, 4, copy.weight);
+    copy.tet = s.tet, copy.area = float(s.area);
+  }
+  out.first_sample = t.first_sample;
+  for (const auto& c : t.cores) {
+    auto& copy = out.cores.emplace_back();
+    std::copy_n(c.least, 4, copy.least), copy.scale = float(c.scale);
+  }
+  for (const auto& b : t.bodies) {
+    auto& copy = out.bodies.emplace_back();
+    copy.field.values = b.field.values;
+    std::copy_n(b.field.nodes, 3, copy.field.nodes), std::copy_n(b.field.lower, 3, copy.field.lower);
+    copy.field.inverse_cell = float(b.field.inverse_cell), copy.field.unit = float(b.field.unit);
+    copy.reach_factor = 1.0001f * float(b.reach_factor);
+    copy.sampled_tets = b.sampled_tets, copy.cored_tets = b.cored_tets;
+  }
+  out.offset.assign(t.offset.begin(), t.offset.end());
+  out.tets_round_node = t.tets_round_node;
+  return out;
+}
+
+// How far the surfaces of two bodies are apart at the start, up to the offset asked for; negative: how deep.
+std::vector<double> gaps_at_rest(const World& world, double offset_m) {
+  const std::size_t bodies = world.bodies.size();
+  std::vector<double> gaps(bodies * bodies, offset_m);
+  const auto& x = world.tables64.rest_positions;
+  const std::vector<double> still(x.size(), 0.0), travel(bodies, 0.0);
+  std::vector<double> forces(x.size(), 0.0), lower, upper;
+  for (const Body& body : world.bodies) {
+    const Box box = bounding_box(body.cage.positions);
+    lower.insert(lower.end(), box.lower.data(), box.lower.data() + 3);
+    upper.insert(upper.end(), box.upper.data(), box.upper.data() + 3);
+  }
+  constexpr Layout rows{3, 1};
+  SurfaceContacts<double> contacts(world, kernels<double>(best_isa(), 1), 1);
+  for (const auto& touch : contacts.find(0, {x.data(), still.data(), forces.data(), rows, rows, 1,
+                                             lower.data(), upper.data(), travel.data()})) {
+    if (touch.against < 0) continue;
+    const std::size_t one = std::size_t(touch.body), other = std::size_t(touch.against);
+    for (double* gap : {&gaps[one * bodies + other], &gaps[other * bodies + one]})
+      *gap = std::min(*gap, offset_m - touch.depth);
+  }
+  return gaps;
+}
+
+}  // namespace
+
+void make_surface_tables(double offset_m, World& world) {
+  const std::size_t with_shape = std::size_t(std::count_if(world.bodies.begin(), world.bodies.end(),
+                                                           [](const Body& b) { return b.shape != nullptr; }));
+  LIMBER_CHECK(with_shape == 0 || with_shape == world.bodies.size(), with_shape, world.bodies.size());
+  if (with_shape == 0) return;
+  LIMBER_CHECK(offset_m >= 0, offset_m);
+  Tables64& tables = world.surfaces64;
+  tables.bodies.resize(world.bodies.size());
+  tables.tets_round_node.resize(std::size_t(world.nodes));
+  for (const bool moving : {true, false})  // in the order of the world's tets
+    for (std::size_t b = 0; b < world.bodies.size(); ++b) {
+      if (world.bodies[b].moving != moving) continue;
+      append(world.bodies[b], offset_m, world.topology, tables, tables.bodies[b]);
+      if (world.bodies[b].self_contact) append_tets_round_nodes(world.bodies[b], tables);
+    }
+  tables.first_sample.push_back(int(tables.samples.size()));
+  const std::size_t bodies = world.bodies.size();
+  tables.offset.assign(bodies * bodies, offset_m);
+  tables.offset = gaps_at_rest(world, offset_m);
+  for (std::size_t a = 0; a < bodies; ++a)
+    for (std::size_t b = a; b < bodies; ++b)
+      if (const double gap = tables.offset[a * bodies + b]; gap < -offset_m)
+        throw InputError(
+            a == b ? fmt::format("body {} overlaps itself at the start, {:.3g} m deep; mend the model, or "
+                                 "switch its self_contact off",
+                                 world.bodies[a].name, -gap)
+                   : fmt::format("bodies {} and {} overlap at the start, {:.3g} m deep; move them apart",
+                                 world.bodies[a].name, world.bodies[b].name, -gap));
+  world.surfaces = single_precision(tables);
+}
+
+}  // namespace limber::fem::detail

@@ -1,0 +1,525 @@
+#include "fem/detail/surface_contact.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "fem/world.h"
+
+namespace limber::fem::detail {
+namespace {
+
+// Share of a distance that movement may use up, and of the reach, by which less; the rest is for rounding.
+// And what is farther than this share of the reach is apart, however it is computed.
+constexpr float kept = 0.9f, rounding = 0.02f, certain = 0.004f;
+// A column that holds no sample: in no box.
+constexpr float nowhere = 1e30f;
+
+template <class Real>
+const SurfaceTables<Real>& surface_tables_of(const World&);
+template <>
+const SurfaceTables<float>& surface_tables_of(const World& world) {
+  return world.surfaces;
+}
+template <>
+const SurfaceTables<double>& surface_tables_of(const World& world) {
+  return world.surfaces64;
+}
+
+template <class Real>
+bool boxes_meet(const Real lower[3], const Real upper[3], const Real other_lower[3],
+                const Real other_upper[3]) {
+  bool meet = true;  // never of what is not finite
+  for (int c = 0; c < 3; ++c) meet &= lower[c] <= other_upper[c] && other_lower[c] <= upper[c];
+  return meet;
+}
+
+}  // namespace
+
+template <class Real>
+Real SurfaceTables<Real>::Field::at(const Real place[3], Real gradient[3]) const {
+  int cell[3];
+  Real part[3];
+  bool within[3];
+  for (int c = 0; c < 3; ++c) {
+    const Real last = Real(nodes[c] - 1), t = (place[c] - lower[c]) * inverse_cell;
+    within[c] = t >= 0 && t <= last;
+    const Real held = within[c] ? t : (t > last ? last : Real(0));  // 0 of what is not a number
+    cell[c] = std::min(int(held), nodes[c] - 2);
+    part[c] = held - Real(cell[c]);
+  }
+  const std::ptrdiff_t row = nodes[0], slice = row * nodes[1];
+  const std::int16_t* v = values + cell[2] * slice + cell[1] * row + cell[0];
+  const auto value = [&](int i, int j, int k) { return Real(v[k * slice + j * row + i]); };
+  const auto mix = [](Real a, Real b, Real t) { return a + t * (b - a); };
+  Real along_x[2][2], rise_x[2][2];
+  for (int k = 0; k < 2; ++k)
+    for (int j = 0; j < 2; ++j) {
+      rise_x[k][j] = value(1, j, k) - value(0, j, k);
+      along_x[k][j] = value(0, j, k) + part[0] * rise_x[k][j];
+    }
+  const Real low = mix(along_x[0][0], along_x[0][1], part[1]),
+             high = mix(along_x[1][0], along_x[1][1], part[1]);
+  const Real scale = unit * inverse_cell;
+  gradient[0] = within[0] ? scale * mix(mix(rise_x[0][0], rise_x[0][1], part[1]),
+                                        mix(rise_x[1][0], rise_x[1][1], part[1]), part[2])
+                          : Real(0);
+  gradient[1] = within[1] ? scale * mix(along_x[0][1] - along_x[0][0], along_x[1][1] - along_x[1][0], part[2])
+                          : Real(0);
+  gradient[2] = within[2] ? scale * (high - low) : Real(0);
+  return unit * mix(low, high, part[2]);
+}
+
+template <class Real>
+SurfaceContacts<Real>::SurfaceContacts(const World& world, const Kernels<Real>& kernels, int lanes)
+    : world_(world),
+      topology_(world.topology),
+      tables_(tables_of<Real>(world)),
+      surface_(surface_tables_of<Real>(world)),
+      kernels_(kernels),
+      bodies_(int(world.bodies.size())),
+      world_nodes_(world.nodes),
+      first_sample_row_(world.nodes + 4 * int(world.topology.tets.size())),
+      step_(Real(world.contact_dt_s)) {
+  for (int a = 0; a < bodies_; ++a) {
+    if (world.bodies[a].moving && world.bodies[a].self_contact) pairs_.emplace_back(a, a);
+    for (int b = a + 1; b < bodies_; ++b)
+      if (world.bodies[a].moving || world.bodies[b].moving) pairs_.emplace_back(a, b);
+  }
+  for (const auto& body : world.bodies)
+    if (body.kind == BodyKind::rigid) bearings_.resize(world.bodies.size());
+  const std::size_t tets = topology_.tets.size(), samples = surface_.samples.size();
+  lists_.resize(std::size_t(lanes) * pairs_.size());
+  self_travel_.assign(std::size_t(lanes * bodies_), 0);
+  places_.resize(std::size_t(first_sample_row_) + samples);
+  stamps_.assign(std::size_t(world_nodes_) + tets + samples, 0);
+  loads_.assign(std::size_t(world_nodes_), 0);
+  beside_.assign(tets, 0);
+}
+
+template <class Real>
+bool SurfaceContacts<Real>::is_rigid(int body) const {
+  return world_.bodies[body].kind == BodyKind::rigid;
+}
+
+template <class Real>
+void SurfaceContacts<Real>::forget(int lane) {
+  for (std::size_t p = 0; p < pairs_.size(); ++p) lists_[lane * pairs_.size() + p].built = false;
+}
+
+template <class Real>
+const Real* SurfaceContacts<Real>::node_place(const LaneView<Real>& view, int node) {
+  Real* at = places_[node].at;
+  if (stamps_[node] == stamp_) return at;
+  stamps_[node] = stamp_;
+  for (int c = 0; c < 3; ++c) at[c] = view.x[view.state.at(node, c)];
+  return at;
+}
+
+template <class Real>
+const Real* SurfaceContacts<Real>::sample_place(const LaneView<Real>& view, int index) {
+  Real* at = places_[row_of_sample(index)].at;
+  unsigned& stamp = stamps_[world_nodes_ + int(topology_.tets.size()) + index];
+  if (stamp == stamp_) return at;
+  stamp = stamp_;
+  const typename Tables::Sample& sample = surface_.samples[index];
+  Real place[3] = {0, 0, 0};
+  for (int i = 0; i < 4; ++i) {
+    const Real* node = node_place(view, sample.node[i]);
+    for (int c = 0; c < 3; ++c) place[c] += sample.weight[i] * node[c];
+  }
+  std::copy_n(place, 3, at);
+  return at;
+}
+
+template <class Real>
+void SurfaceContacts<Real>::find_core(const LaneView<Real>& view, int tet) {
+  unsigned& stamp = stamps_[world_nodes_ + tet];
+  if (stamp == stamp_) return;
+  stamp = stamp_;
+  const typename Tables::Core& core = surface_.cores[tet];
+  const Real* corner[4];
+  Real base[3] = {0, 0, 0};
+  for (int i = 0; i < 4; ++i) {
+    corner[i] = node_place(view, topology_.tets[tet].node[i]);
+    for (int c = 0; c < 3; ++c) base[c] += core.least[i] * corner[i][c];
+  }
+  for (int i = 0; i < 4; ++i)
+    for (int c = 0; c < 3; ++c) places_[row_of_core(tet) + i].at[c] = base[c] + core.scale * corner[i][c];
+}
+
+// How far points of the two bodies can have come to one another since the lane was loaded.
+template <class Real>
+Real SurfaceContacts<Real>::travel_of(int lane, const LaneView<Real>& view, int a, int b) {
+  const Real factor_a = surface_.bodies[a].reach_factor, factor_b = surface_.bodies[b].reach_factor;
+  if (a == b) return (1 + factor_a) * self_travel_[lane * bodies_ + a];
+  return factor_a * view.travel[a * view.stride] + factor_b * view.travel[b * view.stride];
+}
+
+template <class Real>
+void SurfaceContacts<Real>::add_forces(int lane, const LaneView<Real>& view) {
+  find(lane, view);
+  if (touches_.empty()) return;
+  share_loads(view);
+  for (const SurfaceTouch<Real>& touch : touches_) respond(view, touch);
+  for (const SurfaceTouch<Real>& touch : touches_)
+    for (const int node : touch.node) loads_[node] = 0;
+}
+
+template <class Real>
+const std::vector<SurfaceTouch<Real>>& SurfaceContacts<Real>::find(int lane, const LaneView<Real>& view) {
+  if (++stamp_ == 0) std::fill(stamps_.begin(), stamps_.end(), 0u), stamp_ = 1;
+  touches_.clear();
+  for (std::size_t p = 0; p < pairs_.size(); ++p) find_pair(lane, view, p);
+  for (int body = 0; body < bodies_ && world_.walls; ++body)
+    if (topology_.bodies[body].moving && !view.sleeps(body)) find_walls(view, body);
+  return touches_;
+}
+
+template <class Real>
+void SurfaceContacts<Real>::find_pair(int lane, const LaneView<Real>& view, std::size_t pair) {
+  const auto [a, b] = pairs_[pair];
+  if (view.sleeps(a) && view.sleeps(b)) return;
+  if (a == b) {  // of the step that led here
+    const Topology::Body& body = topology_.bodies[a];
+    Real mean[3] = {0, 0, 0}, fastest2 = 0;
+    for (int n = body.first_node; n < body.last_node; ++n)
+      for (int c = 0; c < 3; ++c) mean[c] += view.v[view.state.at(n, c)];
+    for (Real& m : mean) m /= Real(body.last_node - body.first_node);
+    for (int n = body.first_node; n < body.last_node; ++n) {
+      Real square = 0;
+      for (int c = 0; c < 3; ++c) {
+        const Real way = view.v[view.state.at(n, c)] - mean[c];
+        square += way * way;
+      }
+      fastest2 = std::max(fastest2, square);
+    }
+    self_travel_[lane * bodies_ + a] += Real(world_.dt_s) * std::sqrt(fastest2);
+  }
+  const Real offset = surface_.offset[a * bodies_ + b];
+  for (int c = 0; c < 3; ++c) {
+    const int ka = (3 * a + c) * view.stride, kb = (3 * b + c) * view.stride;
+    if (view.lower[ka] - offset > view.upper[kb] || view.lower[kb] - offset > view.upper[ka]) return;
+  }
+  List& list = lists_[lane * pairs_.size() + pair];
+  const Real reach = (tables_.skin[a] + tables_.skin[b]) / 2, travel = travel_of(lane, view, a, b);
+  if (!list.built || travel - list.travel_at_build > kept * reach) {
+    list.built = true, list.travel_at_build = travel;
+    build(view, a, b, reach, list.near[0]);
+    if (a != b) build(view, b, a, reach, list.near[1]);
+    for (Near& near : list.near)
+      for (std::size_t k = 0; k < near.candidates.size(); ++k)
+        near.asleep_until[k] = travel + kept * near.asleep_until[k] - rounding * reach;
+  }
+  find_in(view, a, b, reach, travel, list.near[0]);
+  if (a != b) find_in(view, b, a, reach, travel, list.near[1]);
+}
+
+// The samples of the body that are near a box, by tet, in columns.
+template <class Real>
+void SurfaceContacts<Real>::collect_groups(const LaneView<Real>& view, int from, const Real lower[3],
+                                           const Real upper[3], Real reach) {
+  groups_.clear(), sample_of_column_.clear();
+  for (auto& column : columns_) column.clear();
+  for (const int tet : surface_.bodies[from].sampled_tets) {
+    Real least[3], most[3];
+    for (int i = 0; i < 4; ++i) {
+      const Real* at = node_place(view, topology_.tets[tet].node[i]);
+      for (int c = 0; c < 3; ++c) {
+        least[c] = i == 0 ? at[c] : std::min(least[c], at[c]);
+        most[c] = i == 0 ? at[c] : std::max(most[c], at[c]);
+      }
+    }
+    // Samples that no tet holds lie a little outside of theirs.
+    for (int c = 0; c < 3; ++c) least[c] -= reach, most[c] += reach;
+    if (!boxes_meet(least, most, lower, upper)) continue;
+    Group group{tet, int(sample_of_column_.size()), 0, {}, {}};
+    for (int s = surface_.first_sample[tet]; s < surface_.first_sample[tet + 1]; ++s) {
+      const Real* at = sample_place(view, s);
+      bool near = true;
+      for (int c = 0; c < 3; ++c) near &= at[c] >= lower[c] - reach && at[c] <= upper[c] + reach;
+      if (!near) continue;
+      for (int c = 0; c < 3; ++c) {
+        group.lower[c] = group.count == 0 ? at[c] : std::min(group.lower[c], at[c]);
+        group.upper[c] = group.count == 0 ? at[c] : std::max(group.upper[c], at[c]);
+        columns_[c].push_back(at[c]);
+      }
+      sample_of_column_.push_back(s), ++group.count;
+    }
+    if (group.count == 0) continue;
+    const std::size_t full = (sample_of_column_.size() + block_size - 1) / block_size * block_size;
+    for (auto& column : columns_) column.resize(full, Real(nowhere));
+    sample_of_column_.resize(full, -1);
+    groups_.push_back(group);
+  }
+}
+
+// Candidates, with their distances in the place of what they sleep until.
+template <class Real>
+void SurfaceContacts<Real>::build(const LaneView<Real>& view, int from, int into, Real reach, Near& near) {
+  Real lower[3], upper[3];
+  for (int c = 0; c < 3; ++c) {
+    const int k = (3 * into + c) * view.stride;
+    lower[c] = view.lower[k] - surface_.offset[from * bodies_ + into];
+    upper[c] = view.upper[k] + surface_.offset[from * bodies_ + into];
+  }
+  collect_groups(view, from, lower, upper, reach);
+  found_.clear(), found_distance_.clear(), near_tets_.clear();
+  if (!groups_.empty()) {
+    for (int c = 0; c < 3; ++c) {
+      lower[c] = groups_[0].lower[c], upper[c] = groups_[0].upper[c];
+      for (const Group& group : groups_)
+        lower[c] = std::min(lower[c], group.lower[c]), upper[c] = std::max(upper[c], group.upper[c]);
+      lower[c] -= reach, upper[c] += reach;
+    }
+    for (const int tet : surface_.bodies[into].cored_tets) {
+      find_core(view, tet);
+      const int row = row_of_core(tet);
+      bool meet = true;
+      for (int c = 0; c < 3; ++c) {
+        const Real *p = places_[row].at, *q = places_[row + 1].at, *r = places_[row + 2].at,
+                   *s = places_[row + 3].at;
+        meet &= std::min(std::min(p[c], q[c]), std::min(r[c], s[c])) <= upper[c] &&
+                std::max(std::max(p[c], q[c]), std::max(r[c], s[c])) >= lower[c];
+      }
+      if (meet) near_tets_.push_back({{row, row + 1, row + 2, row + 3}, -1, -1, tet, -1});
+    }
+  }
+  planes_.resize((near_tets_.size() + block_size - 1) / block_size);
+  kernels_.find_planes(near_tets_.data(), int(near_tets_.size()), places_[0].at, reach, planes_.data());
+  const auto mark_beside = [&](int tet, unsigned char mark) {
+    for (const int node : topology_.tets[tet].node)
+      for (const int other : surface_.tets_round_node[node]) beside_[other] = mark;
+  };
+  for (std::size_t k = 0; k < near_tets_.size(); ++k) {
+    const TetPlanes<Real>& planes = planes_[k / block_size];
+    const int column = int(k % block_size);
+    Real tet_lower[3], tet_upper[3];
+    for (int c = 0; c < 3; ++c)
+      tet_lower[c] = planes.lower[c][column], tet_upper[c] = planes.upper[c][column];
+    if (from == into) mark_beside(near_tets_[k].tet, 1);
+    for (const Group& group : groups_) {
+      if (!boxes_meet(group.lower, group.upper, tet_lower, tet_upper) || beside_[group.tet]) continue;
+      const Real* const at[3] = {&columns_[0][group.begin], &columns_[1][group.begin],
+                                 &columns_[2][group.begin]};
+      near_tet_.resize(std::size_t(group.count));
+      const int count = kernels_.near_points(planes, column, at, at, group.count, reach, near_tet_.data());
+      for (int i = 0; i < count; ++i) {
+        const int sample = sample_of_column_[group.begin + near_tet_[i].item];
+        TetAndEdge& found = found_.emplace_back(near_tets_[k]);
+        found.from = found.to = row_of_sample(sample), found.point = sample;
+        found_distance_.push_back(near_tet_[i].distance);
+      }
+    }
+    if (from == into) mark_beside(near_tets_[k].tet, 0);
+  }
+  // Counting sort by sample, which keeps the tets of each ascending.
+  const int first = groups_.empty() ? 0 : surface_.first_sample[groups_.front().tet],
+            last = groups_.empty() ? 0 : surface_.first_sample[groups_.back().tet + 1];
+  counts_.assign(std::size_t(last - first + 1), 0);
+  for (const TetAndEdge& found : found_) ++counts_[found.point - first + 1];
+  for (std::size_t k = 1; k < counts_.size(); ++k) counts_[k] += counts_[k - 1];
+  near.candidates.resize(found_.size());
+  near.asleep_until.resize(found_.size() + block_size);
+  for (std::size_t i = 0; i < found_.size(); ++i) {
+    const int k = counts_[found_[i].point - first]++;
+    near.candidates[k] = found_[i], near.asleep_until[k] = found_distance_[i];
+  }
+}
+
+// Of the tets whose cores hold a sample, that one has it in which its least barycentric coordinate is
+// largest: the one that holds it, or, just outside of the cage, the nearest.
+template <class Real>
+void SurfaceContacts<Real>::find_in(const LaneView<Real>& view, int from, int into, Real reach, Real travel,
+                                    Near& near) {
+  const std::size_t count = near.candidates.size();
+  if (awake_.size() < count + block_size) awake_.resize(count + block_size), distance_.resize(awake_.size());
+  const int awake = kernels_.find_at_most(near.asleep_until.data(), int(count), travel, awake_.data());
+  for (int i = 0; i < awake; ++i) {
+    find_core(view, near.candidates[awake_[i]].tet);
+    sample_place(view, near.candidates[awake_[i]].point);
+  }
+  kernels_.middle_distances(near.candidates.data(), awake_.data(), awake, places_[0].at, distance_.data());
+  for (int i = 0; i < awake;) {
+    const int sample = near.candidates[awake_[i]].point;
+    const Real* place = places_[row_of_sample(sample)].at;
+    int best = -1;
+    Real best_weight[4], best_least = -std::numeric_limits<Real>::max();
+    for (; i < awake && near.candidates[awake_[i]].point == sample; ++i) {
+      near.asleep_until[awake_[i]] = travel + kept * distance_[i] - rounding * reach;
+      if (distance_[i] > certain * reach) continue;
+      const int tet = near.candidates[awake_[i]].tet;
+      Real weight[4];
+      if (!weights_in(view, tet, place, weight)) continue;
+      const Real least = std::min(std::min(weight[0], weight[1]), std::min(weight[2], weight[3]));
+      if (!(least > best_least)) continue;
+      best = tet, best_least = least;
+      std::copy_n(weight, 4, best_weight);
+    }
+    if (best >= 0) measure(view, from, into, sample, best, best_weight);
+  }
+}
+
+// False outside of the tet's core, and in a tet that is inverted.
+template <class Real>
+bool SurfaceContacts<Real>::weights_in(const LaneView<Real>& view, int tet, const Real place[3],
+                                       Real weight[4]) {
+  const int* node = topology_.tets[tet].node;
+  const Real* corner[4];
+  for (int i = 0; i < 4; ++i) corner[i] = node_place(view, node[i]);
+  Real edge[3][3], normal[3], p[3];
+  for (int c = 0; c < 3; ++c) {
+    p[c] = place[c] - corner[0][c];
+    for (int i = 0; i < 3; ++i) edge[i][c] = corner[i + 1][c] - corner[0][c];
+  }
+  Real volume6 = 0;
+  weight[0] = 1;
+  for (int i = 0; i < 3; ++i) {
+    cross(edge[(i + 1) % 3], edge[(i + 2) % 3], normal);
+    if (i == 0) volume6 = dot(normal, edge[0]);
+    if (!(volume6 > 0)) return false;
+    weight[i + 1] = dot(normal, p) / volume6;
+    weight[0] -= weight[i + 1];
+  }
+  const typename Tables::Core& core = surface_.cores[tet];
+  bool inside = true;
+  for (int i = 0; i < 4; ++i) inside &= weight[i] >= core.least[i];
+  return inside;
+}
+
+// Reads the field at rest, and turns its gradient into that of the distance where the tet is now. Appends a
+// touch where the surface is nearer than the offset, or above.
+template <class Real>
+bool SurfaceContacts<Real>::measure(const LaneView<Real>& view, int from, int into, int sample, int tet,
+                                    const Real weight[4]) {
+  const int* node = topology_.tets[tet].node;
+  const Real* rest = tables_.rest_positions.data();
+  Real at_rest[3] = {0, 0, 0}, gradient[3];
+  for (int i = 0; i < 4; ++i)
+    for (int c = 0; c < 3; ++c) at_rest[c] += weight[i] * rest[3 * node[i] + c];
+  const Real distance = surface_.bodies[into].field.at(at_rest, gradient);
+  const Real offset = surface_.offset[from * bodies_ + into];
+  const Real* corner[4];
+  for (int i = 0; i < 4; ++i) corner[i] = node_place(view, node[i]);
+  Real edge[3][3], normal[3], now[3] = {0, 0, 0}, volume6 = 0;
+  for (int i = 0; i < 3; ++i)
+    for (int c = 0; c < 3; ++c) edge[i][c] = corner[i + 1][c] - corner[0][c];
+  for (int i = 0; i < 3; ++i) {
+    cross(edge[(i + 1) % 3], edge[(i + 2) % 3], normal);
+    if (i == 0) volume6 = dot(normal, edge[0]);
+    Real rise = 0;
+    for (int c = 0; c < 3; ++c) rise += gradient[c] * (rest[3 * node[i + 1] + c] - rest[3 * node[0] + c]);
+    for (int c = 0; c < 3; ++c) now[c] += rise / volume6 * normal[c];
+  }
+  const Real steepness = std::sqrt(dot(now, now));
+  if (!(steepness > Real(1e-3))) return false;
+  SurfaceTouch<Real> touch;
+  touch.depth = offset - distance / steepness;
+  if (!(touch.depth > 0)) return false;
+  touch.body = from, touch.against = into, touch.sample = sample, touch.tet = tet;
+  const typename Tables::Sample& own = surface_.samples[sample];
+  for (int i = 0; i < 4; ++i) {
+    touch.node[i] = own.node[i], touch.weight[i] = own.weight[i];
+    touch.node[4 + i] = node[i], touch.weight[4 + i] = -weight[i];
+  }
+  std::copy_n(places_[row_of_sample(sample)].at, 3, touch.place);
+  for (int c = 0; c < 3; ++c) touch.normal[c] = now[c] / steepness;
+  touches_.push_back(touch);
+  return true;
+}
+
+template <class Real>
+void SurfaceContacts<Real>::find_walls(const LaneView<Real>& view, int body) {
+  for (int axis = 0; axis < 3; ++axis)
+    for (int side = 0; side < 2; ++side) {
+      const Real out = side == 0 ? Real(1) : Real(-1);
+      const Real wall = Real(side == 0 ? world_.bounds_m.lower[axis] : world_.bounds_m.upper[axis]);
+      const Real* reach = side == 0 ? view.lower : view.upper;
+      if (!(out * (wall - reach[(3 * body + axis) * view.stride]) > 0)) continue;
+      for (const int tet : surface_.bodies[body].sampled_tets) {
+        bool beyond = false;
+        for (const int node : topology_.tets[tet].node)
+          beyond |= out * (wall - view.x[view.state.at(node, axis)]) > 0;
+        if (!beyond) continue;
+        for (int s = surface_.first_sample[tet]; s < surface_.first_sample[tet + 1]; ++s) {
+          const Real* at = sample_place(view, s);
+          const Real depth = out * (wall - at[axis]);
+          if (!(depth > 0)) continue;
+          SurfaceTouch<Real> touch{};
+          touch.body = body, touch.against = -1, touch.sample = s, touch.tet = -1, touch.depth = depth;
+          for (int i = 0; i < 4; ++i) {
+            touch.node[i] = touch.node[4 + i] = surface_.samples[s].node[i];
+            touch.weight[i] = surface_.samples[s].weight[i];
+          }
+          std::copy_n(at, 3, touch.place);
+          touch.normal[axis] = out;
+          touches_.push_back(touch);
+        }
+      }
+    }
+}
+
+template <class Real>
+Real SurfaceContacts<Real>::load_of(const SurfaceTouch<Real>& touch) const {
+  return surface_.samples[touch.sample].area * touch.depth;
+}
+
+// What each node bears, and each rigid body, of all touches: their shares of it are shares of mass.
+template <class Real>
+void SurfaceContacts<Real>::share_loads(const LaneView<Real>& view) {
+  for (Bearing& bearing : bearings_) bearing.depths = 0;
+  for (const SurfaceTouch<Real>& touch : touches_) {
+    const Real load = load_of(touch);
+    for (int i = 0; i < 8; ++i) loads_[touch.node[i]] += load * std::abs(touch.weight[i]);
+    if (bearings_.empty()) continue;
+    bearings_[touch.body].depths += double(load);
+    if (touch.against >= 0) bearings_[touch.against].depths += double(load);
+  }
+  for (std::size_t body = 0; body < bearings_.size(); ++body)
+    if (is_rigid(int(body)) && bearings_[body].depths > 0)
+      bearings_[body].measure(view, topology_.bodies[body], tables_.node_mass);
+}
+
+template <class Real>
+void SurfaceContacts<Real>::respond(const LaneView<Real>& view, const SurfaceTouch<Real>& touch) {
+  const Real load = load_of(touch);
+  const int side[2] = {touch.body, touch.against};
+  Real relative[3] = {0, 0, 0}, inverse_mass = 0;  // of what is not rigid
+  for (int i = 0; i < 8; ++i) {
+    const int node = touch.node[i];
+    for (int c = 0; c < 3; ++c) relative[c] += touch.weight[i] * view.v[view.state.at(node, c)];
+    if (side[i / 4] >= 0 && !is_rigid(side[i / 4]))
+      inverse_mass += std::abs(touch.weight[i]) * (loads_[node] / load) * tables_.inverse_mass[node];
+  }
+  bool any_rigid = false;
+  for (const int body : side) any_rigid |= body >= 0 && is_rigid(body);
+  if (!any_rigid && !(inverse_mass > 0)) return;
+  const auto mass_along = [&](const Real along[3]) {
+    Real inverse = inverse_mass;
+    for (const int body : side)
+      if (body >= 0 && is_rigid(body))
+        inverse += Real(bearings_[body].inverse_mass(touch.place, along, load));
+    return 1 / inverse;
+  };
+  Real force[3];
+  const int other = touch.against < 0 ? touch.body : touch.against;
+  if (!penalty_force(Real(contact_beta), touch.depth, touch.normal, relative, mass_along, step_,
+                     tables_.pair_friction[touch.body * bodies_ + other], force))
+    return;
+  for (int i = 0; i < 8; ++i)
+    if (tables_.inverse_mass[touch.node[i]] > 0)
+      for (int c = 0; c < 3; ++c) view.f[view.force.at(touch.node[i], c)] += touch.weight[i] * force[c];
+  if (told_)
+    told_->push_back({touch.body,
+                      touch.against,
+                      {touch.place[0], touch.place[1], touch.place[2]},
+                      touch.depth,
+                      {force[0], force[1], force[2]}});
+}
+
+template struct SurfaceTables<float>;
+template struct SurfaceTables<double>;
+template class SurfaceContacts<float>;
+template class SurfaceContacts<double>;
+
+}  // namespace limber::fem::detail

@@ -1,0 +1,114 @@
+// Contact of one lane between fine surfaces, which are moved by their cages: samples of one body read the
+// distance to the other's surface, at rest, through its deformed cage. Method and figures: docs/contact.md.
+#pragma once
+
+#include <utility>
+#include <vector>
+
+#include "fem/detail/bearing.h"
+#include "fem/detail/contact.h"
+#include "fem/detail/lane_view.h"
+#include "fem/detail/penalty.h"
+#include "fem/detail/surface_tables.h"
+#include "fem/detail/tables.h"
+
+namespace limber::fem::detail {
+
+// A sample of one body within the offset of another's surface, or beyond a wall. All follows from the present
+// positions.
+template <class Real>
+struct SurfaceTouch {
+  int body, against;                // whose sample, in whose cage; against −1: a wall
+  int sample, tet;                  // of the world's; tet −1: a wall
+  int node[8];                      // of the sample's tet, then of the tet it is in; a wall has four
+  Real weight[8];                   // of the sample's place, then minus those of the place in the tet
+  Real place[3], depth, normal[3];  // depth > 0, along the unit normal, out of `against`
+};
+
+template <class Real>
+class SurfaceContacts {
+ public:
+  SurfaceContacts(const World&, const Kernels<Real>&, int lanes);
+  void forget(int lane);  // the lane holds another state now
+  // Adds to view.f the forces of all contacts and walls.
+  void add_forces(int lane, const LaneView<Real>& view);
+  // From now on add_forces also appends to this list, unless null.
+  void tell(std::vector<Exerted<Real>>* list) { told_ = list; }
+  // Of all bodies, as add_forces finds them; valid until the next call.
+  const std::vector<SurfaceTouch<Real>>& find(int lane, const LaneView<Real>& view);
+
+ private:
+  using Tables = SurfaceTables<Real>;
+  // Samples of one body and the cores of another near them, ascending by sample, then by tet: derived data, a
+  // superset of what can touch.
+  struct Near {
+    std::vector<TetAndEdge> candidates;  // corners and ends are rows of places_
+    std::vector<Real> asleep_until;      // travel before which they cannot touch; filled up for the kernel
+  };
+  struct List {
+    bool built = false;
+    Real travel_at_build = 0;
+    Near near[2];  // samples of a in b, of b in a
+  };
+  struct Place {
+    Real at[4];
+  };
+  // The samples of one tet, in columns that begin with a block of their own.
+  struct Group {
+    int tet, begin, count;
+    Real lower[3], upper[3];
+  };
+
+  const Real* node_place(const LaneView<Real>&, int node);
+  const Real* sample_place(const LaneView<Real>&, int sample);
+  void find_core(const LaneView<Real>&, int tet);
+  int row_of_core(int tet) const { return world_nodes_ + 4 * tet; }
+  int row_of_sample(int sample) const { return first_sample_row_ + sample; }
+  Real travel_of(int lane, const LaneView<Real>&, int a, int b);
+  void build(const LaneView<Real>&, int from, int into, Real reach, Near&);
+  void collect_groups(const LaneView<Real>&, int from, const Real lower[3], const Real upper[3], Real reach);
+  void find_pair(int lane, const LaneView<Real>&, std::size_t pair);
+  void find_in(const LaneView<Real>&, int from, int into, Real reach, Real travel, Near&);
+  bool measure(const LaneView<Real>&, int from, int into, int sample, int tet, const Real weight[4]);
+  bool weights_in(const LaneView<Real>&, int tet, const Real place[3], Real weight[4]);
+  void find_walls(const LaneView<Real>&, int body);
+  void share_loads(const LaneView<Real>&);
+  void respond(const LaneView<Real>&, const SurfaceTouch<Real>&);
+  Real load_of(const SurfaceTouch<Real>&) const;
+  bool is_rigid(int body) const;
+
+  const World& world_;
+  const Topology& topology_;
+  const detail::Tables<Real>& tables_;
+  const Tables& surface_;
+  const Kernels<Real>& kernels_;
+  int bodies_, world_nodes_, first_sample_row_;
+  std::vector<Exerted<Real>>* told_ = nullptr;
+  Real step_;
+  std::vector<std::pair<int, int>> pairs_;  // a body with itself, or a < b
+  std::vector<List> lists_;                 // [lane × pairs + pair]
+  std::vector<Real> self_travel_;           // [lane × bodies + body] of nodes against their mean
+  std::vector<SurfaceTouch<Real>> touches_;
+  // Rows: the world's nodes, four corners of each core, the samples; those are of this call whose stamp is.
+  std::vector<Place> places_;
+  std::vector<unsigned> stamps_;  // a node, a tet's core, a sample
+  unsigned stamp_ = 0;
+  std::vector<int> awake_;
+  std::vector<Real> distance_;
+  std::vector<Real> loads_;        // a node: Σ area × depth × weight of its touches
+  std::vector<Bearing> bearings_;  // a body; empty without rigid ones
+  // Scratch of a list's building.
+  std::vector<Group> groups_;
+  std::vector<int> sample_of_column_, counts_;
+  std::vector<Real> columns_[3];
+  std::vector<TetAndEdge> near_tets_, found_;
+  std::vector<Real> found_distance_;
+  std::vector<TetPlanes<Real>> planes_;
+  std::vector<NearTet<Real>> near_tet_;
+  std::vector<unsigned char> beside_;  // a tet
+};
+
+extern template class SurfaceContacts<float>;
+extern template class SurfaceContacts<double>;
+
+}  // namespace limber::fem::detail

@@ -1,0 +1,47 @@
+// What contact on the fine surfaces reads of a World. Method: docs/contact.md, "On the fine surface".
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "core/contact_shape.h"
+
+namespace limber::fem::detail {
+
+struct Topology;
+
+template <class Real>
+struct SurfaceTables {
+  // A point of a surface, by the nodes of the world's tet that it lies in at rest.
+  struct Sample {
+    int node[4], tet;
+    Real weight[4], area;
+  };
+  // The part of a tet that can be inside the surface, or within twice the offset of it: where each
+  // barycentric coordinate is at least `least`. It is a tet too, of corners scale × node + Σ least × nodes.
+  struct Core {
+    Real least[4], scale;  // scale ≤ 0: there is none
+  };
+  struct Field {
+    const std::int16_t* values;  // of the ContactShape that the body shares
+    int nodes[3];
+    Real lower[3], inverse_cell, unit;
+    // The distance at a place at rest, and its gradient; of the nearest place that lies in the grid.
+    Real at(const Real place[3], Real gradient[3]) const;
+  };
+  struct Body {
+    Field field;
+    Real reach_factor;  // no corner of a core moves farther than this times the body's fastest node
+    std::vector<int> sampled_tets, cored_tets;  // world tets, ascending
+  };
+  std::vector<Sample> samples;    // ascending by tet
+  std::vector<int> first_sample;  // (tets + 1) of the world's tets
+  std::vector<Core> cores;        // (tets)
+  std::vector<Body> bodies;
+  // [body a × bodies + body b] metres: surfaces that near are in contact. On the diagonal: a body with
+  // itself.
+  std::vector<Real> offset;
+  std::vector<std::vector<int>> tets_round_node;  // of bodies that touch themselves, else empty; ascending
+};
+
+}  // namespace limber::fem::detail

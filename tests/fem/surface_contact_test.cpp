@@ -1,0 +1,297 @@
+// Contact between fine surfaces that cages move (docs/contact.md, "On the fine surface").
+#include "fem/detail/surface_contact.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <map>
+
+#include "core/error.h"
+#include "core/random.h"
+#include "fem/batch.h"
+#include "fem/observe.h"
+#include "tests/fem/lane.h"
+#include "tests/fem/shapes.h"
+#include "tests/fem/worlds.h"
+
+namespace limber::fem {
+namespace {
+
+using testing::ball_surface;
+using testing::cube;
+using testing::Lane;
+using testing::rounded_box_surface;
+using testing::shape_of;
+
+// Balls of radius 0.4 in cubes of edge 1, whose cages overlap by far when the balls touch.
+WorldSpec two_balls(double spacing_m = 0.03, double friction = 0.2) {
+  WorldSpec spec;
+  for (const double x : {0.0, 0.81}) {
+    BodySpec body{x == 0 ? "one" : "other", cube({x, 0, 0}, 1, 3), {}, {}, BodyKind::deformable};
+    body.material.friction = friction;
+    body.shape = shape_of(body.cage, ball_surface({x, 0, 0}, 0.4), 0.02, spacing_m);
+    spec.bodies.push_back(std::move(body));
+  }
+  spec.bounds_m = {Vec3::Constant(-20), Vec3::Constant(20)};
+  spec.walls = false;
+  spec.contact_offset_m = 0.005;
+  return spec;
+}
+
+WorldSpec barriers_with_bevels() {
+  Material material;
+  material.poisson_ratio = 0.48;
+  WorldSpec spec = testing::barriers(1, material);
+  for (BodySpec& body : spec.bodies)
+    body.shape =
+        shape_of(body.cage, rounded_box_surface(bounding_box(body.cage.positions), 0.08), 0.03, 0.06);
+  spec.contact_offset_m = 0.005;
+  return spec;
+}
+
+std::vector<detail::SurfaceTouch<float>> touches_of(Lane& lane) {
+  detail::SurfaceContacts<float> contacts(lane.world, detail::kernels<float>(detail::best_isa(), 1), 1);
+  return contacts.find(0, lane.view());
+}
+
+double deepest(const std::vector<detail::SurfaceTouch<float>>& touches) {
+  float depth = 0;
+  for (const auto& touch : touches) depth = std::max(depth, touch.depth);
+  return double(depth);
+}
+
+// Moved towards one another, or with everything stretched along the line of their centres by an affine map,
+// the depth is that of the two balls, or ellipsoids, on that line.
+TEST(SurfaceContact, DepthIsThatOfTheSurfacesThroughAffineMaps) {
+  const World world = build_world(two_balls());
+  EXPECT_TRUE(touches_of(*std::make_unique<Lane>(world)).empty());
+  for (const double stretch : {0.6, 1.0, 1.5})
+    for (const double depth : {0.004, 0.012, 0.025}) {
+      SCOPED_TRACE(fmt::format("stretch {}, depth {}", stretch, depth));
+      Lane lane(world);
+      const float closer = float((0.01 * stretch + depth) / stretch);
+      lane.move(1, [&](const Vec3f& p) { return Vec3f(p - closer * Vec3f::UnitX()); });
+      for (const int body : {0, 1})
+        lane.move(body, [&](const Vec3f& p) { return Vec3f(float(stretch) * p.x(), p.y(), p.z()); });
+      const auto touches = touches_of(lane);
+      ASSERT_FALSE(touches.empty());
+      EXPECT_NEAR(deepest(touches), depth + 0.005, 0.1 * depth + 0.0015);
+      for (const auto& touch : touches) {  // out of the other body, against one's own centre
+        EXPECT_GT(touch.normal[0] * (touch.against == 0 ? 1 : -1), 0.9f);
+        EXPECT_NEAR(Eigen::Map<const Vec3f>(touch.normal).norm(), 1, 1e-5);
+      }
+    }
+}
+
+TEST(SurfaceContact, ForcesKeepMomentumAndAngularMomentum) {
+  const World world = build_world(two_balls());
+  Lane lane(world);
+  Rng rng(11, 0);
+  lane.move(1, [&](const Vec3f& p) { return Vec3f(p - 0.04f * Vec3f::UnitX()); });
+  for (float& v : lane.v) v = float(rng.uniform(-0.3, 0.3));
+  detail::SurfaceContacts<float> contacts(world, detail::kernels<float>(detail::best_isa(), 1), 1);
+  contacts.add_forces(0, lane.view());
+  Vec3 sum = Vec3::Zero(), torque = Vec3::Zero();
+  double all = 0;
+  for (int n = 0; n < world.nodes; ++n) {
+    const Vec3 force = Eigen::Map<const Vec3f>(&lane.f[3 * n]).cast<double>();
+    sum += force, torque += lane.node(n).cross(force), all += force.norm();
+  }
+  EXPECT_GT(all, 1);
+  EXPECT_LT(sum.norm(), 1e-5 * all);
+  EXPECT_LT(torque.norm(), 1e-5 * all);
+}
+
+// A cube pressed onto the floor by gravity sinks by g h²/β at most, whatever the number of its samples: they
+// share the stiffness.
+TEST(SurfaceContact, TheNumberOfSamplesDoesNotChangeTheStiffness) {
+  std::map<double, double> sunk;
+  for (const double spacing : {0.13, 0.06, 0.03}) {
+    WorldSpec spec = testing::alone({"cube", cube({0, 0, 0.51}, 1, 2), {}, {}, BodyKind::deformable});
+    BodySpec& body = spec.bodies[0];
+    body.material.youngs_modulus_pa = 1e6, body.material.damping_ratio = 0.3;
+    body.shape =
+        shape_of(body.cage, rounded_box_surface(bounding_box(body.cage.positions), 0.02), 0.05, spacing);
+    spec.bounds_m = {Vec3(-5, -5, 0), Vec3(5, 5, 10)};
+    spec.walls = true;
+    spec.gravity_m_s2 = {0, 0, -10};
+    const World world = build_world(spec);
+    Control coast;
+    coast.steps = int(2 / world.dt_s);
+    const State end = propagate(world, rest_state(world), coast).end;
+    double mass = 0;
+    for (int n = 0; n < world.nodes; ++n)
+      if (world.bodies[0].cage.positions(n, 2) < 0.02) mass += world.tables64.node_mass[n];
+    sunk[spacing] = -double(body_positions(world, end, 0).col(2).minCoeff());
+    EXPECT_LT(mean_speed_m_s(world, end, 0), 1e-3);
+    // The nodes below bear all of the mass.
+    const double expected =
+        10 * world.contact_dt_s * world.contact_dt_s / detail::contact_beta * world.bodies[0].mass_kg / mass;
+    EXPECT_GT(sunk[spacing], 0.3 * expected);
+    EXPECT_LT(sunk[spacing], 3 * expected);
+  }
+  EXPECT_NEAR(sunk[0.03] / sunk[0.06], 1, 0.3);
+}
+
+// Nothing blows up, however many samples touch: cubes thrown at one another, face on face and edge on face.
+TEST(SurfaceContact, ThrownBodiesComeApartWithTheirMomentumAndNoMoreEnergy) {
+  const World world = build_world(two_balls(0.02, 0));
+  for (const double speed : {1.0, 4.0, 8.0}) {
+    SCOPED_TRACE(speed);
+    State state = rest_state(world);
+    for (int n = 0; n < world.bodies[0].node_count(); ++n) state.velocities[3 * n] = float(speed);
+    const double before = kinetic_energy_j(world, state);
+    Control coast;
+    coast.steps = int(0.6 / world.dt_s);
+    const Rollout rollout = propagate(world, state, coast);
+    ASSERT_EQ(rollout.outcome.status, RunStatus::ok) << rollout.outcome.reason;
+    EXPECT_EQ(inverted_tets(world, rollout.end), 0);
+    EXPECT_LT(kinetic_energy_j(world, rollout.end) + elastic_energy_j(world, rollout.end), 1.001 * before);
+    EXPECT_GT(center_velocity_m_s(world, rollout.end, 1).x(), 0.6 * speed);
+    EXPECT_LT(center_of_mass_m(world, rollout.end, 0).x(), center_of_mass_m(world, rollout.end, 1).x() - 0.7);
+  }
+}
+
+TEST(SurfaceContact, TheAgeOfListsChangesNothing) {
+  const World world = build_world(barriers_with_bevels());
+  Batch batch(world, 1);
+  const auto run = [&](State state, Control control, int calls) {
+    control.steps /= calls;
+    for (int i = 0; i < calls; ++i) {
+      batch.load(0, state, control);
+      batch.advance();
+      batch.store(0, state);
+    }
+    return state;
+  };
+  State state = rest_state(world);
+  Rng rng(5, 1);
+  int touched = 0;
+  for (int i = 0; i < 40; ++i) {
+    SCOPED_TRACE(i);
+    Control control;
+    control.manipulation = Manipulation::body;
+    control.force_n = Vec3f(300, 0, i < 20 ? 100.f : -100.f) + (400 * rng.direction()).cast<float>();
+    control.steps = 150;
+    const State whole = run(state, control, 1);
+    ASSERT_EQ(run(state, control, 150), whole);
+    state = whole;
+    for (const PairForce& pair : pair_forces(contact_forces(world, state))) touched += pair.other > 0;
+  }
+  EXPECT_GT(touched, 5);
+}
+
+TEST(SurfaceContact, SameBitsForAnyLanesNeighboursAndInstructionSet) {
+  const World world = build_world(barriers_with_bevels());
+  Control press;
+  press.manipulation = Manipulation::body;
+  press.force_n = {900, 0, -100};
+  press.steps = 20;
+  State pressed = rest_state(world);
+  const auto touches_plate = [&] {
+    const auto pairs = pair_forces(contact_forces(world, pressed));
+    return std::any_of(pairs.begin(), pairs.end(),
+                       [](const PairForce& p) { return p.other == 1 && p.contacts > 3; });
+  };
+  for (int i = 0; i < 60 && !touches_plate(); ++i) pressed = propagate(world, pressed, press).end;
+  ASSERT_TRUE(touches_plate());
+  Rng rng(21, 0);
+  std::vector<Control> controls;
+  for (int i = 0; i < 20; ++i) {
+    Control& control = controls.emplace_back();
+    control.manipulation = Manipulation::body;
+    control.steps = 20 + rng.below(60);
+    control.force_n = (800 * rng.direction()).cast<float>();
+  }
+  const auto run = [&](int lanes, InstructionSet set) {
+    std::vector<Rollout> rollouts;
+    for (const Control& control : controls) rollouts.push_back({&pressed, control, {}, {}});
+    Batch batch(world, lanes, set);
+    propagate(batch, rollouts);
+    std::vector<State> ends;
+    for (const Rollout& rollout : rollouts) ends.push_back(rollout.end);
+    return ends;
+  };
+  const std::vector<State> expected = run(1, InstructionSet::sse2);
+  for (const int lanes : {1, 4, 8, 16})
+    for (const auto set : {InstructionSet::sse2, InstructionSet::avx2, InstructionSet::avx512}) {
+      SCOPED_TRACE(fmt::format("{} lanes, set {}", lanes, int(set)));
+      try {
+        EXPECT_EQ(run(lanes, set), expected);
+      } catch (const InputError& lacking) {
+        std::puts(lacking.what());
+      }
+    }
+}
+
+// A bar of 0.2 × 0.4 in the form of a U, whose arms swing at one another.
+TEST(SurfaceContact, ABodyTouchesItself) {
+  constexpr double arm = 1.6, radius = 0.25;
+  constexpr double length = 2 * arm + M_PI * radius;
+  TetMesh cage = testing::grid({0, -0.13, -0.23}, {length, 0.26, 0.46}, 26, 2, 2);
+  for (int n = 0; n < cage.positions.rows(); ++n) {
+    const Vec3 p = cage.positions.row(n);
+    const double bend = (p.x() - arm) / radius;
+    cage.positions.row(n) =
+        bend < 0 ? Vec3(arm - p.x(), -radius - p.y(), p.z()).transpose()
+        : bend > M_PI
+            ? Vec3(p.x() - arm - M_PI * radius, radius + p.y(), p.z()).transpose()
+            : Vec3(-(radius + p.y()) * std::sin(bend), -(radius + p.y()) * std::cos(bend), p.z()).transpose();
+  }
+  const testing::Distance bar = [](const Vec3& p) {
+    const double across =
+        p.x() < 0 ? std::abs(std::hypot(p.x(), p.y()) - radius) : std::abs(std::abs(p.y()) - radius);
+    return std::max({across - 0.1, std::abs(p.z()) - 0.2, p.x() - (arm - 0.03)});
+  };
+  for (const bool self_contact : {false, true}) {
+    SCOPED_TRACE(self_contact);
+    WorldSpec spec = testing::alone({"bar", cage, {}, {}, BodyKind::deformable});
+    spec.bodies[0].shape = shape_of(cage, bar, 0.03, 0.04);
+    spec.bodies[0].self_contact = self_contact;
+    spec.contact_offset_m = 0.005;
+    const World world = build_world(spec);
+    State state = rest_state(world);
+    const Points rest = world.bodies[0].cage.positions;
+    for (int n = 0; n < world.nodes; ++n)
+      if (rest(n, 0) > 0) state.velocities[3 * n + 1] = float((rest(n, 1) > 0 ? -2 : 2) * rest(n, 0) / arm);
+    Control coast;
+    coast.steps = int(0.01 / world.dt_s);
+    double least = 1;
+    for (int i = 0; i < 60; ++i) {
+      state = propagate(world, state, coast).end;
+      const Points now = body_positions(world, state, 0);
+      double lower = -1e9, upper = 1e9;  // the fine faces that look at one another, 0.03 in the cage
+      for (int n = 0; n < world.nodes; ++n) {
+        if (rest(n, 0) < 1.2) continue;
+        if (rest(n, 1) < 0) lower = std::max(lower, now(n, 1) - 0.03);
+        if (rest(n, 1) > 0) upper = std::min(upper, now(n, 1) + 0.03);
+      }
+      least = std::min(least, upper - lower);
+    }
+    if (self_contact) {
+      EXPECT_LT(least, 0.012);
+      EXPECT_GT(least, -0.012);
+    } else {
+      EXPECT_LT(least, -0.2);
+    }
+  }
+}
+
+TEST(SurfaceContact, RefusesSurfacesThatOverlapAtTheStart) {
+  WorldSpec spec = two_balls();
+  spec.bodies[1].cage.positions.col(0).array() -= 0.03;
+  auto moved = std::make_shared<ContactShape>(*spec.bodies[1].shape);
+  moved->field.lower_m.x() -= 0.03;
+  moved->samples.positions_m.col(0).array() -= 0.03;
+  spec.bodies[1].shape = moved;
+  try {
+    build_world(spec);
+    FAIL();
+  } catch (const InputError& error) {
+    EXPECT_NE(std::string(error.what()).find("one and other overlap at the start, 0.0"), std::string::npos)
+        << error.what();
+  }
+}
+
+}  // namespace
+}  // namespace limber::fem
