@@ -35,6 +35,21 @@ void mark_tet(const TetMesh& cage, int t, plan::Workspace::Cell kind, plan::Work
       }
 }
 
+// Where the middle of a cell is inside the body's fine surface.
+void mark_surface(const DistanceField& field, plan::Workspace::Cell kind, plan::Workspace& w) {
+  Eigen::Vector3i first, last;
+  for (int i = 0; i < 3; ++i) {
+    const double lower = field.lower_m[i], upper = lower + field.cell_m * (field.nodes[std::size_t(i)] - 1);
+    first[i] = std::max(0, int(std::ceil((lower - w.box.lower[i]) / w.cell_m - 0.5)));
+    last[i] = std::min(w.cells[i] - 1, int(std::floor((upper - w.box.lower[i]) / w.cell_m - 0.5)));
+  }
+  for (int z = first.z(); z <= last.z(); ++z)
+    for (int y = first.y(); y <= last.y(); ++y)
+      for (int x = first.x(); x <= last.x(); ++x)
+        if (field.at(w.box.lower + w.cell_m * Vec3(x + 0.5, y + 0.5, z + 0.5)) < 0)
+          w.what[std::size_t((z * w.cells.y() + y) * w.cells.x() + x)] = kind;
+}
+
 }  // namespace
 
 plan::Workspace workspace_of(const fem::World& world) {
@@ -47,9 +62,11 @@ plan::Workspace workspace_of(const fem::World& world) {
   w.what.assign(std::size_t(w.cells.prod()), plan::Workspace::open);
   for (int b = 0; b < int(world.bodies.size()); ++b) {
     const fem::Body& body = world.bodies[std::size_t(b)];
-    const bool soft = body.kind == fem::BodyKind::deformable;
-    for (int t = 0; t < body.cage.tets.rows() && b != world.robot; ++t)
-      mark_tet(body.cage, t, soft ? plan::Workspace::soft : plan::Workspace::rigid, w);
+    if (b == world.robot) continue;
+    const auto kind =
+        body.kind == fem::BodyKind::deformable ? plan::Workspace::soft : plan::Workspace::rigid;
+    if (body.shape) mark_surface(body.shape->field, kind, w);
+    for (int t = 0; t < body.cage.tets.rows() && !body.shape; ++t) mark_tet(body.cage, t, kind, w);
   }
   return w;
 }

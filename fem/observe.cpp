@@ -55,6 +55,8 @@ double inner_radius_m(const World& world, int index) {
   const auto corner = [&](int node) -> Vec3 { return body.cage.positions.row(node); };
   Vec3 center = Vec3::Zero();
   for (int n = 0; n < body.node_count(); ++n) center += body.node_mass_kg[n] * corner(n) / body.mass_kg;
+  if (body.shape)
+    if (const double distance = body.shape->field.at(center); distance < 0) return -distance;
   double radius = std::numeric_limits<double>::infinity();
   for (const auto& t : body.surface.rowwise())
     radius = std::min(radius, detail::distance_to_triangle(center, corner(t[0]), corner(t[1]), corner(t[2])));

@@ -402,7 +402,9 @@ BodySpec read_body(const Node& table, const Box& bounds) {
   const std::string what = "bodies." + body.name;
   body.role = read_role(text(table, "role"));
   body.kind = text(table, "kind") == "rigid" ? Kind::rigid : Kind::deformable;
-  body.self_contact = flag(table, "self_contact");
+  if (table.find("contact"))
+    body.contact = text(table, "contact") == "cage" ? Contact::cage : Contact::surface;
+  if (table.find("self_contact")) body.self_contact = flag(table, "self_contact");
   body.max_volume_change = number(table, "max_volume_change");
   body.model = read_model(child(table, "model"), what);
   body.color_srgb = read_body_color(table, body.role);
@@ -695,6 +697,13 @@ FilmSpec read_film(const Node& table) {
   return film;
 }
 
+// The paper's contact, where the scene does not say otherwise.
+void touch_cages(const Node& root, Scene& scene) {
+  for (const Node& table : list(root, "bodies"))
+    for (BodySpec& body : scene.bodies)
+      if (body.name == text(table, "name") && !table.find("contact")) body.contact = Contact::cage;
+}
+
 }  // namespace
 
 Vec3 axis_named(const std::string& name) { return (name[0] == '-' ? -1.0 : 1.0) * Vec3::Unit(name[1] - 'x'); }
@@ -718,11 +727,13 @@ Scene read_scene(const std::string& toml, const std::string& name_for_messages,
   scene.walls = flag(world, "walls");
   scene.rest_speed_m_s = number(world, "rest_speed_m_s");
   scene.gravity_m_s2 = vector(world, "gravity_m_s2");
+  scene.contact_offset_m = maybe_number(world, "contact_offset_m");
   scene.max_dt_s = maybe_number(world, "max_dt_s");
   read_bodies(root, scene);
   scene.via = read_via(root, scene);
   scene.goal = read_goal(root, scene);
   scene.planner = read_planner(child(root, "planner"));
+  if (scene.planner.preset == "paper") touch_cages(root, scene);
   scene.cameras = read_cameras(root, scene);
   scene.film = read_film(child(root, "film"));
   scene.text = toml;

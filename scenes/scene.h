@@ -14,6 +14,7 @@
 namespace limber::scenes {
 
 enum class Role { robot, obstacle, free, scenery };
+enum class Contact { surface, cage };  // where a body is touched
 enum class Kind {
   deformable,
   rigid
@@ -99,7 +100,8 @@ struct BodySpec {
   std::string name;  // letters, digits, _ and -: it names a folder
   Role role = Role::obstacle;
   Kind kind = Kind::deformable;
-  bool self_contact = false;       // parts of it that are not neighbours push one another apart
+  Contact contact = Contact::surface;
+  std::optional<bool> self_contact;  // parts of it push one another apart; nothing: wherever it can reach itself
   double max_volume_change = 0.1;  // |V − V0|/V0 in all states of a plan, in (0, 1]
   Model model;
   CageSpec cage;
@@ -200,6 +202,7 @@ struct Scene {
   bool walls = true;  // the bounds are closed by rigid walls
   Vec3 gravity_m_s2 = Vec3::Zero();
   double rest_speed_m_s = 0;
+  std::optional<double> contact_offset_m;  // surfaces that near push each other
   std::optional<double> max_dt_s;  // only ever lowers the automatic time step
   std::vector<BodySpec> bodies;
   int robot = -1;        // index of the one body whose role is robot

@@ -606,10 +606,11 @@ std::string all_of(const Scene& s) {
   const auto b = [&](const Box& x) { return v(x.lower) + v(x.upper); };
   std::string t = fmt::format("{} {} {} {} {} {} {}\n", s.name, s.description, b(s.bounds_m), s.walls,
                               v(s.gravity_m_s2), s.rest_speed_m_s, s.max_dt_s.value_or(-1));
+  t += fmt::format("{}\n", s.contact_offset_m.value_or(-1));
   for (const BodySpec& body : s.bodies) {
     const MaterialSpec& m = body.material;
     t += fmt::format("{} {} {} {} {} | {} {} {} {} {} | {} {} {} {} {} {} {} | {} {} {} {} | {}", body.name,
-                     int(body.role), int(body.kind), body.self_contact, all_of(body.model), body.cage.tets,
+                     int(body.role), int(body.kind), 4 * int(body.contact) + int(body.self_contact.value_or(2)), all_of(body.model), body.cage.tets,
                      v(body.cage.cells), body.cage.cell_m, body.cage.mode, body.cage.shells, m.model,
                      m.youngs_modulus_pa, m.poisson_ratio, m.density_kg_m3, m.damping_ratio, m.friction,
                      m.mesh_independent, v(body.pose.position_m), v(body.pose.axis), body.pose.angle_deg,
