@@ -15,7 +15,7 @@ constexpr std::string_view npy_magic("\x93NUMPY\x01\x00", 8);
 
 std::size_t item_size(std::string_view dtype) {
   for (const auto& [name, size] :
-       {std::pair{"<f4", 4}, {"<f8", 8}, {"<i4", 4}, {"<i8", 8}, {"<u8", 8}, {"|u1", 1}})
+       {std::pair{"<f4", 4}, {"<f8", 8}, {"<i2", 2}, {"<i4", 4}, {"<i8", 8}, {"<u8", 8}, {"|u1", 1}})
     if (dtype == name) return std::size_t(size);
   return 0;
 }
@@ -75,6 +75,10 @@ const char* NpyArray::dtype_of<float>() {
 template <>
 const char* NpyArray::dtype_of<double>() {
   return "<f8";
+}
+template <>
+const char* NpyArray::dtype_of<std::int16_t>() {
+  return "<i2";
 }
 template <>
 const char* NpyArray::dtype_of<std::int32_t>() {

@@ -13,7 +13,7 @@
 namespace limber {
 
 struct NpyArray {
-  std::string dtype;                // "<f4", "<f8", "<i4", "<i8", "<u8", "|u1"
+  std::string dtype;                // "<f4", "<f8", "<i2", "<i4", "<i8", "<u8", "|u1"
   std::vector<std::int64_t> shape;  // C order
   std::vector<std::byte> bytes;
 
@@ -50,6 +50,8 @@ template <>
 const char* NpyArray::dtype_of<float>();
 template <>
 const char* NpyArray::dtype_of<double>();
+template <>
+const char* NpyArray::dtype_of<std::int16_t>();
 template <>
 const char* NpyArray::dtype_of<std::int32_t>();
 template <>

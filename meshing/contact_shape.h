@@ -1,0 +1,44 @@
+// What contact on the fine surface needs of a body (core/contact_shape.h), from its surface and its cage.
+// Method, figures, traps: docs/contact.md.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "core/contact_shape.h"
+#include "core/mesh.h"
+
+namespace limber::meshing {
+
+// "Size" is the longest edge of the surface's box. What is aimed at is a share of the smaller of that and
+// 6 V / A: a ball's diameter, three times a plate's thickness.
+struct ContactShapeSettings {
+  int cells = 64;                       // of the field along the longest edge, to begin with; 8 … 1000
+  int most_cells = 160;                 // where that is not good enough
+  std::int64_t most_nodes = 3'000'000;  // of the field; 1,000 or more
+  double field_error = 0.0025;          // distance that the field may have on 99 % of the surface
+  double missed_depth = 0.0025;         // of a flat body, between samples of a face that bends
+  double least_spacing = 0.008;         // of samples, over size
+  double most_spacing = 0.03;           // where the surface bends
+  double most_flat_spacing = 0.05;      // in flat faces
+  int most_samples = 4000;
+};
+
+struct ContactShapeReport {
+  int cells = 0;  // along the longest edge of the surface's box
+  std::int64_t nodes = 0;
+  double characteristic_m = 0;  // min(size, 6 V / A)
+  double error_p99_m = 0;       // of the field, at samples by their area
+  double error_max_m = 0;
+  double open_share = 0;  // of the surface: where what is inside is a matter of degree
+  double memory_mb = 0;   // of the field
+  double cpu_s = 0;
+  std::vector<std::string> warnings;
+};
+
+// Both meshes must pass validate(); the surface may be open, doubled, self-intersecting: inside is where the
+// winding number is above a half. Same input, same bytes on any number of threads.
+ContactShape make_contact_shape(const SurfaceMesh& surface, const TetMesh& cage,
+                                const ContactShapeSettings& = {}, ContactShapeReport* = nullptr);
+
+}  // namespace limber::meshing

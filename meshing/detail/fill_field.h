@@ -1,0 +1,22 @@
+// The signed distance to a surface at the nodes of a grid.
+#pragma once
+
+#include "core/contact_shape.h"
+#include "meshing/detail/nearest_triangle.h"
+#include "meshing/winding_number.h"
+
+namespace limber::meshing::detail {
+
+// The grid of cells `cell_m` wide, or wider so that it has no more than `most_nodes` nodes, that covers the
+// box and a cell more on each side; no values yet.
+DistanceField grid_over(const Box&, double cell_m, std::int64_t most_nodes);
+
+// Distance to the nearest of `surface`, up to 2 % too large where it is beyond four cells; inside is where
+// the winding number is above a half. `closed`: that it can change at the surface only. Same input, same
+// bytes on any number of threads. Returns the volume inside, by the share of each node's cell.
+double fill(const NearestTriangle& surface, const WindingNumber&, bool closed, DistanceField&);
+
+// Whether each edge is run through as often one way as the other.
+bool is_closed(const Triangles&);
+
+}  // namespace limber::meshing::detail

@@ -1,0 +1,266 @@
+#include "meshing/detail/sample_surface.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <numeric>
+
+#include "core/random.h"
+#include "core/threads.h"
+#include "meshing/detail/point_grid.h"
+
+namespace limber::meshing::detail {
+
+namespace {
+
+constexpr double probes_a_disc = 1.5, candidates_a_disc = 6;  // a square of the least spacing
+constexpr int most_candidates = 400'000;
+constexpr double same_side = 0.2;  // cosine of normals, below which points are not of one side of a sheet
+const double crease_cosine = std::cos(std::numbers::pi / 6), corner_cosine = std::cos(std::numbers::pi / 6);
+
+struct Spot {
+  Vec3 position, normal;
+};
+
+// The i-th point of a sequence spread evenly over the mesh.
+class SpotSequence {
+ public:
+  explicit SpotSequence(const SurfaceMesh& mesh) : mesh_(mesh) {
+    areas_.reserve(std::size_t(mesh.triangles.rows()));
+    double sum = 0;
+    for (int f = 0; f < mesh.triangles.rows(); ++f) areas_.push_back(sum += 0.5 * area_vector(f).norm());
+  }
+  Spot at(std::uint32_t i) const {
+    const auto bits = philox4x32({i, 0, 0, 0}, {0x636f6e74, 0x61637400});
+    const double wanted = 0x1p-32 * (bits[0] + 0.5) * areas_.back();
+    const int f =
+        int(std::min<std::ptrdiff_t>(std::upper_bound(areas_.begin(), areas_.end(), wanted) - areas_.begin(),
+                                     std::ptrdiff_t(areas_.size()) - 1));
+    double u = 0x1p-32 * bits[1], v = 0x1p-32 * bits[2];
+    if (u + v > 1) u = 1 - u, v = 1 - v;
+    const Vec3 a = corner(f, 0);
+    return {a + u * (corner(f, 1) - a) + v * (corner(f, 2) - a), area_vector(f).normalized()};
+  }
+
+ private:
+  Vec3 corner(int f, int k) const { return mesh_.positions.row(mesh_.triangles(f, k)); }
+  Vec3 area_vector(int f) const { return (corner(f, 1) - corner(f, 0)).cross(corner(f, 2) - corner(f, 0)); }
+
+  const SurfaceMesh& mesh_;
+  std::vector<double> areas_;  // of all triangles up to this
+};
+
+// How far apart samples may be, by how far the surface falls away below the tangent plane.
+class SpacingMap {
+ public:
+  SpacingMap(const SpotSequence& sequence, int count, const Box& box, const SampleSpacing& limits)
+      : limits_(limits), grid_(box, 0.5 * limits.most_m) {
+    std::vector<std::pair<int, int>> order;
+    for (int i = 0; i < count; ++i) {
+      spots_.push_back(sequence.at(std::uint32_t(i)));
+      order.emplace_back(grid_.cell_of(spots_.back().position), i);
+    }
+    std::sort(order.begin(), order.end());  // neighbours in space are neighbours in memory
+    std::vector<Spot> sorted;
+    for (const auto& [cell, i] : order) sorted.push_back(spots_[std::size_t(i)]);
+    spots_ = std::move(sorted);
+    for (const Spot& s : spots_) grid_.add(s.position);
+
+    std::vector<Vec3> smooth(spots_.size());
+    spacing_.resize(spots_.size());
+    for_all([&](std::size_t i) {
+      Vec3 sum = spots_[i].normal;
+      grid_.any_within(spots_[i].position, limits_.least_m, [&](int n, double) {
+        const Vec3& normal = spots_[std::size_t(n)].normal;
+        if (normal.dot(spots_[i].normal) > same_side) sum += normal;
+        return false;
+      });
+      smooth[i] = sum.normalized();
+    });
+    for_all([&](std::size_t i) { spacing_[i] = measured({spots_[i].position, smooth[i]}); });
+  }
+
+  double measured(const Spot& at) const {
+    double least_squared = limits_.most_m * limits_.most_m, bend = 0;
+    grid_.any_within(at.position, limits_.most_flat_m, [&](int n, double squared_distance) {
+      const Spot& other = spots_[std::size_t(n)];
+      if (other.normal.dot(at.normal) <= same_side) return false;
+      const double fall = (at.position - other.position).dot(at.normal);
+      bend = std::max(bend, std::abs(fall));
+      if (fall > 0 && squared_distance >= limits_.least_m * limits_.least_m)
+        least_squared = std::min(least_squared, squared_distance * 2 * limits_.missed_m / fall);
+      return false;
+    });
+    if (bend < 0.1 * limits_.missed_m) return limits_.most_flat_m;
+    return std::max(limits_.least_m, std::sqrt(least_squared));
+  }
+
+  // That of the nearest spot on this side of the surface.
+  double at(const Spot& p) const {
+    double nearest = 1e300, spacing = 0;
+    grid_.any_within(p.position, 2 * limits_.least_m, [&](int n, double squared_distance) {
+      if (squared_distance < nearest && spots_[std::size_t(n)].normal.dot(p.normal) > same_side)
+        nearest = squared_distance, spacing = spacing_[std::size_t(n)];
+      return false;
+    });
+    return spacing > 0 ? spacing : measured(p);
+  }
+
+ private:
+  template <class Body>
+  void for_all(Body body) const {
+    constexpr std::size_t chunk = 256;
+    parallel_for(int((spots_.size() + chunk - 1) / chunk), [&](int c) {
+      for (std::size_t i = std::size_t(c) * chunk; i < std::min(spots_.size(), std::size_t(c + 1) * chunk);
+           ++i)
+        body(i);
+    });
+  }
+
+  SampleSpacing limits_;
+  std::vector<Spot> spots_;
+  std::vector<double> spacing_;
+  PointGrid grid_;
+};
+
+// Corners that stick out, then points of the creases that do.
+std::vector<Spot> spots_that_stick_out(const SurfaceMesh& surface, const std::vector<char>& seen,
+                                       double step) {
+  struct Side {
+    int a, b, triangle, apex;
+  };
+  std::vector<Side> sides;
+  for (int f = 0; f < surface.triangles.rows(); ++f)
+    for (int k = 0; k < 3 && seen[std::size_t(f)]; ++k) {
+      const int a = surface.triangles(f, k), b = surface.triangles(f, (k + 1) % 3);
+      sides.push_back({std::min(a, b), std::max(a, b), f, surface.triangles(f, (k + 2) % 3)});
+    }
+  std::sort(sides.begin(), sides.end(), [](const Side& s, const Side& t) {
+    return std::tie(s.a, s.b, s.triangle) < std::tie(t.a, t.b, t.triangle);
+  });
+  const auto position = [&](int v) { return Vec3(surface.positions.row(v)); };
+  const auto normal_of = [&](int f) {
+    const Vec3 a = position(surface.triangles(f, 0));
+    return Vec3(
+        (position(surface.triangles(f, 1)) - a).cross(position(surface.triangles(f, 2)) - a).normalized());
+  };
+
+  struct Crease {
+    int a, b;
+    Vec3 normal;
+  };
+  std::vector<Crease> creases;
+  for (std::size_t i = 0, end; i < sides.size(); i = end) {
+    for (end = i; end < sides.size() && sides[end].a == sides[i].a && sides[end].b == sides[i].b;) ++end;
+    if (end - i != 2) continue;
+    const Side &s = sides[i], &t = sides[i + 1];
+    const Vec3 n = normal_of(s.triangle), m = normal_of(t.triangle);
+    if (n.dot(m) < crease_cosine && (position(t.apex) - position(s.a)).dot(n) < 0 && (n + m).norm() > 1e-3)
+      creases.push_back({s.a, s.b, (n + m).normalized()});
+  }
+
+  struct End {
+    int vertex, crease;
+    Vec3 away;
+  };
+  std::vector<End> ends;
+  for (int c = 0; c < int(creases.size()); ++c) {
+    const Vec3 along =
+        (position(creases[std::size_t(c)].b) - position(creases[std::size_t(c)].a)).normalized();
+    ends.push_back({creases[std::size_t(c)].a, c, along});
+    ends.push_back({creases[std::size_t(c)].b, c, -along});
+  }
+  std::stable_sort(ends.begin(), ends.end(), [](const End& s, const End& t) { return s.vertex < t.vertex; });
+  std::vector<Spot> spots;
+  for (std::size_t i = 0, end; i < ends.size(); i = end) {
+    Vec3 normal = Vec3::Zero();
+    for (end = i; end < ends.size() && ends[end].vertex == ends[i].vertex; ++end)
+      normal += creases[std::size_t(ends[end].crease)].normal;
+    const bool runs_through = end - i == 2 && ends[i].away.dot(ends[i + 1].away) < -corner_cosine;
+    if (!runs_through && normal.norm() > 1e-3)
+      spots.push_back({position(ends[i].vertex), normal.normalized()});
+  }
+  for (const Crease& c : creases) {
+    const Vec3 a = position(c.a), along = position(c.b) - a;
+    const int points = int(std::min(1e4, std::ceil(along.norm() / step)));
+    for (int k = 0; k < points; ++k) spots.push_back({a + (k + 0.5) / points * along, c.normal});
+  }
+  return spots;
+}
+
+// Of each candidate's share of the surface, to the nearest sample of its side.
+void share_area(const SpotSequence& sequence, int count, double area, const PointGrid& grid, double reach,
+                std::vector<SurfaceSample>& samples) {
+  std::vector<int> nearest(static_cast<std::size_t>(count));
+  constexpr int chunk = 256;
+  parallel_for((count + chunk - 1) / chunk, [&](int c) {
+    for (int i = c * chunk; i < std::min(count, (c + 1) * chunk); ++i) {
+      const Spot spot = sequence.at(std::uint32_t(i));
+      int found = -1;
+      for (double radius = reach; found < 0; radius *= 4) {
+        double least = 1e300;
+        grid.any_within(spot.position, radius, [&](int n, double squared_distance) {
+          const bool other_side = samples[std::size_t(n)].normal.dot(spot.normal) < 0;
+          const double cost = squared_distance + (other_side ? radius * radius : 0);
+          if (cost < least || (cost == least && n < found)) least = cost, found = n;
+          return false;
+        });
+      }
+      nearest[std::size_t(i)] = found;
+    }
+  });
+  // Each sample counts as a candidate too: none stands for nothing.
+  const double share = area / double(std::size_t(count) + samples.size());
+  for (SurfaceSample& s : samples) s.area_m2 = share;
+  for (int n : nearest) samples[std::size_t(n)].area_m2 += share;
+}
+
+}  // namespace
+
+std::vector<SurfaceSample> sample_surface(const SurfaceMesh& surface, const SeenSurface& seen,
+                                          const WindingNumber& winding, const SampleSpacing& spacing,
+                                          int most) {
+  if (!(seen.area_m2 > 0)) return {};
+  const Box box = bounding_box(seen.mesh.positions);
+  const SpotSequence sequence(seen.mesh);
+  const double discs = seen.area_m2 / (spacing.least_m * spacing.least_m);
+  const int probes = int(std::clamp(probes_a_disc * discs, 1000.0, 0.25 * most_candidates)),
+            candidates = int(std::clamp(candidates_a_disc * discs, 4000.0, 1.0 * most_candidates));
+  const SpacingMap map(sequence, probes, box, spacing);
+
+  std::vector<Spot> spots = spots_that_stick_out(surface, seen.seen, spacing.least_m / 3);
+  const std::size_t sticking_out = spots.size();
+  for (int i = 0; i < candidates; ++i) spots.push_back(sequence.at(std::uint32_t(i)));
+  std::vector<double> wanted;
+  for (const Spot& s : spots) wanted.push_back(map.at(s));
+
+  enum : char { unknown, yes, no };
+  std::vector<char> at_the_surface(sticking_out, unknown);
+  const auto sticks_out = [&](std::size_t i) {
+    char& known = at_the_surface[i];
+    if (known == unknown)
+      known =
+          parts_inside_from_outside(winding, spots[i].position, spots[i].normal, spacing.offset_m) ? yes : no;
+    return known == yes;
+  };
+  for (double scale = 1;; scale *= 1.1) {
+    const double widest = scale * spacing.most_flat_m;
+    PointGrid grid(box, 0.5 * spacing.most_m);
+    std::vector<SurfaceSample> samples;
+    for (std::size_t i = 0; i < spots.size() && int(samples.size()) <= most; ++i) {
+      const Spot& s = spots[i];
+      const bool covered = grid.any_within(s.position, scale * wanted[i], [&](int n, double) {
+        return samples[std::size_t(n)].normal.dot(s.normal) > same_side;
+      });
+      if (covered) continue;
+      if (i < sticking_out && !sticks_out(i)) continue;
+      grid.add(s.position);
+      samples.push_back({s.position, s.normal, 0});
+    }
+    if (int(samples.size()) > most) continue;
+    share_area(sequence, std::min(candidates, 100'000), seen.area_m2, grid, widest, samples);
+    return samples;
+  }
+}
+
+}  // namespace limber::meshing::detail
