@@ -20,6 +20,7 @@ std::uint64_t hash_of(const fem::World& world) {
   hasher.value(world.robot).matrix(world.bounds_m.lower).matrix(world.bounds_m.upper).value(int(world.walls));
   hasher.matrix(world.goal_shape_m);
   hasher.matrix(world.gravity_m_s2).value(world.dt_s).value(world.contact_dt_s).value(world.rest_speed_m_s);
+  for (const double offset : world.surfaces64.offset) hasher.value(offset);
   for (const fem::Body& body : world.bodies) {
     const fem::Material& m = body.material;
     hasher.value(limber::hash_of(body.cage))
@@ -32,6 +33,7 @@ std::uint64_t hash_of(const fem::World& world) {
     for (const auto* of_tets : {&body.youngs_modulus_from_tet_pa, &body.density_from_tet_kg_m3})
       for (const double v : *of_tets) hasher.value(v);
     for (const bool fixed : body.fixed) hasher.value(int(fixed));
+    if (body.shape) hasher.value(limber::hash_of(*body.shape));
   }
   return hasher.digest();
 }

@@ -8,6 +8,8 @@
 #include "core/mesh_files.h"
 #include "core/progress.h"
 #include "core/version.h"
+#include "meshing/contact_shape.h"
+#include "meshing/convex_hull.h"
 #include "meshing/simplify.h"
 #include "scenes/library.h"
 #include "scenes/models.h"
@@ -15,6 +17,10 @@
 namespace limber::app {
 
 namespace {
+
+// Surfaces that near push each other, as a share of the robot's size; a field is off by less than that nearly
+// everywhere.
+constexpr double usual_contact_offset = 0.004;
 
 // The lines of the scene that shape a body's meshes, as the user's text has them once more: a change of any
 // makes them anew.
@@ -238,6 +244,39 @@ Points goal_shape(const scenes::Scene& scene, const Points& rest) {
 
 }  // namespace
 
+namespace {
+
+// Of a body that is touched at its cage among others that are not: the cage is its surface.
+ContactShape shape_of_cage(const TetMesh& cage) {
+  return meshing::make_contact_shape({cage.positions, boundary_triangles(cage.tets)}, cage);
+}
+
+// Whether parts of a surface can meet without folding it flat: it is far from convex.
+bool can_reach_itself(const PreparedBody& body) {
+  constexpr double convex = 0.9;  // of its hull
+  const double hull = volume(meshing::convex_hull(body.surface.positions));
+  return std::abs(volume(body.surface)) < convex * hull;
+}
+
+// Contact at the fine surfaces, unless all bodies are touched at their cages.
+void set_contact(const scenes::Scene& scene, const std::vector<PreparedBody>& prepared, fem::WorldSpec& spec) {
+  const bool all_cages =
+      std::all_of(scene.bodies.begin(), scene.bodies.end(),
+                  [](const scenes::BodySpec& body) { return body.contact == scenes::Contact::cage; });
+  for (std::size_t b = 0; b < prepared.size(); ++b) {
+    const scenes::BodySpec& body = scene.bodies[b];
+    const bool on_surface = body.contact == scenes::Contact::surface && prepared[b].contact.usable;
+    if (!all_cages)
+      spec.bodies[b].shape = std::make_shared<const ContactShape>(
+          on_surface ? prepared[b].contact : shape_of_cage(prepared[b].cage));
+    spec.bodies[b].self_contact = body.self_contact.value_or(on_surface && can_reach_itself(prepared[b]));
+  }
+  const Box robot = bounding_box(prepared[std::size_t(scene.robot)].surface.positions);
+  spec.contact_offset_m = scene.contact_offset_m.value_or(usual_contact_offset * robot.size().maxCoeff());
+}
+
+}  // namespace
+
 fem::World build_world(const scenes::Scene& scene, const std::vector<PreparedBody>& prepared) {
   fem::WorldSpec spec;
   for (std::size_t b = 0; b < prepared.size(); ++b) {
@@ -255,11 +294,11 @@ fem::World build_world(const scenes::Scene& scene, const std::vector<PreparedBod
                          .mesh_independent = body.material.mesh_independent};
     fem_body.fixed_nodes = scenes::fixed_nodes(body, scene.bounds_m, prepared[b].cage.positions);
     fem_body.kind = kind_of(body);
-    fem_body.self_contact = body.self_contact;
     fem_body.max_volume_change = body.max_volume_change;
     set_parts(body, prepared[b], fem_body);
     spec.bodies.push_back(std::move(fem_body));
   }
+  set_contact(scene, prepared, spec);
   spec.robot = scene.robot;
   spec.bounds_m = scene.bounds_m;
   spec.walls = scene.walls;
