@@ -2,6 +2,7 @@
 
 #include "app/export.h"
 #include "app/preview.h"
+#include "core/contact_shape_file.h"
 #include "core/error.h"
 #include "core/events.h"
 #include "core/hash.h"
@@ -13,6 +14,7 @@
 #include "ffd/binding_file.h"
 #include "meshing/cage.h"
 #include "meshing/certificate.h"
+#include "meshing/contact_shape.h"
 #include "meshing/decompose.h"
 #include "meshing/quality.h"
 
@@ -20,7 +22,7 @@ namespace limber::app {
 
 namespace {
 
-constexpr const char* body_files[] = {"surface.ply", "shells.obj", "cage.msh", "binding.npz"};
+constexpr const char* body_files[] = {"surface.ply", "shells.obj", "cage.msh", "binding.npz", "contact.npz"};
 
 Json json_of(const PrepareSettings& s) {
   return {{"shells", s.shells}, {"concavity", s.concavity}, {"inflate", s.inflate},
@@ -126,6 +128,11 @@ Json prepare_body(const BodySource& source, const PrepareSettings& settings, con
 
   const ffd::Binding binding = ffd::bind(model.surface, cage.mesh);
   costs.end_stage("bind");
+  throw_if_stopped();
+
+  meshing::ContactShapeReport contact_report;
+  const ContactShape contact = meshing::make_contact_shape(model.surface, cage.mesh, {}, &contact_report);
+  costs.end_stage("contact");
 
   make_folder(folder);  // not before: a model that is refused leaves all as it was
   remove_abandoned(folder);
@@ -139,10 +146,12 @@ Json prepare_body(const BodySource& source, const PrepareSettings& settings, con
   write_obj(folder / "shells.obj", decomposition.shells);
   write_msh(folder / "cage.msh", cage.mesh, cage.shell_from_tet);
   ffd::write_binding(folder / "binding.npz", binding, model.surface, cage.mesh);
+  write_contact_shape(folder / "contact.npz", contact, model.surface, cage.mesh);
   costs.end_stage("write");
 
   std::vector<std::string> warnings = model.warnings;
   warnings.insert(warnings.end(), cage.notes.begin(), cage.notes.end());
+  warnings.insert(warnings.end(), contact_report.warnings.begin(), contact_report.warnings.end());
   if (certificate.vertices_outside > 0)
     warnings.push_back(fmt::format("{} vertices lie outside the cage", certificate.vertices_outside));
   if (certificate.triangles_crossing > 0)
@@ -180,6 +189,17 @@ Json prepare_body(const BodySource& source, const PrepareSettings& settings, con
   report["certificate"] = json_of(certificate);
   report["binding"] = {{"vertices_outside", binding.outside},
                        {"max_outside_distance_m", binding.max_outside_distance_m}};
+  report["contact"] = {{"usable", contact.usable},
+                       {"samples", contact.samples.tet_from_sample.size()},
+                       {"cells", contact_report.cells},
+                       {"nodes", contact_report.nodes},
+                       {"cell_m", contact.field.cell_m},
+                       {"unit_m", contact.field.unit_m},
+                       {"characteristic_m", contact_report.characteristic_m},
+                       {"error_p99_m", contact_report.error_p99_m},
+                       {"error_max_m", contact_report.error_max_m},
+                       {"open_share", contact_report.open_share},
+                       {"memory_mb", contact_report.memory_mb}};
   report["cpu_seconds"] = costs.cpu_s;
   report["peak_memory_mb_after"] = costs.peak_mb;
   report["peak_memory_mb"] = std::round(peak_memory_mb());
@@ -200,6 +220,7 @@ PreparedBody read_body(const fs::path& folder) {
     body.surface = read_ply(folder / "surface.ply");
     body.cage = read_msh(folder / "cage.msh", &body.shell_from_tet);
     body.binding = ffd::read_binding(folder / "binding.npz", body.surface, body.cage);
+    body.contact = read_contact_shape(folder / "contact.npz", body.surface, body.cage);
   } catch (const InputError& error) {
     throw InputError(fmt::format(
         "{}; make the body anew with limber prepare, or the scene's bodies with limber plan", error.what()));
@@ -214,7 +235,7 @@ PreparedBody read_body(const fs::path& folder) {
 
 std::string summary_of_report(const Json& report) {
   const Json &surface = report.at("surface"), &shells = report.at("shells"), &cage = report.at("cage"),
-             &certificate = report.at("certificate");
+             &certificate = report.at("certificate"), &contact = report.at("contact");
   std::string text = fmt::format(
       "{}\n"
       "  surface      {} vertices, {} triangles\n"
@@ -231,6 +252,14 @@ std::string summary_of_report(const Json& report) {
       certificate.at("holds").get<bool>() ? "holds" : "does NOT hold",
       certificate.at("vertices_outside").get<int>(), certificate.at("triangles_crossing").get<int>(),
       certificate.at("nonmanifold_edges").get<int>(), certificate.at("nonmanifold_vertices").get<int>());
+  text += contact.at("usable").get<bool>()
+              ? fmt::format(
+                    "  contact      {} samples; field of {} cells along the longest edge ({:.1f} MB), off by "
+                    "{:.2g} m on 99 % of the surface, {:.2g} m at worst\n",
+                    contact.at("samples").get<int>(), contact.at("cells").get<int>(),
+                    contact.at("memory_mb").get<double>(), contact.at("error_p99_m").get<double>(),
+                    contact.at("error_max_m").get<double>())
+              : "  contact      by the cage\n";
   for (const Json& sentence : report.at("mended"))
     text += fmt::format("  mended       {}\n", sentence.get<std::string>());
   for (const Json& sentence : report.at("warnings"))

@@ -1,10 +1,12 @@
-// A body's folder: surface.ply, shells.obj, cage.msh, binding.npz, report.json. See docs/files.md.
+// A body's folder: surface.ply, shells.obj, cage.msh, binding.npz, contact.npz, report.json. See
+// docs/files.md.
 #pragma once
 
 #include <functional>
 #include <optional>
 #include <string>
 
+#include "core/contact_shape.h"
 #include "core/file.h"
 #include "core/json.h"
 #include "core/mesh.h"
@@ -33,7 +35,7 @@ struct BodySource {
   };  // a box in cells brings its own
 };
 
-// Writes the five files and returns the report; leaves a folder that is up to date as it is.
+// Writes the six files and returns the report; leaves a folder that is up to date as it is.
 Json prepare_body(const BodySource&, const PrepareSettings&, const fs::path& folder);
 
 struct PreparedBody {
@@ -41,6 +43,7 @@ struct PreparedBody {
   TetMesh cage;
   std::vector<int> shell_from_tet;  // (T)
   ffd::Binding binding;
+  ContactShape contact;
   Json report;
 };
 // Throws InputError naming the file and the command that renews it when one is missing, damaged, or of

@@ -247,7 +247,7 @@ int run_command_line(int argc, const char* const* argv) {
       ->required();
   prepare_command
       .add_option("-o,--out", prepare_options.out,
-                  "folder for surface.ply, shells.obj, cage.msh, binding.npz, report.json")
+                  "folder for surface.ply, shells.obj, cage.msh, binding.npz, contact.npz, report.json")
       ->required()
       ->type_name("DIR");
   prepare_command.add_option("--shells", prepare_options.shells, "convex shells, at most; 1 … 1000")

@@ -10,6 +10,7 @@
 #include "core/threads.h"
 #include "meshing/detail/box_tree.h"
 #include "meshing/detail/fill_field.h"
+#include "meshing/detail/nearest_on_triangle.h"
 #include "meshing/detail/sample_surface.h"
 #include "meshing/detail/seen_surface.h"
 
@@ -62,9 +63,7 @@ Box box_of(const TetCoordinates& coordinates, int tet) {
 class TetFinder {
  public:
   TetFinder(const TetMesh& cage, const TetCoordinates& coordinates)
-      : coordinates_(coordinates),
-        tree_(boxes(cage, coordinates)),
-        faces_(cage.positions, faces_of(cage.tets)) {}
+      : coordinates_(coordinates), tree_(boxes(cage, coordinates)) {}
 
   std::pair<int, Weights4> find(const Vec3& p) const {
     constexpr double tolerance = 1e-9, least_weight = -1;
@@ -78,7 +77,12 @@ class TetFinder {
           return false;
         });
     if (tet >= 0) return {tet, coordinates_.at(tet, p)};
-    tet = faces_.at(p).triangle / 4;
+    double least = 1e300;
+    tree_.nearest(p, least, [&](int t) {
+      const double d = squared_distance(t, p);
+      if (d < least || (d == least && t < tet)) least = d, tet = t;
+      return least;
+    });
     const Weights4 there = coordinates_.at(tet, p);
     if (there.minCoeff() >= least_weight) return {tet, there};
     // From the middle of the tet outwards, as far as the clamp allows.
@@ -92,18 +96,19 @@ class TetFinder {
     for (int t = 0; t < cage.tets.rows(); ++t) all.push_back(box_of(coordinates, t));
     return all;
   }
-  // Four of each tet.
-  static Triangles faces_of(const Tets& tets) {
-    Triangles faces(4 * tets.rows(), 3);
-    for (Eigen::Index t = 0; t < tets.rows(); ++t)
-      for (int k = 0; k < 4; ++k)
-        faces.row(4 * t + k) << tets(t, (k + 1) % 4), tets(t, (k + 2) % 4), tets(t, (k + 3) % 4);
-    return faces;
+  // Of a point outside.
+  double squared_distance(int tet, const Vec3& p) const {
+    double least = 1e300;
+    for (int k = 0; k < 4; ++k) {
+      const auto corner = [&](int c) { return coordinates_.corner(tet, (k + c) % 4); };
+      least = std::min(least,
+                       (detail::nearest_on_triangle(corner(1), corner(2), corner(3), p) - p).squaredNorm());
+    }
+    return least;
   }
 
   const TetCoordinates& coordinates_;
   detail::BoxTree tree_;
-  detail::NearestTriangle faces_;
 };
 
 SurfaceSamples bound(const std::vector<detail::SurfaceSample>& samples, const TetMesh& cage,
@@ -261,7 +266,6 @@ ContactShape make_contact_shape(const SurfaceMesh& surface, const TetMesh& cage,
       "or close it";
   if (!(seen.area_m2 > 0)) return give_up(no_inside);
 
-  const detail::NearestTriangle nearest(seen.mesh.positions, seen.mesh.triangles);
   const bool closed = detail::is_closed(surface.triangles);
   ContactShape shape;
   std::vector<detail::SurfaceSample> samples;
@@ -269,7 +273,7 @@ ContactShape make_contact_shape(const SurfaceMesh& surface, const TetMesh& cage,
   double thickness = 0;  // of a plate of this volume and area
   while (true) {
     shape.field = detail::grid_over(box, size / cells, settings.most_nodes);
-    const double volume = detail::fill(nearest, winding, closed, shape.field);
+    const double volume = detail::fill(seen, winding, closed, shape.field);
     thickness = 2 * volume / seen.area_m2;
     if (samples.empty()) {
       r.characteristic_m = std::min(size, 3 * thickness);
@@ -281,6 +285,7 @@ ContactShape make_contact_shape(const SurfaceMesh& surface, const TetMesh& cage,
                                         .most_flat_m = settings.most_flat_spacing * size,
                                         .offset_m = offset},
                                        settings.most_samples);
+      if (samples.empty()) return give_up(no_inside);
     }
     std::tie(r.error_p99_m, r.error_max_m) = errors(shape.field, samples);
     const bool good = r.error_p99_m <= settings.field_error * r.characteristic_m &&

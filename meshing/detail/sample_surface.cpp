@@ -22,32 +22,27 @@ struct Spot {
   Vec3 position, normal;
 };
 
-// The i-th point of a sequence spread evenly over the mesh.
+// The i-th point of a sequence spread evenly over what is seen.
 class SpotSequence {
  public:
-  explicit SpotSequence(const SurfaceMesh& mesh) : mesh_(mesh) {
-    areas_.reserve(std::size_t(mesh.triangles.rows()));
+  explicit SpotSequence(const SeenSurface& surface) : pieces_(surface.pieces) {
     double sum = 0;
-    for (int f = 0; f < mesh.triangles.rows(); ++f) areas_.push_back(sum += 0.5 * area_vector(f).norm());
+    for (const SurfacePiece& p : pieces_) areas_.push_back(sum += p.seen ? p.area_vector().norm() : 0);
   }
   Spot at(std::uint32_t i) const {
-    const auto bits = philox4x32({i, 0, 0, 0}, {0x636f6e74, 0x61637400});
+    const auto bits = philox4x32({i, 0, 0, 0}, {0, 0});
     const double wanted = 0x1p-32 * (bits[0] + 0.5) * areas_.back();
-    const int f =
-        int(std::min<std::ptrdiff_t>(std::upper_bound(areas_.begin(), areas_.end(), wanted) - areas_.begin(),
-                                     std::ptrdiff_t(areas_.size()) - 1));
+    const auto found = std::upper_bound(areas_.begin(), areas_.end() - 1, wanted) - areas_.begin();
+    const SurfacePiece& piece = pieces_[std::size_t(found)];
     double u = 0x1p-32 * bits[1], v = 0x1p-32 * bits[2];
     if (u + v > 1) u = 1 - u, v = 1 - v;
-    const Vec3 a = corner(f, 0);
-    return {a + u * (corner(f, 1) - a) + v * (corner(f, 2) - a), area_vector(f).normalized()};
+    const auto& [a, b, c] = piece.corners;
+    return {a + u * (b - a) + v * (c - a), piece.area_vector().normalized()};
   }
 
  private:
-  Vec3 corner(int f, int k) const { return mesh_.positions.row(mesh_.triangles(f, k)); }
-  Vec3 area_vector(int f) const { return (corner(f, 1) - corner(f, 0)).cross(corner(f, 2) - corner(f, 0)); }
-
-  const SurfaceMesh& mesh_;
-  std::vector<double> areas_;  // of all triangles up to this
+  const std::vector<SurfacePiece>& pieces_;
+  std::vector<double> areas_;  // seen, of all pieces up to this
 };
 
 // How far apart samples may be, by how far the surface falls away below the tangent plane.
@@ -221,8 +216,8 @@ std::vector<SurfaceSample> sample_surface(const SurfaceMesh& surface, const Seen
                                           const WindingNumber& winding, const SampleSpacing& spacing,
                                           int most) {
   if (!(seen.area_m2 > 0)) return {};
-  const Box box = bounding_box(seen.mesh.positions);
-  const SpotSequence sequence(seen.mesh);
+  const Box box = bounding_box(surface.positions);
+  const SpotSequence sequence(seen);
   const double discs = seen.area_m2 / (spacing.least_m * spacing.least_m);
   const int probes = int(std::clamp(probes_a_disc * discs, 1000.0, 0.25 * most_candidates)),
             candidates = int(std::clamp(candidates_a_disc * discs, 4000.0, 1.0 * most_candidates));
@@ -258,6 +253,7 @@ std::vector<SurfaceSample> sample_surface(const SurfaceMesh& surface, const Seen
       samples.push_back({s.position, s.normal, 0});
     }
     if (int(samples.size()) > most) continue;
+    if (samples.empty()) return {};
     share_area(sequence, std::min(candidates, 100'000), seen.area_m2, grid, widest, samples);
     return samples;
   }

@@ -320,7 +320,8 @@ TEST_F(Program, PrepareReportsAndVerifyProvesAgain) {
   EXPECT_TRUE(prepared.json().at("certificate").at("holds").get<bool>());
   EXPECT_EQ(limber_program({"verify", out()}).code, exit_done);
   EXPECT_EQ(limber_program({"info", out()}).code, exit_done);
-  for (const char* name : {"surface.ply", "shells.obj", "cage.msh", "binding.npz", "report.json"})
+  for (const char* name :
+       {"surface.ply", "shells.obj", "cage.msh", "binding.npz", "contact.npz", "report.json"})
     EXPECT_EQ(limber_program({"info", (fs::path(out()) / name).string()}).code, exit_done) << name;
 }
 
