@@ -254,12 +254,13 @@ ContactShape shape_of_cage(const TetMesh& cage) {
 // Whether parts of a surface can meet without folding it flat: it is far from convex.
 bool can_reach_itself(const PreparedBody& body) {
   constexpr double convex = 0.9;  // of its hull
-  const double hull = volume(meshing::convex_hull(body.surface.positions));
-  return std::abs(volume(body.surface)) < convex * hull;
+  const ConvexShell hull = meshing::convex_hull(body.surface.positions);
+  return std::abs(volume(body.surface)) < convex * volume(SurfaceMesh{hull.vertices, hull.triangles});
 }
 
 // Contact at the fine surfaces, unless all bodies are touched at their cages.
-void set_contact(const scenes::Scene& scene, const std::vector<PreparedBody>& prepared, fem::WorldSpec& spec) {
+void set_contact(const scenes::Scene& scene, const std::vector<PreparedBody>& prepared,
+                 fem::WorldSpec& spec) {
   const bool all_cages =
       std::all_of(scene.bodies.begin(), scene.bodies.end(),
                   [](const scenes::BodySpec& body) { return body.contact == scenes::Contact::cage; });

@@ -27,6 +27,23 @@ std::uint64_t hash_of(std::string_view bytes) { return XXH3_64bits(bytes.data(),
 std::uint64_t hash_of(const SurfaceMesh& mesh) {
   return Hasher().matrix(mesh.positions).matrix(mesh.triangles).digest();
 }
+std::uint64_t hash_of(const ContactShape& shape) {
+  const auto& [field, samples, least_weight, usable] = shape;
+  return Hasher()
+      .matrix(field.lower_m)
+      .value(field.cell_m)
+      .value(field.unit_m)
+      .values(std::span<const int>(field.nodes))
+      .values(std::span<const std::int16_t>(field.values))
+      .matrix(samples.positions_m)
+      .matrix(samples.tet_from_sample)
+      .matrix(samples.weights)
+      .matrix(samples.area_m2)
+      .matrix(least_weight)
+      .value(int(usable))
+      .digest();
+}
+
 std::uint64_t hash_of(const TetMesh& mesh) {
   return Hasher().matrix(mesh.positions).matrix(mesh.tets).digest();
 }

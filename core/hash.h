@@ -7,6 +7,7 @@
 #include <string>
 #include <string_view>
 
+#include "core/contact_shape.h"
 #include "core/mesh.h"
 
 namespace limber {
@@ -38,6 +39,7 @@ class Hasher {
 std::uint64_t hash_of(std::string_view bytes);
 std::uint64_t hash_of(const SurfaceMesh&);
 std::uint64_t hash_of(const TetMesh&);
+std::uint64_t hash_of(const ContactShape&);
 std::string hex(std::uint64_t);  // 16 lower-case digits
 // Throws InputError when the text is not 16 hexadecimal digits.
 std::uint64_t hash_from_hex(std::string_view);

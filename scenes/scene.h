@@ -101,7 +101,8 @@ struct BodySpec {
   Role role = Role::obstacle;
   Kind kind = Kind::deformable;
   Contact contact = Contact::surface;
-  std::optional<bool> self_contact;  // parts of it push one another apart; nothing: wherever it can reach itself
+  std::optional<bool>
+      self_contact;  // parts of it push one another apart; nothing: wherever it can reach itself
   double max_volume_change = 0.1;  // |V − V0|/V0 in all states of a plan, in (0, 1]
   Model model;
   CageSpec cage;
@@ -203,7 +204,7 @@ struct Scene {
   Vec3 gravity_m_s2 = Vec3::Zero();
   double rest_speed_m_s = 0;
   std::optional<double> contact_offset_m;  // surfaces that near push each other
-  std::optional<double> max_dt_s;  // only ever lowers the automatic time step
+  std::optional<double> max_dt_s;          // only ever lowers the automatic time step
   std::vector<BodySpec> bodies;
   int robot = -1;        // index of the one body whose role is robot
   std::vector<Via> via;  // goals that are reached before the last, in this order

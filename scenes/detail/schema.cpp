@@ -37,7 +37,8 @@ constexpr Key all_keys[] = {
      {0, 1},
      0,
      may_lack,
-     "m; fine surfaces that near push each other; else 0.4 % of the longest edge of the robot's box, or the gap of two "
+     "m; fine surfaces that near push each other; else 0.4 % of the longest edge of the robot's box, or the "
+     "gap of two "
      "bodies at the start where that is less",
      "",
      ""},
@@ -88,7 +89,8 @@ constexpr Key all_keys[] = {
      {},
      0,
      may_lack,
-     "where it is touched: at its fine surface, or, as in the paper, at its cage; else `\"surface\"`, and with "
+     "where it is touched: at its fine surface, or, as in the paper, at its cage; else `\"surface\"`, and "
+     "with "
      "`planner.preset = \"paper\"` `\"cage\"`",
      "surface, cage",
      ""},
@@ -97,7 +99,8 @@ constexpr Key all_keys[] = {
      {},
      0,
      may_lack,
-     "parts of a deformable body push one another apart; else wherever a body that is touched at its surface can "
+     "parts of a deformable body push one another apart; else wherever a body that is touched at its surface "
+     "can "
      "reach itself: it fills less than nine tenths of its convex hull",
      "",
      ""},
