@@ -17,10 +17,10 @@ struct ContactShapeSettings {
   int most_cells = 160;                 // where that is not good enough
   std::int64_t most_nodes = 3'000'000;  // of the field; 1,000 or more
   double field_error = 0.0025;          // distance that the field may have on 99 % of the surface
-  double missed_depth = 0.0025;         // of a flat body, between samples of a face that bends
+  double missed_depth = 0.005;          // of a flat body, between samples of a face that bends
   double least_spacing = 0.008;         // of samples, over size
-  double most_spacing = 0.03;           // where the surface bends
-  double most_flat_spacing = 0.05;      // in flat faces
+  double most_spacing = 0.06;           // where the surface bends
+  double most_flat_spacing = 0.10;      // in flat faces
   int most_samples = 4000;
 };
 

@@ -59,13 +59,29 @@ void append(const Body& body, double offset_m, const Topology& topology, Tables6
       out.reach_factor = std::max(out.reach_factor, reach_factor(core));
     }
     tables.first_sample.push_back(int(tables.samples.size()));
-    for (; s < samples.positions_m.rows() && samples.tet_from_sample[s] == t; ++s) {
-      Tables64::Sample& sample = tables.samples.emplace_back();
-      sample.tet = tet, sample.area = samples.area_m2[s];
-      std::copy_n(topology.tets[std::size_t(tet)].node, 4, sample.node);
-      std::copy_n(&samples.weights(s, 0), 4, sample.weight);
-      out.reach_factor = std::max(out.reach_factor, samples.weights.row(s).cwiseAbs().sum());
+    const auto& nodes = topology.tets[std::size_t(tet)].node;
+    Eigen::Index end = s;
+    while (end < samples.positions_m.rows() && samples.tet_from_sample[end] == t) ++end;
+    const auto held = [&](Eigen::Index k) {
+      for (int i = 0; i < 4; ++i)
+        if (!body.fixed[std::size_t(nodes[i] - body.first_node)] && std::abs(samples.weights(k, i)) > 1e-6)
+          return false;
+      return true;
+    };
+    for (const bool which : {false, true}) {
+      for (Eigen::Index k = s; k < end; ++k) {
+        if (held(k) != which) continue;
+        auto& sample = tables.samples.emplace_back();
+        sample.tet = tet, sample.area = samples.area_m2[k];
+        std::copy_n(nodes, 4, sample.node);
+        std::copy_n(&samples.weights(k, 0), 4, sample.weight);
+        for (int i = 0; i < 4; ++i) tables.weights[i].push_back(samples.weights(k, i));
+        out.reach_factor = std::max(out.reach_factor, samples.weights.row(k).cwiseAbs().sum());
+      }
+      if (!which) tables.first_held_sample.push_back(int(tables.samples.size()));
     }
+    s = end;
+    if (tables.first_held_sample.back() > tables.first_sample.back()) out.wall_tets.push_back(tet);
     if (tables.first_sample.back() < int(tables.samples.size())) out.sampled_tets.push_back(tet);
   }
   LIMBER_CHECK(s == samples.positions_m.rows(), s, samples.positions_m.rows());
@@ -85,7 +101,9 @@ SurfaceTables<float> single_precision(const Tables64& t) {
     std::copy_n(s.node, 4, copy.node), std::copy_n(s.weight, 4, copy.weight);
     copy.tet = s.tet, copy.area = float(s.area);
   }
-  out.first_sample = t.first_sample;
+  for (int i = 0; i < 4; ++i) out.weights[i].assign(t.weights[i].begin(), t.weights[i].end());
+  out.first_sample = t.first_sample, out.first_held_sample = t.first_held_sample;
+  out.wall_slack = float(t.wall_slack);
   for (const auto& c : t.cores) {
     auto& copy = out.cores.emplace_back();
     std::copy_n(c.least, 4, copy.least), copy.scale = float(c.scale);
@@ -97,6 +115,7 @@ SurfaceTables<float> single_precision(const Tables64& t) {
     copy.field.inverse_cell = float(b.field.inverse_cell), copy.field.unit = float(b.field.unit);
     copy.reach_factor = 1.0001f * float(b.reach_factor);
     copy.sampled_tets = b.sampled_tets, copy.cored_tets = b.cored_tets;
+    copy.wall_tets = b.wall_tets;
   }
   out.offset.assign(t.offset.begin(), t.offset.end());
   out.tets_round_node = t.tets_round_node;
@@ -146,6 +165,7 @@ void make_surface_tables(double offset_m, World& world) {
     }
   tables.first_sample.push_back(int(tables.samples.size()));
   const std::size_t bodies = world.bodies.size();
+  tables.wall_slack = 0.05 * offset_m;
   tables.offset.assign(bodies * bodies, offset_m);
   tables.offset = gaps_at_rest(world, offset_m);
   for (std::size_t a = 0; a < bodies; ++a)

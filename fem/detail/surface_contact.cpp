@@ -80,6 +80,7 @@ SurfaceContacts<Real>::SurfaceContacts(const World& world, const Kernels<Real>& 
       bodies_(int(world.bodies.size())),
       world_nodes_(world.nodes),
       first_sample_row_(world.nodes + 4 * int(world.topology.tets.size())),
+      first_sample_stamp_(world.nodes + int(world.topology.tets.size())),
       step_(Real(world.contact_dt_s)) {
   for (int a = 0; a < bodies_; ++a) {
     if (world.bodies[a].moving && world.bodies[a].self_contact) pairs_.emplace_back(a, a);
@@ -95,6 +96,10 @@ SurfaceContacts<Real>::SurfaceContacts(const World& world, const Kernels<Real>& 
   stamps_.assign(std::size_t(world_nodes_) + tets + samples, 0);
   loads_.assign(std::size_t(world_nodes_), 0);
   beside_.assign(tets, 0);
+  walls_asleep_until_.resize(self_travel_.size());
+  for (int k = 0; k < lanes * bodies_; ++k)
+    walls_asleep_until_[k].assign(surface_.bodies[k % bodies_].wall_tets.size() + block_size,
+                                  std::numeric_limits<Real>::lowest());
 }
 
 template <class Real>
@@ -105,31 +110,33 @@ bool SurfaceContacts<Real>::is_rigid(int body) const {
 template <class Real>
 void SurfaceContacts<Real>::forget(int lane) {
   for (std::size_t p = 0; p < pairs_.size(); ++p) lists_[lane * pairs_.size() + p].built = false;
+  for (int body = 0; body < bodies_; ++body) {
+    auto& walls = walls_asleep_until_[lane * bodies_ + body];
+    std::fill(walls.begin(), walls.end(), std::numeric_limits<Real>::lowest());
+  }
 }
 
 template <class Real>
-const Real* SurfaceContacts<Real>::node_place(const LaneView<Real>& view, int node) {
-  Real* at = places_[node].at;
-  if (stamps_[node] == stamp_) return at;
+auto SurfaceContacts<Real>::node_place(const LaneView<Real>& view, int node) -> const Place& {
+  Place& place = places_[node];
+  if (stamps_[node] == stamp_) return place;
   stamps_[node] = stamp_;
-  for (int c = 0; c < 3; ++c) at[c] = view.x[view.state.at(node, c)];
-  return at;
+  const Real* x = view.x + view.state.at(node, 0);
+  place.row = Row{x[0], x[view.state.component], x[2 * view.state.component], 0};
+  return place;
 }
 
 template <class Real>
-const Real* SurfaceContacts<Real>::sample_place(const LaneView<Real>& view, int index) {
-  Real* at = places_[row_of_sample(index)].at;
-  unsigned& stamp = stamps_[world_nodes_ + int(topology_.tets.size()) + index];
-  if (stamp == stamp_) return at;
+auto SurfaceContacts<Real>::sample_place(const LaneView<Real>& view, int index) -> const Place& {
+  Place& place = places_[row_of_sample(index)];
+  unsigned& stamp = stamps_[first_sample_stamp_ + index];
+  if (stamp == stamp_) return place;
   stamp = stamp_;
   const typename Tables::Sample& sample = surface_.samples[index];
-  Real place[3] = {0, 0, 0};
-  for (int i = 0; i < 4; ++i) {
-    const Real* node = node_place(view, sample.node[i]);
-    for (int c = 0; c < 3; ++c) place[c] += sample.weight[i] * node[c];
-  }
-  std::copy_n(place, 3, at);
-  return at;
+  Row sum = sample.weight[0] * node_place(view, sample.node[0]).row;
+  for (int i = 1; i < 4; ++i) sum += sample.weight[i] * node_place(view, sample.node[i]).row;
+  place.row = sum;
+  return place;
 }
 
 template <class Real>
@@ -138,14 +145,10 @@ void SurfaceContacts<Real>::find_core(const LaneView<Real>& view, int tet) {
   if (stamp == stamp_) return;
   stamp = stamp_;
   const typename Tables::Core& core = surface_.cores[tet];
-  const Real* corner[4];
-  Real base[3] = {0, 0, 0};
-  for (int i = 0; i < 4; ++i) {
-    corner[i] = node_place(view, topology_.tets[tet].node[i]);
-    for (int c = 0; c < 3; ++c) base[c] += core.least[i] * corner[i][c];
-  }
-  for (int i = 0; i < 4; ++i)
-    for (int c = 0; c < 3; ++c) places_[row_of_core(tet) + i].at[c] = base[c] + core.scale * corner[i][c];
+  const int* node = topology_.tets[tet].node;
+  Row corner[4], base = core.least[0] * (corner[0] = node_place(view, node[0]).row);
+  for (int i = 1; i < 4; ++i) base += core.least[i] * (corner[i] = node_place(view, node[i]).row);
+  for (int i = 0; i < 4; ++i) places_[row_of_core(tet) + i].row = base + core.scale * corner[i];
 }
 
 // How far points of the two bodies can have come to one another since the lane was loaded.
@@ -163,7 +166,7 @@ void SurfaceContacts<Real>::add_forces(int lane, const LaneView<Real>& view) {
   share_loads(view);
   for (const SurfaceTouch<Real>& touch : touches_) respond(view, touch);
   for (const SurfaceTouch<Real>& touch : touches_)
-    for (const int node : touch.node) loads_[node] = 0;
+    for (int i = 0; i < touch.nodes; ++i) loads_[touch.node[i]] = 0;
 }
 
 template <class Real>
@@ -172,7 +175,7 @@ const std::vector<SurfaceTouch<Real>>& SurfaceContacts<Real>::find(int lane, con
   touches_.clear();
   for (std::size_t p = 0; p < pairs_.size(); ++p) find_pair(lane, view, p);
   for (int body = 0; body < bodies_ && world_.walls; ++body)
-    if (topology_.bodies[body].moving && !view.sleeps(body)) find_walls(view, body);
+    if (topology_.bodies[body].moving && !view.sleeps(body)) find_walls(lane, view, body);
   return touches_;
 }
 
@@ -224,7 +227,7 @@ void SurfaceContacts<Real>::collect_groups(const LaneView<Real>& view, int from,
   for (const int tet : surface_.bodies[from].sampled_tets) {
     Real least[3], most[3];
     for (int i = 0; i < 4; ++i) {
-      const Real* at = node_place(view, topology_.tets[tet].node[i]);
+      const Real* at = node_place(view, topology_.tets[tet].node[i]).at;
       for (int c = 0; c < 3; ++c) {
         least[c] = i == 0 ? at[c] : std::min(least[c], at[c]);
         most[c] = i == 0 ? at[c] : std::max(most[c], at[c]);
@@ -235,7 +238,7 @@ void SurfaceContacts<Real>::collect_groups(const LaneView<Real>& view, int from,
     if (!boxes_meet(least, most, lower, upper)) continue;
     Group group{tet, int(sample_of_column_.size()), 0, {}, {}};
     for (int s = surface_.first_sample[tet]; s < surface_.first_sample[tet + 1]; ++s) {
-      const Real* at = sample_place(view, s);
+      const Real* at = sample_place(view, s).at;
       bool near = true;
       for (int c = 0; c < 3; ++c) near &= at[c] >= lower[c] - reach && at[c] <= upper[c] + reach;
       if (!near) continue;
@@ -286,7 +289,7 @@ void SurfaceContacts<Real>::build(const LaneView<Real>& view, int from, int into
     }
   }
   planes_.resize((near_tets_.size() + block_size - 1) / block_size);
-  kernels_.find_planes(near_tets_.data(), int(near_tets_.size()), places_[0].at, reach, planes_.data());
+  kernels_.find_planes(near_tets_.data(), int(near_tets_.size()), &places_[0].at[0], reach, planes_.data());
   const auto mark_beside = [&](int tet, unsigned char mark) {
     for (const int node : topology_.tets[tet].node)
       for (const int other : surface_.tets_round_node[node]) beside_[other] = mark;
@@ -339,7 +342,8 @@ void SurfaceContacts<Real>::find_in(const LaneView<Real>& view, int from, int in
     find_core(view, near.candidates[awake_[i]].tet);
     sample_place(view, near.candidates[awake_[i]].point);
   }
-  kernels_.middle_distances(near.candidates.data(), awake_.data(), awake, places_[0].at, distance_.data());
+  kernels_.middle_distances(near.candidates.data(), awake_.data(), awake, &places_[0].at[0],
+                            distance_.data());
   for (int i = 0; i < awake;) {
     const int sample = near.candidates[awake_[i]].point;
     const Real* place = places_[row_of_sample(sample)].at;
@@ -366,7 +370,7 @@ bool SurfaceContacts<Real>::weights_in(const LaneView<Real>& view, int tet, cons
                                        Real weight[4]) {
   const int* node = topology_.tets[tet].node;
   const Real* corner[4];
-  for (int i = 0; i < 4; ++i) corner[i] = node_place(view, node[i]);
+  for (int i = 0; i < 4; ++i) corner[i] = node_place(view, node[i]).at;
   Real edge[3][3], normal[3], p[3];
   for (int c = 0; c < 3; ++c) {
     p[c] = place[c] - corner[0][c];
@@ -400,7 +404,7 @@ bool SurfaceContacts<Real>::measure(const LaneView<Real>& view, int from, int in
   const Real distance = surface_.bodies[into].field.at(at_rest, gradient);
   const Real offset = surface_.offset[from * bodies_ + into];
   const Real* corner[4];
-  for (int i = 0; i < 4; ++i) corner[i] = node_place(view, node[i]);
+  for (int i = 0; i < 4; ++i) corner[i] = node_place(view, node[i]).at;
   Real edge[3][3], normal[3], now[3] = {0, 0, 0}, volume6 = 0;
   for (int i = 0; i < 3; ++i)
     for (int c = 0; c < 3; ++c) edge[i][c] = corner[i + 1][c] - corner[0][c];
@@ -416,7 +420,7 @@ bool SurfaceContacts<Real>::measure(const LaneView<Real>& view, int from, int in
   SurfaceTouch<Real> touch;
   touch.depth = offset - distance / steepness;
   if (!(touch.depth > 0)) return false;
-  touch.body = from, touch.against = into, touch.sample = sample, touch.tet = tet;
+  touch.body = from, touch.against = into, touch.sample = sample, touch.tet = tet, touch.nodes = 8;
   const typename Tables::Sample& own = surface_.samples[sample];
   for (int i = 0; i < 4; ++i) {
     touch.node[i] = own.node[i], touch.weight[i] = own.weight[i];
@@ -428,35 +432,70 @@ bool SurfaceContacts<Real>::measure(const LaneView<Real>& view, int from, int in
   return true;
 }
 
+// A tet sleeps until its nodes can have come to a wall. Sides 0 … 2 are the lower walls, 3 … 5 the upper
+// ones.
 template <class Real>
-void SurfaceContacts<Real>::find_walls(const LaneView<Real>& view, int body) {
-  for (int axis = 0; axis < 3; ++axis)
-    for (int side = 0; side < 2; ++side) {
-      const Real out = side == 0 ? Real(1) : Real(-1);
-      const Real wall = Real(side == 0 ? world_.bounds_m.lower[axis] : world_.bounds_m.upper[axis]);
-      const Real* reach = side == 0 ? view.lower : view.upper;
-      if (!(out * (wall - reach[(3 * body + axis) * view.stride]) > 0)) continue;
-      for (const int tet : surface_.bodies[body].sampled_tets) {
-        bool beyond = false;
-        for (const int node : topology_.tets[tet].node)
-          beyond |= out * (wall - view.x[view.state.at(node, axis)]) > 0;
-        if (!beyond) continue;
-        for (int s = surface_.first_sample[tet]; s < surface_.first_sample[tet + 1]; ++s) {
-          const Real* at = sample_place(view, s);
-          const Real depth = out * (wall - at[axis]);
-          if (!(depth > 0)) continue;
-          SurfaceTouch<Real> touch{};
-          touch.body = body, touch.against = -1, touch.sample = s, touch.tet = -1, touch.depth = depth;
-          for (int i = 0; i < 4; ++i) {
-            touch.node[i] = touch.node[4 + i] = surface_.samples[s].node[i];
-            touch.weight[i] = surface_.samples[s].weight[i];
-          }
-          std::copy_n(at, 3, touch.place);
-          touch.normal[axis] = out;
-          touches_.push_back(touch);
-        }
+void SurfaceContacts<Real>::find_walls(int lane, const LaneView<Real>& view, int body) {
+  const Real slack = surface_.wall_slack;
+  Row least{}, most{};  // where no wall is beyond
+  bool any = false;
+  for (int c = 0; c < 3; ++c) {
+    least[c] = Real(world_.bounds_m.lower[c]) - slack, most[c] = Real(world_.bounds_m.upper[c]) + slack;
+    const int k = (3 * body + c) * view.stride;
+    any |= view.lower[k] < least[c] || view.upper[k] > most[c];
+  }
+  if (!any) return;
+  const std::vector<int>& tets = surface_.bodies[body].wall_tets;
+  std::vector<Real>& asleep_until = walls_asleep_until_[lane * bodies_ + body];
+  const Real travel = view.travel[body * view.stride], rounding_m = Real(1e-3) * slack;
+  if (awake_.size() < tets.size() + block_size)
+    awake_.resize(tets.size() + block_size), distance_.resize(awake_.size());
+  const int awake = kernels_.find_at_most(asleep_until.data(), int(tets.size()), travel, awake_.data());
+  for (int t = 0; t < awake; ++t) {
+    const int tet = tets[awake_[t]];
+    const int* node = topology_.tets[tet].node;
+    Row lower = node_place(view, node[0]).row, upper = lower;
+    for (int i = 1; i < 4; ++i) {
+      const Row at = node_place(view, node[i]).row;
+      lower = at < lower ? at : lower, upper = at > upper ? at : upper;
+    }
+    const Row inside = lower - least, other_inside = most - upper;
+    int sides = 0;
+    Real nearest = std::numeric_limits<Real>::max();
+    for (int c = 0; c < 3; ++c) {
+      nearest = std::min(nearest, std::min(inside[c], other_inside[c]));
+      sides |= int(inside[c] < 0) << c | int(other_inside[c] < 0) << (3 + c);
+    }
+    if (sides == 0) {
+      asleep_until[awake_[t]] = travel + kept * nearest - rounding_m;
+      continue;
+    }
+    const int first = surface_.first_sample[tet], count = surface_.first_held_sample[tet] - first;
+    if (int(beyond_.size()) < count) beyond_.resize(std::size_t(count));
+    for (int side = 0; side < 6; ++side) {
+      if ((sides >> side & 1) == 0) continue;
+      const int axis = side % 3;
+      const Real inward = side < 3 ? Real(1) : Real(-1), wall = side < 3 ? least[axis] : most[axis];
+      Real out[4];
+      for (int i = 0; i < 4; ++i) out[i] = inward * (wall - places_[node[i]].at[axis]);
+      Real* const beyond = beyond_.data();
+      const Real *w0 = &surface_.weights[0][first], *w1 = &surface_.weights[1][first],
+                 *w2 = &surface_.weights[2][first], *w3 = &surface_.weights[3][first];
+      for (int k = 0; k < count; ++k)
+        beyond[k] = w0[k] * out[0] + w1[k] * out[1] + w2[k] * out[2] + w3[k] * out[3];
+      for (int k = 0; k < count; ++k) {
+        if (!(beyond[k] > 0)) continue;
+        const typename Tables::Sample& sample = surface_.samples[first + k];
+        SurfaceTouch<Real>& touch = touches_.emplace_back();
+        touch.body = body, touch.against = -1, touch.sample = first + k, touch.tet = -1;
+        touch.nodes = 4, touch.depth = beyond[k];
+        std::copy_n(sample.node, 4, touch.node), std::copy_n(sample.weight, 4, touch.weight);
+        std::copy_n(sample_place(view, first + k).at, 3, touch.place);
+        for (Real& c : touch.normal) c = 0;
+        touch.normal[axis] = inward;
       }
     }
+  }
 }
 
 template <class Real>
@@ -470,7 +509,7 @@ void SurfaceContacts<Real>::share_loads(const LaneView<Real>& view) {
   for (Bearing& bearing : bearings_) bearing.depths = 0;
   for (const SurfaceTouch<Real>& touch : touches_) {
     const Real load = load_of(touch);
-    for (int i = 0; i < 8; ++i) loads_[touch.node[i]] += load * std::abs(touch.weight[i]);
+    for (int i = 0; i < touch.nodes; ++i) loads_[touch.node[i]] += load * std::abs(touch.weight[i]);
     if (bearings_.empty()) continue;
     bearings_[touch.body].depths += double(load);
     if (touch.against >= 0) bearings_[touch.against].depths += double(load);
@@ -485,7 +524,7 @@ void SurfaceContacts<Real>::respond(const LaneView<Real>& view, const SurfaceTou
   const Real load = load_of(touch);
   const int side[2] = {touch.body, touch.against};
   Real relative[3] = {0, 0, 0}, inverse_mass = 0;  // of what is not rigid
-  for (int i = 0; i < 8; ++i) {
+  for (int i = 0; i < touch.nodes; ++i) {
     const int node = touch.node[i];
     for (int c = 0; c < 3; ++c) relative[c] += touch.weight[i] * view.v[view.state.at(node, c)];
     if (side[i / 4] >= 0 && !is_rigid(side[i / 4]))
@@ -506,7 +545,7 @@ void SurfaceContacts<Real>::respond(const LaneView<Real>& view, const SurfaceTou
   if (!penalty_force(Real(contact_beta), touch.depth, touch.normal, relative, mass_along, step_,
                      tables_.pair_friction[touch.body * bodies_ + other], force))
     return;
-  for (int i = 0; i < 8; ++i)
+  for (int i = 0; i < touch.nodes; ++i)
     if (tables_.inverse_mass[touch.node[i]] > 0)
       for (int c = 0; c < 3; ++c) view.f[view.force.at(touch.node[i], c)] += touch.weight[i] * force[c];
   if (told_)

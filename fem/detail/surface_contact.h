@@ -20,7 +20,8 @@ template <class Real>
 struct SurfaceTouch {
   int body, against;                // whose sample, in whose cage; against −1: a wall
   int sample, tet;                  // of the world's; tet −1: a wall
-  int node[8];                      // of the sample's tet, then of the tet it is in; a wall has four
+  int nodes;                        // 8, of a wall 4
+  int node[8];                      // of the sample's tet, then of the tet it is in
   Real weight[8];                   // of the sample's place, then minus those of the place in the tet
   Real place[3], depth, normal[3];  // depth > 0, along the unit normal, out of `against`
 };
@@ -50,8 +51,13 @@ class SurfaceContacts {
     Real travel_at_build = 0;
     Near near[2];  // samples of a in b, of b in a
   };
+  // x y z and nothing: added and scaled at once.
+  typedef Real Row __attribute__((vector_size(4 * sizeof(Real))));
   struct Place {
-    Real at[4];
+    union {
+      Row row;
+      Real at[4];
+    };
   };
   // The samples of one tet, in columns that begin with a block of their own.
   struct Group {
@@ -59,8 +65,8 @@ class SurfaceContacts {
     Real lower[3], upper[3];
   };
 
-  const Real* node_place(const LaneView<Real>&, int node);
-  const Real* sample_place(const LaneView<Real>&, int sample);
+  const Place& node_place(const LaneView<Real>&, int node);
+  const Place& sample_place(const LaneView<Real>&, int sample);
   void find_core(const LaneView<Real>&, int tet);
   int row_of_core(int tet) const { return world_nodes_ + 4 * tet; }
   int row_of_sample(int sample) const { return first_sample_row_ + sample; }
@@ -71,7 +77,7 @@ class SurfaceContacts {
   void find_in(const LaneView<Real>&, int from, int into, Real reach, Real travel, Near&);
   bool measure(const LaneView<Real>&, int from, int into, int sample, int tet, const Real weight[4]);
   bool weights_in(const LaneView<Real>&, int tet, const Real place[3], Real weight[4]);
-  void find_walls(const LaneView<Real>&, int body);
+  void find_walls(int lane, const LaneView<Real>&, int body);
   void share_loads(const LaneView<Real>&);
   void respond(const LaneView<Real>&, const SurfaceTouch<Real>&);
   Real load_of(const SurfaceTouch<Real>&) const;
@@ -82,12 +88,14 @@ class SurfaceContacts {
   const detail::Tables<Real>& tables_;
   const Tables& surface_;
   const Kernels<Real>& kernels_;
-  int bodies_, world_nodes_, first_sample_row_;
+  int bodies_, world_nodes_, first_sample_row_, first_sample_stamp_;
   std::vector<Exerted<Real>>* told_ = nullptr;
   Real step_;
   std::vector<std::pair<int, int>> pairs_;  // a body with itself, or a < b
   std::vector<List> lists_;                 // [lane × pairs + pair]
   std::vector<Real> self_travel_;           // [lane × bodies + body] of nodes against their mean
+  // [lane × bodies + body], of its wall_tets: travel before which none of their nodes can be beyond a wall.
+  std::vector<std::vector<Real>> walls_asleep_until_;
   std::vector<SurfaceTouch<Real>> touches_;
   // Rows: the world's nodes, four corners of each core, the samples; those are of this call whose stamp is.
   std::vector<Place> places_;
@@ -106,6 +114,7 @@ class SurfaceContacts {
   std::vector<TetPlanes<Real>> planes_;
   std::vector<NearTet<Real>> near_tet_;
   std::vector<unsigned char> beside_;  // a tet
+  std::vector<Real> beyond_;           // how far the samples of a tet are beyond a wall
 };
 
 extern template class SurfaceContacts<float>;

@@ -33,11 +33,17 @@ struct SurfaceTables {
     Field field;
     Real reach_factor;  // no corner of a core moves farther than this times the body's fastest node
     std::vector<int> sampled_tets, cored_tets;  // world tets, ascending
+    std::vector<int> wall_tets;                 // those with a sample that walls can push
   };
-  std::vector<Sample> samples;    // ascending by tet
+  std::vector<Sample> samples;   // ascending by tet
+  std::vector<Real> weights[4];  // of the samples, in columns
+  // (tets) Of the samples of a tet, those from here on hang on nodes that never move alone: no wall pushes
+  // them.
+  std::vector<int> first_held_sample;
   std::vector<int> first_sample;  // (tets + 1) of the world's tets
   std::vector<Core> cores;        // (tets)
   std::vector<Body> bodies;
+  Real wall_slack;  // metres: what is less far beyond a wall is where rounding put it
   // [body a × bodies + body b] metres: surfaces that near are in contact. On the diagonal: a body with
   // itself.
   std::vector<Real> offset;
