@@ -259,14 +259,14 @@ ContactShape make_contact_shape(const SurfaceMesh& surface, const TetMesh& cage,
   };
   const WindingNumber winding(surface.positions, surface.triangles);
   const double offset = offset_share * size;
-  const detail::SeenSurface seen = detail::seen_surface(surface, winding, size / 32, offset);
+  const bool closed = detail::is_closed(surface.triangles);
+  const detail::SeenSurface seen = detail::seen_surface(surface, winding, closed, size / 32, offset);
   r.open_share = seen.open_share;
   const std::string no_inside =
       "the surface encloses nothing: contact goes by the cage, which is fatter; give the model a thickness, "
       "or close it";
   if (!(seen.area_m2 > 0)) return give_up(no_inside);
 
-  const bool closed = detail::is_closed(surface.triangles);
   ContactShape shape;
   std::vector<detail::SurfaceSample> samples;
   int cells = settings.cells;

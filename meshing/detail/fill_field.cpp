@@ -5,6 +5,7 @@
 
 #include "core/threads.h"
 #include "meshing/detail/nearest_on_triangle.h"
+#include "meshing/detail/surface_spots.h"
 
 namespace limber::meshing::detail {
 
@@ -12,6 +13,8 @@ namespace {
 
 constexpr double near_cells = 1.2;  // within which distances are exact
 constexpr double largest_value = 32'000;
+constexpr double spots_a_cell = 4, most_spots = 2e6;  // a face of a cell; to fit the field to
+constexpr int fitting_steps = 4;
 
 class Filler {
  public:
@@ -102,7 +105,7 @@ class Filler {
       for (std::size_t head = 0; head < region.size(); ++head) {
         const std::size_t node = region[head];
         if (clear_[node] > clear_[clearest]) clearest = node;
-        const std::array<int, 3> at = place(node);
+        const std::array<int, 3> at = indices(node);
         for (int axis = 0; axis < 3; ++axis)
           for (const int turn : {-1, 1}) {
             if (at[axis] + turn < 0 || at[axis] + turn >= nodes_[axis]) continue;
@@ -112,7 +115,7 @@ class Filler {
             region.push_back(other);
           }
       }
-      const auto [i, j, k] = place(clearest);
+      const auto [i, j, k] = indices(clearest);
       if (winding.inside(position(i, j, k)))
         for (std::size_t node : region) inside[node] = 1;
     }
@@ -129,22 +132,76 @@ class Filler {
     return inside;
   }
 
-  double store(const std::vector<char>& inside, DistanceField& field) const {
+  void turn_negative(const std::vector<char>& inside) {
+    for (std::size_t n = 0; n < distance_.size(); ++n)
+      if (inside[n]) distance_[n] = -distance_[n];
+  }
+
+  // Distances at the nodes next to the surface are changed so that what lies between them is nearer to 0 on
+  // the surface, since a trilinear field rounds its edges off: four steps of SART (Andersen and Kak,
+  // Ultrasonic Imaging 6, 1984).
+  void fit(const SeenSurface& surface) {
+    const double spots = spots_a_cell * surface.area_m2 / (cell_ * cell_);
+    if (!(spots >= 1)) return;
+    const SurfaceSpots sequence(surface);
+    std::vector<Place> places(std::size_t(std::min(spots, most_spots)));
+    for (std::size_t i = 0; i < places.size(); ++i)
+      places[i] = place_of(sequence.at(std::uint32_t(i)).position);
+    std::vector<float> weights(distance_.size());
+    for (const Place& p : places)
+      for (int c = 0; c < 8; ++c) weights[p.node + offset(c)] += p.weights[std::size_t(c)];
+    std::vector<double> errors(distance_.size());
+    for (int step = 0; step < fitting_steps; ++step) {
+      std::fill(errors.begin(), errors.end(), 0);
+      for (const Place& p : places) {
+        double error = 0;
+        for (int c = 0; c < 8; ++c) error += p.weights[std::size_t(c)] * distance_[p.node + offset(c)];
+        for (int c = 0; c < 8; ++c) errors[p.node + offset(c)] += p.weights[std::size_t(c)] * error;
+      }
+      // A node that few spots are near is changed less.
+      for (std::size_t n = 0; n < distance_.size(); ++n) distance_[n] -= errors[n] / (weights[n] + 0.5);
+    }
+  }
+
+  // Returns the volume inside.
+  double store(DistanceField& field) const {
     double volume = 0, most = 0;
-    for (const double d : distance_) most = std::max(most, d);
+    for (const double d : distance_) most = std::max(most, std::abs(d));
     field.unit_m = most / largest_value;
     field.values.resize(distance_.size());
     for (std::size_t n = 0; n < distance_.size(); ++n) {
-      const double d = inside[n] ? -distance_[n] : distance_[n];
-      field.values[n] = std::int16_t(std::lround(d / field.unit_m));
-      volume += std::clamp(0.5 - d / cell_, 0.0, 1.0);
+      field.values[n] = std::int16_t(std::lround(distance_[n] / field.unit_m));
+      volume += std::clamp(0.5 - distance_[n] / cell_, 0.0, 1.0);
     }
     return volume * cell_ * cell_ * cell_;
   }
 
  private:
+  // The cell that holds a point: its first node, and the shares of its eight corners, x fastest.
+  struct Place {
+    std::size_t node;
+    std::array<float, 8> weights;
+  };
+  std::size_t offset(int corner) const {
+    return std::size_t((corner & 1) * step_[0] + (corner >> 1 & 1) * step_[1] + (corner >> 2) * step_[2]);
+  }
+  Place place_of(const Vec3& p) const {
+    Place result{0, {}};
+    Vec3 share;
+    for (int axis = 0; axis < 3; ++axis) {
+      const double at = (p[axis] - lower_[axis]) / cell_;
+      const int first = std::clamp(int(at), 0, nodes_[axis] - 2);
+      result.node += std::size_t(first * step_[axis]);
+      share[axis] = std::clamp(at - first, 0.0, 1.0);
+    }
+    for (int c = 0; c < 8; ++c)
+      result.weights[std::size_t(c)] =
+          float(((c & 1) ? share[0] : 1 - share[0]) * ((c & 2) ? share[1] : 1 - share[1]) *
+                ((c & 4) ? share[2] : 1 - share[2]));
+    return result;
+  }
   Vec3 position(int i, int j, int k) const { return lower_ + cell_ * Vec3(i, j, k); }
-  std::array<int, 3> place(std::size_t node) const {
+  std::array<int, 3> indices(std::size_t node) const {
     return {int(node % std::size_t(step_[1])), int(node / std::size_t(step_[1]) % std::size_t(nodes_[1])),
             int(node / std::size_t(step_[2]))};
   }
@@ -187,26 +244,9 @@ double fill(const SeenSurface& surface, const WindingNumber& winding, bool close
   const std::vector<char> inside =
       closed ? filler.inside_by_regions(winding) : filler.inside_by_nodes(winding);
   filler.measure_far();
-  return filler.store(inside, field);
-}
-
-bool is_closed(const Triangles& triangles) {
-  std::vector<std::array<int, 3>> edges;  // lesser end, greater end, 1 or −1
-  edges.reserve(std::size_t(triangles.size()));
-  for (const auto t : triangles.rowwise())
-    for (int k = 0; k < 3; ++k) {
-      const int a = t[k], b = t[(k + 1) % 3];
-      edges.push_back({std::min(a, b), std::max(a, b), a < b ? 1 : -1});
-    }
-  std::sort(edges.begin(), edges.end());
-  int turns = 0;
-  for (std::size_t i = 0; i < edges.size(); ++i) {
-    turns += edges[i][2];
-    const bool last =
-        i + 1 == edges.size() || edges[i + 1][0] != edges[i][0] || edges[i + 1][1] != edges[i][1];
-    if (last && turns != 0) return false;
-  }
-  return true;
+  filler.turn_negative(inside);
+  filler.fit(surface);
+  return filler.store(field);
 }
 
 }  // namespace limber::meshing::detail
