@@ -12,8 +12,8 @@ DistanceField grid_over(const Box&, double cell_m, std::int64_t most_nodes);
 
 // Distance to the nearest of what is seen, exact at a cell and seldom too large by much beyond; nearer, such
 // that the field between the nodes is as near to 0 on the surface as it can. Inside is where the winding
-// number is above a half. `closed`: that it can change at the surface only. Same input, same bytes on any
-// number of threads. Returns the volume inside, by the share of each node's cell.
+// number is above a half; holes are closed where it is just that, to a cell. `closed`: that it can change at
+// the surface only. Returns the volume inside, by the share of each node's cell.
 double fill(const SeenSurface&, const WindingNumber&, bool closed, DistanceField&);
 
 }  // namespace limber::meshing::detail
