@@ -205,14 +205,21 @@ std::vector<SurfaceSample> sample_surface(const SurfaceMesh& surface, const Seen
   std::vector<double> wanted;
   for (const SurfaceSpot& s : spots) wanted.push_back(map.at(s));
 
+  // What is not on a piece that was judged itself, or where pieces may be hidden in part, is judged where it
+  // is taken.
+  const std::size_t doubtful =
+      std::all_of(seen.pieces.begin(), seen.pieces.end(), [](const SurfacePiece& p) { return p.seen; })
+          ? sticking_out
+          : spots.size();
   enum : char { unknown, yes, no };
-  std::vector<char> at_the_surface(sticking_out, unknown);
-  const auto sticks_out = [&](std::size_t i) {
-    char& known = at_the_surface[i];
-    if (known == unknown)
-      known =
-          parts_inside_from_outside(winding, spots[i].position, spots[i].normal, spacing.offset_m) ? yes : no;
-    return known == yes;
+  std::vector<char> judgements(doubtful, unknown);
+  const auto is_hidden = [&](std::size_t i) {
+    if (i >= doubtful) return false;
+    char& hidden = judgements[i];
+    if (hidden == unknown)
+      hidden =
+          parts_inside_from_outside(winding, spots[i].position, spots[i].normal, spacing.offset_m) ? no : yes;
+    return hidden == yes;
   };
   for (double scale = 1;; scale *= 1.1) {
     PointGrid grid(box, spacing.most_m);
@@ -223,7 +230,7 @@ std::vector<SurfaceSample> sample_surface(const SurfaceMesh& surface, const Seen
         return samples[std::size_t(n)].normal.dot(s.normal) > same_side;
       });
       if (covered) continue;
-      if (i < sticking_out && !sticks_out(i)) continue;
+      if (is_hidden(i)) continue;
       grid.add(s.position);
       samples.push_back({s.position, s.normal, 0});
     }
