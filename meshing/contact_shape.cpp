@@ -22,8 +22,10 @@ using Weights4 = Eigen::RowVector4d;
 
 constexpr double offset_share = 1e-4;  // of the size: how far beside the surface it is asked what is inside
 constexpr double least_cells_thick = 2;
-constexpr double finer = 1.5;
-constexpr double open_share_worth_a_word = 0.1;
+constexpr double well_resolved_cells =
+    3;  // a thickness that is not worth more cells than settings.most_cells
+constexpr int most_cells_for_thin_walls = 1000;
+constexpr double open_share_worth_a_word = 0.1, open_share_too_large = 0.5;
 
 // Barycentric coordinates in each tet of a mesh.
 class TetCoordinates {
@@ -259,14 +261,14 @@ ContactShape make_contact_shape(const SurfaceMesh& surface, const TetMesh& cage,
   };
   const WindingNumber winding(surface.positions, surface.triangles);
   const double offset = offset_share * size;
-  const detail::SeenSurface seen = detail::seen_surface(surface, winding, size / 32, offset);
+  const bool closed = detail::is_closed(surface.triangles);
+  const detail::SeenSurface seen = detail::seen_surface(surface, winding, closed, size / 32, offset);
   r.open_share = seen.open_share;
   const std::string no_inside =
       "the surface encloses nothing: contact goes by the cage, which is fatter; give the model a thickness, "
       "or close it";
   if (!(seen.area_m2 > 0)) return give_up(no_inside);
 
-  const bool closed = detail::is_closed(surface.triangles);
   ContactShape shape;
   std::vector<detail::SurfaceSample> samples;
   int cells = settings.cells;
@@ -288,21 +290,31 @@ ContactShape make_contact_shape(const SurfaceMesh& surface, const TetMesh& cage,
       if (samples.empty()) return give_up(no_inside);
     }
     std::tie(r.error_p99_m, r.error_max_m) = errors(shape.field, samples);
-    const bool good = r.error_p99_m <= settings.field_error * r.characteristic_m &&
-                      thickness >= least_cells_thick * shape.field.cell_m;
+    const double wanted = settings.field_error * r.characteristic_m;
+    const bool thin = thickness < well_resolved_cells * shape.field.cell_m;
+    const int most = thin ? most_cells_for_thin_walls : settings.most_cells;
     const bool wider_than_asked = shape.field.cell_m > 1.001 * size / cells;
-    if (good || wider_than_asked || cells >= settings.most_cells) break;
-    cells = std::min(settings.most_cells, int(finer * cells));
+    if ((r.error_p99_m <= wanted && !thin) || wider_than_asked || cells >= most) break;
+    // The error goes with about the 1.4th power of the cell.
+    const double by_error = cells * std::clamp(std::pow(r.error_p99_m / wanted, 0.7), 1.5, 3.0);
+    const double by_thickness = 1.02 * well_resolved_cells * size / thickness;
+    cells = std::min(
+        most,
+        int(std::max({1.1 * cells, thin ? by_thickness : 0, std::min(by_error, 1.0 * settings.most_cells)})));
   }
   r.cells = int(std::lround(size / shape.field.cell_m));
   r.nodes = std::int64_t(shape.field.values.size());
   r.memory_mb = double(shape.field.values.size() * sizeof(std::int16_t)) / 1e6;
   if (thickness < least_cells_thick * shape.field.cell_m)
-    return give_up(
-        fmt::format("walls are {:.2g} m thick in the mean, less than two cells ({:.2g} m) of the finest "
-                    "field: contact goes by the "
-                    "cage, which is fatter; thicken the model",
-                    thickness, shape.field.cell_m));
+    return give_up(fmt::format(
+        "walls are {:.2g} m thick in the mean, less than {} cells of the finest field, which are {:.2g} m: "
+        "contact goes by the cage, which is fatter; thicken the model",
+        thickness, least_cells_thick, shape.field.cell_m));
+  if (seen.open_share > open_share_too_large)
+    return give_up(fmt::format(
+        "for {:.0f} % of the surface it is a guess what is inside: contact goes by the cage, which "
+        "is fatter; close the holes",
+        100 * seen.open_share));
   if (seen.open_share > open_share_worth_a_word)
     r.warnings.push_back(fmt::format(
         "{:.0f} % of the surface is near holes, where it is a guess what is inside, and so is contact; "

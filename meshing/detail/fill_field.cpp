@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/threads.h"
 #include "meshing/detail/nearest_on_triangle.h"
+#include "meshing/detail/surface_spots.h"
 
 namespace limber::meshing::detail {
 
@@ -12,6 +12,8 @@ namespace {
 
 constexpr double near_cells = 1.2;  // within which distances are exact
 constexpr double largest_value = 32'000;
+constexpr double spots_a_cell = 4, most_spots = 2e6;  // a face of a cell; to fit the field to
+constexpr int fitting_steps = 4;
 
 class Filler {
  public:
@@ -79,21 +81,17 @@ class Filler {
               const int piece = nearest_[other];
               if (piece < 0 || piece == nearest_[node] || distance_[other] - cell_ >= distance_[node])
                 continue;
-              const auto& [a, b, c] = pieces_[std::size_t(piece)].corners;
-              const Vec3 p = position(at[0], at[1], at[2]);
-              const double distance = (nearest_on_triangle(a, b, c, p) - p).norm();
+              const double distance = distance_to(piece, position(at[0], at[1], at[2]));
               if (distance < distance_[node]) distance_[node] = distance, nearest_[node] = piece;
             }
           }
     }
   }
 
-  // One winding number for each region: of nodes joined by edges that no surface crosses, since the balls
-  // about both ends within which there is none cover the edge.
+  // One winding number for each region of nodes joined by edges that no surface crosses.
   std::vector<char> inside_by_regions(const WindingNumber& winding) const {
     std::vector<char> inside(distance_.size(), 0), reached(distance_.size(), 0);
     std::vector<std::size_t> region;
-    const double covered = cell_ * (1 + 1e-5);
     for (std::size_t start = 0; start < reached.size(); ++start) {
       if (reached[start]) continue;
       region.assign(1, start);
@@ -102,49 +100,151 @@ class Filler {
       for (std::size_t head = 0; head < region.size(); ++head) {
         const std::size_t node = region[head];
         if (clear_[node] > clear_[clearest]) clearest = node;
-        const std::array<int, 3> at = place(node);
-        for (int axis = 0; axis < 3; ++axis)
-          for (const int turn : {-1, 1}) {
-            if (at[axis] + turn < 0 || at[axis] + turn >= nodes_[axis]) continue;
-            const std::size_t other = std::size_t(std::ptrdiff_t(node) + turn * step_[axis]);
-            if (reached[other] || double(clear_[node]) + clear_[other] <= covered) continue;
-            reached[other] = 1;
-            region.push_back(other);
-          }
+        for_uncrossed_edges(node, [&](std::size_t other) {
+          if (reached[other]) return;
+          reached[other] = 1;
+          region.push_back(other);
+        });
       }
-      const auto [i, j, k] = place(clearest);
+      const auto [i, j, k] = indices(clearest);
       if (winding.inside(position(i, j, k)))
         for (std::size_t node : region) inside[node] = 1;
     }
     return inside;
   }
 
+  // For open surfaces, where the winding number changes between them too, but slowly: where it is clearly on
+  // one side of a half, it stays there for half the distance to the surface, or two cells without crossing
+  // it.
   std::vector<char> inside_by_nodes(const WindingNumber& winding) const {
-    std::vector<char> inside(distance_.size());
-    parallel_for(nodes_[1] * nodes_[2], [&](int row) {
-      for (int i = 0; i < nodes_[0]; ++i)
-        inside[std::size_t(row) * nodes_[0] + i] =
-            winding.inside(position(i, row % nodes_[1], row / nodes_[1]));
-    });
+    enum : char { no, yes, unknown };
+    std::vector<char> inside(distance_.size(), unknown);
+    std::vector<std::size_t> patch;
+    for (std::size_t start = 0; start < inside.size(); ++start) {
+      if (inside[start] != unknown) continue;
+      const auto center = indices(start);
+      const double there = winding.at(position(center[0], center[1], center[2])) - 0.5;
+      inside[start] = there > 0 ? yes : no;
+      if (std::abs(there) < 0.25) continue;
+      const double reach = std::max(2.0, 0.5 * distance_[start] / cell_);
+      patch.assign(1, start);
+      for (std::size_t head = 0; head < patch.size(); ++head)
+        for_uncrossed_edges(patch[head], [&](std::size_t other) {
+          const auto at = indices(other);
+          const Vec3 away(at[0] - center[0], at[1] - center[1], at[2] - center[2]);
+          if (inside[other] != unknown || away.squaredNorm() > reach * reach) return;
+          inside[other] = inside[start];
+          patch.push_back(other);
+        });
+    }
     return inside;
   }
 
-  double store(const std::vector<char>& inside, DistanceField& field) const {
+  // Where inside changes without a surface there is a hole, which is closed by points in the middles of
+  // edges.
+  void close_holes(const std::vector<char>& inside) {
+    for (std::size_t node = 0; node < inside.size(); ++node)
+      for_uncrossed_edges(node, [&](std::size_t other) {
+        if (other < node || inside[node] == inside[other]) return;
+        const auto a = indices(node), b = indices(other);
+        closing_.push_back(0.5 * (position(a[0], a[1], a[2]) + position(b[0], b[1], b[2])));
+        for (const std::size_t end : {node, other})
+          if (0.5 * cell_ < distance_[end]) {
+            distance_[end] = 0.5 * cell_;
+            nearest_[end] = int(pieces_.size() + closing_.size()) - 1;
+          }
+      });
+    if (!closing_.empty()) measure_far();
+  }
+
+  void turn_negative(const std::vector<char>& inside) {
+    for (std::size_t n = 0; n < distance_.size(); ++n)
+      if (inside[n]) distance_[n] = -distance_[n];
+  }
+
+  // Distances at the nodes next to the surface are changed so that what lies between them is nearer to 0 on
+  // the surface, since a trilinear field rounds its edges off: four steps of SART (Andersen and Kak,
+  // Ultrasonic Imaging 6, 1984).
+  void fit(const SeenSurface& surface) {
+    const double spots = spots_a_cell * surface.area_m2 / (cell_ * cell_);
+    if (!(spots >= 1)) return;
+    const SurfaceSpots sequence(surface);
+    std::vector<Place> places(std::size_t(std::min(spots, most_spots)));
+    for (std::size_t i = 0; i < places.size(); ++i)
+      places[i] = place_of(sequence.at(std::uint32_t(i)).position);
+    std::vector<float> weights(distance_.size());
+    for (const Place& p : places)
+      for (int c = 0; c < 8; ++c) weights[p.node + offset(c)] += p.weights[std::size_t(c)];
+    std::vector<double> errors(distance_.size());
+    for (int step = 0; step < fitting_steps; ++step) {
+      std::fill(errors.begin(), errors.end(), 0);
+      for (const Place& p : places) {
+        double error = 0;
+        for (int c = 0; c < 8; ++c) error += p.weights[std::size_t(c)] * distance_[p.node + offset(c)];
+        for (int c = 0; c < 8; ++c) errors[p.node + offset(c)] += p.weights[std::size_t(c)] * error;
+      }
+      // A node that few spots are near is changed less.
+      for (std::size_t n = 0; n < distance_.size(); ++n) distance_[n] -= errors[n] / (weights[n] + 0.5);
+    }
+  }
+
+  // Returns the volume inside.
+  double store(DistanceField& field) const {
     double volume = 0, most = 0;
-    for (const double d : distance_) most = std::max(most, d);
+    for (const double d : distance_) most = std::max(most, std::abs(d));
     field.unit_m = most / largest_value;
     field.values.resize(distance_.size());
     for (std::size_t n = 0; n < distance_.size(); ++n) {
-      const double d = inside[n] ? -distance_[n] : distance_[n];
-      field.values[n] = std::int16_t(std::lround(d / field.unit_m));
-      volume += std::clamp(0.5 - d / cell_, 0.0, 1.0);
+      field.values[n] = std::int16_t(std::lround(distance_[n] / field.unit_m));
+      volume += std::clamp(0.5 - distance_[n] / cell_, 0.0, 1.0);
     }
     return volume * cell_ * cell_ * cell_;
   }
 
  private:
+  // The cell that holds a point: its first node, and the shares of its eight corners, x fastest.
+  struct Place {
+    std::size_t node;
+    std::array<float, 8> weights;
+  };
+  std::size_t offset(int corner) const {
+    return std::size_t((corner & 1) * step_[0] + (corner >> 1 & 1) * step_[1] + (corner >> 2) * step_[2]);
+  }
+  Place place_of(const Vec3& p) const {
+    Place result{0, {}};
+    Vec3 share;
+    for (int axis = 0; axis < 3; ++axis) {
+      const double at = (p[axis] - lower_[axis]) / cell_;
+      const int first = std::clamp(int(at), 0, nodes_[axis] - 2);
+      result.node += std::size_t(first * step_[axis]);
+      share[axis] = std::clamp(at - first, 0.0, 1.0);
+    }
+    for (int c = 0; c < 8; ++c)
+      result.weights[std::size_t(c)] =
+          float(((c & 1) ? share[0] : 1 - share[0]) * ((c & 2) ? share[1] : 1 - share[1]) *
+                ((c & 4) ? share[2] : 1 - share[2]));
+    return result;
+  }
+  // Calls visit(node) for the neighbours of a node where no surface crosses the edge to it, since the balls
+  // about both ends within which there is none cover it.
+  template <class Visit>
+  void for_uncrossed_edges(std::size_t node, Visit visit) const {
+    const std::array<int, 3> at = indices(node);
+    for (int axis = 0; axis < 3; ++axis)
+      for (const int turn : {-1, 1}) {
+        if (at[axis] + turn < 0 || at[axis] + turn >= nodes_[axis]) continue;
+        const std::size_t other = std::size_t(std::ptrdiff_t(node) + turn * step_[axis]);
+        if (double(clear_[node]) + clear_[other] > cell_ * (1 + 1e-5)) visit(other);
+      }
+  }
+  double distance_to(int piece, const Vec3& p) const {
+    if (std::size_t(piece) >= pieces_.size())
+      return (closing_[std::size_t(piece) - pieces_.size()] - p).norm();
+    const auto& [a, b, c] = pieces_[std::size_t(piece)].corners;
+    return (nearest_on_triangle(a, b, c, p) - p).norm();
+  }
   Vec3 position(int i, int j, int k) const { return lower_ + cell_ * Vec3(i, j, k); }
-  std::array<int, 3> place(std::size_t node) const {
+  std::array<int, 3> indices(std::size_t node) const {
     return {int(node % std::size_t(step_[1])), int(node / std::size_t(step_[1]) % std::size_t(nodes_[1])),
             int(node / std::size_t(step_[2]))};
   }
@@ -155,7 +255,8 @@ class Filler {
   const std::array<int, 3> nodes_;
   const std::array<std::ptrdiff_t, 3> step_;  // between neighbouring nodes
   std::vector<double> distance_;              // to the nearest piece seen
-  std::vector<int> nearest_;                  // that piece; −1: none known yet
+  std::vector<int> nearest_;                  // that piece, or of closing_ counted on; −1: none known yet
+  std::vector<Vec3> closing_;                 // points that close holes
   std::vector<float> clear_;                  // no piece, seen or not, is nearer; up to near_cells
   std::vector<char> fixed_;
 };
@@ -184,29 +285,13 @@ DistanceField grid_over(const Box& box, double cell_m, std::int64_t most_nodes) 
 double fill(const SeenSurface& surface, const WindingNumber& winding, bool closed, DistanceField& field) {
   Filler filler(surface, field);
   filler.measure_near();
+  filler.measure_far();
   const std::vector<char> inside =
       closed ? filler.inside_by_regions(winding) : filler.inside_by_nodes(winding);
-  filler.measure_far();
-  return filler.store(inside, field);
-}
-
-bool is_closed(const Triangles& triangles) {
-  std::vector<std::array<int, 3>> edges;  // lesser end, greater end, 1 or −1
-  edges.reserve(std::size_t(triangles.size()));
-  for (const auto t : triangles.rowwise())
-    for (int k = 0; k < 3; ++k) {
-      const int a = t[k], b = t[(k + 1) % 3];
-      edges.push_back({std::min(a, b), std::max(a, b), a < b ? 1 : -1});
-    }
-  std::sort(edges.begin(), edges.end());
-  int turns = 0;
-  for (std::size_t i = 0; i < edges.size(); ++i) {
-    turns += edges[i][2];
-    const bool last =
-        i + 1 == edges.size() || edges[i + 1][0] != edges[i][0] || edges[i + 1][1] != edges[i][1];
-    if (last && turns != 0) return false;
-  }
-  return true;
+  if (!closed) filler.close_holes(inside);
+  filler.turn_negative(inside);
+  filler.fit(surface);
+  return filler.store(field);
 }
 
 }  // namespace limber::meshing::detail

@@ -10,12 +10,10 @@ namespace limber::meshing::detail {
 // box and a cell more on each side; no values yet.
 DistanceField grid_over(const Box&, double cell_m, std::int64_t most_nodes);
 
-// Distance to the nearest of what is seen, exact up to a cell and seldom too large by much beyond; inside is
-// where the winding number is above a half. `closed`: that it can change at the surface only. Same input,
-// same bytes on any number of threads. Returns the volume inside, by the share of each node's cell.
+// Distance to the nearest of what is seen, exact at a cell and seldom too large by much beyond; nearer, such
+// that the field between the nodes is as near to 0 on the surface as it can. Inside is where the winding
+// number is above a half; holes are closed where it is just that, to a cell. `closed`: that it can change at
+// the surface only. Returns the volume inside, by the share of each node's cell.
 double fill(const SeenSurface&, const WindingNumber&, bool closed, DistanceField&);
-
-// Whether each edge is run through as often one way as the other.
-bool is_closed(const Triangles&);
 
 }  // namespace limber::meshing::detail

@@ -5,67 +5,40 @@
 #include <numbers>
 #include <numeric>
 
-#include "core/random.h"
 #include "core/threads.h"
 #include "meshing/detail/point_grid.h"
+#include "meshing/detail/surface_spots.h"
 
 namespace limber::meshing::detail {
 
 namespace {
 
-constexpr double probes_a_disc = 1.5, candidates_a_disc = 6;  // a square of the least spacing
+constexpr double probes_a_disc = 1.5, candidates_a_disc = 5;  // a square of the least spacing
 constexpr int most_candidates = 400'000;
 constexpr double same_side = 0.2;  // cosine of normals, below which points are not of one side of a sheet
 const double crease_cosine = std::cos(std::numbers::pi / 6), corner_cosine = std::cos(std::numbers::pi / 6);
 
-struct Spot {
-  Vec3 position, normal;
-};
-
-// The i-th point of a sequence spread evenly over what is seen.
-class SpotSequence {
- public:
-  explicit SpotSequence(const SeenSurface& surface) : pieces_(surface.pieces) {
-    double sum = 0;
-    for (const SurfacePiece& p : pieces_) areas_.push_back(sum += p.seen ? p.area_vector().norm() : 0);
-  }
-  Spot at(std::uint32_t i) const {
-    const auto bits = philox4x32({i, 0, 0, 0}, {0, 0});
-    const double wanted = 0x1p-32 * (bits[0] + 0.5) * areas_.back();
-    const auto found = std::upper_bound(areas_.begin(), areas_.end() - 1, wanted) - areas_.begin();
-    const SurfacePiece& piece = pieces_[std::size_t(found)];
-    double u = 0x1p-32 * bits[1], v = 0x1p-32 * bits[2];
-    if (u + v > 1) u = 1 - u, v = 1 - v;
-    const auto& [a, b, c] = piece.corners;
-    return {a + u * (b - a) + v * (c - a), piece.area_vector().normalized()};
-  }
-
- private:
-  const std::vector<SurfacePiece>& pieces_;
-  std::vector<double> areas_;  // seen, of all pieces up to this
-};
-
 // How far apart samples may be, by how far the surface falls away below the tangent plane.
 class SpacingMap {
  public:
-  SpacingMap(const SpotSequence& sequence, int count, const Box& box, const SampleSpacing& limits)
-      : limits_(limits), grid_(box, 0.5 * limits.most_m) {
+  SpacingMap(const SurfaceSpots& sequence, int count, const Box& box, const SampleSpacing& limits)
+      : limits_(limits), grid_(box, 0.5 * limits.most_flat_m), fine_grid_(box, limits.least_m) {
     std::vector<std::pair<int, int>> order;
     for (int i = 0; i < count; ++i) {
       spots_.push_back(sequence.at(std::uint32_t(i)));
       order.emplace_back(grid_.cell_of(spots_.back().position), i);
     }
     std::sort(order.begin(), order.end());  // neighbours in space are neighbours in memory
-    std::vector<Spot> sorted;
+    std::vector<SurfaceSpot> sorted;
     for (const auto& [cell, i] : order) sorted.push_back(spots_[std::size_t(i)]);
     spots_ = std::move(sorted);
-    for (const Spot& s : spots_) grid_.add(s.position);
+    for (const SurfaceSpot& s : spots_) grid_.add(s.position), fine_grid_.add(s.position);
 
     std::vector<Vec3> smooth(spots_.size());
     spacing_.resize(spots_.size());
     for_all([&](std::size_t i) {
       Vec3 sum = spots_[i].normal;
-      grid_.any_within(spots_[i].position, limits_.least_m, [&](int n, double) {
+      fine_grid_.any_within(spots_[i].position, limits_.least_m, [&](int n, double) {
         const Vec3& normal = spots_[std::size_t(n)].normal;
         if (normal.dot(spots_[i].normal) > same_side) sum += normal;
         return false;
@@ -75,10 +48,10 @@ class SpacingMap {
     for_all([&](std::size_t i) { spacing_[i] = measured({spots_[i].position, smooth[i]}); });
   }
 
-  double measured(const Spot& at) const {
+  double measured(const SurfaceSpot& at) const {
     double least_squared = limits_.most_m * limits_.most_m, bend = 0;
     grid_.any_within(at.position, limits_.most_flat_m, [&](int n, double squared_distance) {
-      const Spot& other = spots_[std::size_t(n)];
+      const SurfaceSpot& other = spots_[std::size_t(n)];
       if (other.normal.dot(at.normal) <= same_side) return false;
       const double fall = (at.position - other.position).dot(at.normal);
       bend = std::max(bend, std::abs(fall));
@@ -91,13 +64,16 @@ class SpacingMap {
   }
 
   // That of the nearest spot on this side of the surface.
-  double at(const Spot& p) const {
+  double at(const SurfaceSpot& p) const {
     double nearest = 1e300, spacing = 0;
-    grid_.any_within(p.position, 2 * limits_.least_m, [&](int n, double squared_distance) {
-      if (squared_distance < nearest && spots_[std::size_t(n)].normal.dot(p.normal) > same_side)
-        nearest = squared_distance, spacing = spacing_[std::size_t(n)];
-      return false;
-    });
+    for (const double radius : {limits_.least_m, 2 * limits_.least_m}) {
+      fine_grid_.any_within(p.position, radius, [&](int n, double squared_distance) {
+        if (squared_distance < nearest && spots_[std::size_t(n)].normal.dot(p.normal) > same_side)
+          nearest = squared_distance, spacing = spacing_[std::size_t(n)];
+        return false;
+      });
+      if (spacing > 0) break;
+    }
     return spacing > 0 ? spacing : measured(p);
   }
 
@@ -113,14 +89,14 @@ class SpacingMap {
   }
 
   SampleSpacing limits_;
-  std::vector<Spot> spots_;
+  std::vector<SurfaceSpot> spots_;
   std::vector<double> spacing_;
-  PointGrid grid_;
+  PointGrid grid_, fine_grid_;
 };
 
 // Corners that stick out, then points of the creases that do.
-std::vector<Spot> spots_that_stick_out(const SurfaceMesh& surface, const std::vector<char>& seen,
-                                       double step) {
+std::vector<SurfaceSpot> spots_that_stick_out(const SurfaceMesh& surface, const std::vector<char>& seen,
+                                              double step) {
   struct Side {
     int a, b, triangle, apex;
   };
@@ -166,7 +142,7 @@ std::vector<Spot> spots_that_stick_out(const SurfaceMesh& surface, const std::ve
     ends.push_back({creases[std::size_t(c)].b, c, -along});
   }
   std::stable_sort(ends.begin(), ends.end(), [](const End& s, const End& t) { return s.vertex < t.vertex; });
-  std::vector<Spot> spots;
+  std::vector<SurfaceSpot> spots;
   for (std::size_t i = 0, end; i < ends.size(); i = end) {
     Vec3 normal = Vec3::Zero();
     for (end = i; end < ends.size() && ends[end].vertex == ends[i].vertex; ++end)
@@ -184,15 +160,15 @@ std::vector<Spot> spots_that_stick_out(const SurfaceMesh& surface, const std::ve
 }
 
 // Of each candidate's share of the surface, to the nearest sample of its side.
-void share_area(const SpotSequence& sequence, int count, double area, const PointGrid& grid, double reach,
+void share_area(const SurfaceSpots& sequence, int count, double area, const PointGrid& grid, double reach,
                 std::vector<SurfaceSample>& samples) {
   std::vector<int> nearest(static_cast<std::size_t>(count));
   constexpr int chunk = 256;
   parallel_for((count + chunk - 1) / chunk, [&](int c) {
     for (int i = c * chunk; i < std::min(count, (c + 1) * chunk); ++i) {
-      const Spot spot = sequence.at(std::uint32_t(i));
+      const SurfaceSpot spot = sequence.at(std::uint32_t(i));
       int found = -1;
-      for (double radius = reach; found < 0; radius *= 4) {
+      for (double radius = reach; found < 0; radius *= 2) {
         double least = 1e300;
         grid.any_within(spot.position, radius, [&](int n, double squared_distance) {
           const bool other_side = samples[std::size_t(n)].normal.dot(spot.normal) < 0;
@@ -217,44 +193,50 @@ std::vector<SurfaceSample> sample_surface(const SurfaceMesh& surface, const Seen
                                           int most) {
   if (!(seen.area_m2 > 0)) return {};
   const Box box = bounding_box(surface.positions);
-  const SpotSequence sequence(seen);
+  const SurfaceSpots sequence(seen);
   const double discs = seen.area_m2 / (spacing.least_m * spacing.least_m);
   const int probes = int(std::clamp(probes_a_disc * discs, 1000.0, 0.25 * most_candidates)),
             candidates = int(std::clamp(candidates_a_disc * discs, 4000.0, 1.0 * most_candidates));
   const SpacingMap map(sequence, probes, box, spacing);
 
-  std::vector<Spot> spots = spots_that_stick_out(surface, seen.seen, spacing.least_m / 3);
+  std::vector<SurfaceSpot> spots = spots_that_stick_out(surface, seen.seen, spacing.least_m / 3);
   const std::size_t sticking_out = spots.size();
   for (int i = 0; i < candidates; ++i) spots.push_back(sequence.at(std::uint32_t(i)));
   std::vector<double> wanted;
-  for (const Spot& s : spots) wanted.push_back(map.at(s));
+  for (const SurfaceSpot& s : spots) wanted.push_back(map.at(s));
 
+  // What is not on a piece that was judged itself, or where pieces may be hidden in part, is judged where it
+  // is taken.
+  const std::size_t doubtful =
+      std::all_of(seen.pieces.begin(), seen.pieces.end(), [](const SurfacePiece& p) { return p.seen; })
+          ? sticking_out
+          : spots.size();
   enum : char { unknown, yes, no };
-  std::vector<char> at_the_surface(sticking_out, unknown);
-  const auto sticks_out = [&](std::size_t i) {
-    char& known = at_the_surface[i];
-    if (known == unknown)
-      known =
-          parts_inside_from_outside(winding, spots[i].position, spots[i].normal, spacing.offset_m) ? yes : no;
-    return known == yes;
+  std::vector<char> judgements(doubtful, unknown);
+  const auto is_hidden = [&](std::size_t i) {
+    if (i >= doubtful) return false;
+    char& hidden = judgements[i];
+    if (hidden == unknown)
+      hidden =
+          parts_inside_from_outside(winding, spots[i].position, spots[i].normal, spacing.offset_m) ? no : yes;
+    return hidden == yes;
   };
   for (double scale = 1;; scale *= 1.1) {
-    const double widest = scale * spacing.most_flat_m;
-    PointGrid grid(box, 0.5 * spacing.most_m);
+    PointGrid grid(box, spacing.most_m);
     std::vector<SurfaceSample> samples;
     for (std::size_t i = 0; i < spots.size() && int(samples.size()) <= most; ++i) {
-      const Spot& s = spots[i];
+      const SurfaceSpot& s = spots[i];
       const bool covered = grid.any_within(s.position, scale * wanted[i], [&](int n, double) {
         return samples[std::size_t(n)].normal.dot(s.normal) > same_side;
       });
       if (covered) continue;
-      if (i < sticking_out && !sticks_out(i)) continue;
+      if (is_hidden(i)) continue;
       grid.add(s.position);
       samples.push_back({s.position, s.normal, 0});
     }
     if (int(samples.size()) > most) continue;
     if (samples.empty()) return {};
-    share_area(sequence, std::min(candidates, 100'000), seen.area_m2, grid, widest, samples);
+    share_area(sequence, std::min(candidates, 100'000), seen.area_m2, grid, spacing.least_m, samples);
     return samples;
   }
 }

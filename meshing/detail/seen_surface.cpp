@@ -51,8 +51,27 @@ bool parts_inside_from_outside(const WindingNumber& winding, const Vec3& point, 
   return !winding.inside(point + offset * normal) && winding.inside(point - offset * normal);
 }
 
-SeenSurface seen_surface(const SurfaceMesh& surface, const WindingNumber& winding, double longest,
-                         double offset) {
+bool is_closed(const Triangles& triangles) {
+  std::vector<std::array<int, 3>> edges;  // lesser end, greater end, 1 or −1
+  edges.reserve(std::size_t(triangles.size()));
+  for (const auto t : triangles.rowwise())
+    for (int k = 0; k < 3; ++k) {
+      const int a = t[k], b = t[(k + 1) % 3];
+      edges.push_back({std::min(a, b), std::max(a, b), a < b ? 1 : -1});
+    }
+  std::sort(edges.begin(), edges.end());
+  int turns = 0;
+  for (std::size_t i = 0; i < edges.size(); ++i) {
+    turns += edges[i][2];
+    const bool last =
+        i + 1 == edges.size() || edges[i + 1][0] != edges[i][0] || edges[i + 1][1] != edges[i][1];
+    if (last && turns != 0) return false;
+  }
+  return true;
+}
+
+SeenSurface seen_surface(const SurfaceMesh& surface, const WindingNumber& winding, bool closed,
+                         double longest, double offset) {
   SeenSurface result;
   result.seen.assign(std::size_t(surface.triangles.rows()), 0);
   std::vector<SurfacePiece>& pieces = result.pieces;
@@ -70,7 +89,7 @@ SeenSurface seen_surface(const SurfaceMesh& surface, const WindingNumber& windin
   std::vector<Place> places;
   for (int i = 0; i < int(pieces.size()); ++i) {
     const auto& [a, b, c] = pieces[std::size_t(i)].corners;
-    const Vec3 cell = ((a + b + c) / 3.0 - lower) / (0.25 * longest),
+    const Vec3 cell = ((a + b + c) / 3.0 - lower) / (0.5 * longest),
                normal = pieces[std::size_t(i)].area_vector();
     if (!(normal.squaredNorm() > 0)) continue;  // has no sides
     int axis;
@@ -92,7 +111,8 @@ SeenSurface seen_surface(const SurfaceMesh& surface, const WindingNumber& windin
       const int piece = places[place].piece;
       const auto& [a, b, c] = pieces[std::size_t(piece)].corners;
       const Vec3 normal = pieces[std::size_t(piece)].area_vector().normalized(), middle = (a + b + c) / 3.0;
-      const double out = winding.at(middle + offset * normal), in = winding.at(middle - offset * normal);
+      const double out = winding.at(middle + offset * normal),
+                   in = closed ? out + 1 : winding.at(middle - offset * normal);
       return judgements[std::size_t(piece)] = {out <= 0.5 && in > 0.5, is_unclear(out) || is_unclear(in)};
     };
     const std::size_t first = groups[std::size_t(g)], last = groups[std::size_t(g) + 1] - 1;

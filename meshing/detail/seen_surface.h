@@ -28,7 +28,11 @@ struct SeenSurface {
 // Pieces are whole triangles where these are no longer than `longest`; each is judged by the winding number
 // at `offset` to either side of its middle, or goes by others that face the same way within `longest` / 4,
 // where the first and the last of these agree. Same input, same bytes on any number of threads.
-SeenSurface seen_surface(const SurfaceMesh&, const WindingNumber&, double longest, double offset);
+SeenSurface seen_surface(const SurfaceMesh&, const WindingNumber&, bool closed, double longest,
+                         double offset);
+
+// Whether each edge is run through as often one way as the other.
+bool is_closed(const Triangles&);
 
 // Whether a step of `offset` along the unit normal leads out, and against it in.
 bool parts_inside_from_outside(const WindingNumber&, const Vec3& point, const Vec3& normal, double offset);

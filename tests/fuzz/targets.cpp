@@ -4,6 +4,7 @@
 #include <array>
 #include <fstream>
 
+#include "core/contact_shape_file.h"
 #include "core/error.h"
 #include "core/hash.h"
 #include "core/json.h"
@@ -237,6 +238,14 @@ std::vector<Target> made_targets() {
     binding.weights.col(0).setOnes();
     ffd::write_binding(p, binding, surface(), cage());
   });
+  const std::string contact_npz = written("contact.npz", [](const fs::path& p) {
+    ContactShape shape;
+    shape.field = {Vec3::Zero(), 0.5, {2, 2, 2}, 1e-4, std::vector<std::int16_t>(8, -3)};
+    shape.samples = {Points::Zero(1, 3), Eigen::VectorXi::Zero(1), Weights::Constant(1, 4, 0.25),
+                     Eigen::VectorXd::Ones(1)};
+    shape.least_weight = Weights::Zero(2, 4);
+    write_contact_shape(p, shape, surface(), cage());
+  });
   const std::string plan_npz = written("plan.npz", [](const fs::path& p) {
     plan::write_plan(p, small_plan(), {{"a", 1}});
   });
@@ -270,6 +279,9 @@ std::vector<Target> made_targets() {
                 })}},
       {"npz", [](auto bytes) { read_npz(file_of(bytes, "a.npz")); }, {npz, plan_npz}},
       {"binding", [](auto bytes) { ffd::read_binding(npz_of(bytes), surface(), cage()); }, {packed(npz)}},
+      {"contact",
+       [](auto bytes) { read_contact_shape(npz_of(bytes), surface(), cage()); },
+       {packed(contact_npz)}},
       {"plan", [](auto bytes) { plan::read_plan(npz_of(bytes)); }, {packed(plan_npz)}},
       {"json", [](auto bytes) { read_json(file_of(bytes, "a.json")).dump(); }, {report}},
       {"scene", [](auto bytes) { scenes::read_scene(std::string(bytes), "scene.toml"); }, {scene_seed()}}};
