@@ -402,6 +402,7 @@ BodySpec read_body(const Node& table, const Box& bounds) {
   const std::string what = "bodies." + body.name;
   body.role = read_role(text(table, "role"));
   body.kind = text(table, "kind") == "rigid" ? Kind::rigid : Kind::deformable;
+  body.deformation = text(table, "deformation") == "phong" ? Deformation::phong : Deformation::linear;
   body.self_contact = flag(table, "self_contact");
   body.max_volume_change = number(table, "max_volume_change");
   body.model = read_model(child(table, "model"), what);

@@ -95,10 +95,15 @@ struct FixedSpec {
   std::vector<Box> boxes_m;  // all that lie in one of these boxes, in world coordinates at the start
 };
 
+// How the fine surface follows the nodes of its cage: docs/binding.md.
+enum class Deformation { linear, phong };
+constexpr Deformation usual_deformation = Deformation::linear;  // of a scene that does not say
+
 struct BodySpec {
   std::string name;  // letters, digits, _ and -: it names a folder
   Role role = Role::obstacle;
   Kind kind = Kind::deformable;
+  Deformation deformation = usual_deformation;
   bool self_contact = false;       // parts of it that are not neighbours push one another apart
   double max_volume_change = 0.1;  // |V − V0|/V0 in all states of a plan, in (0, 1]
   Model model;

@@ -1,5 +1,7 @@
 #include "scenes/detail/schema.h"
 
+#include "scenes/scene.h"
+
 #include <fmt/ranges.h>
 
 #include <algorithm>
@@ -73,6 +75,16 @@ constexpr Key all_keys[] = {
      "\"deformable\"",
      "a rigid obstacle does not move; a rigid robot or free body moves as one piece",
      "deformable, rigid",
+     ""},
+    {"bodies[].deformation",
+     Type::choice,
+     {},
+     0,
+     usual_deformation == Deformation::phong ? "\"phong\"" : "\"linear\"",
+     "how the fine surface follows its cage in films, exports and reports: linear in each tet, or bent "
+     "smoothly by Phong "
+     "Deformation (docs/binding.md)",
+     "linear, phong",
      ""},
     {"bodies[].self_contact",
      Type::boolean,

@@ -9,6 +9,7 @@
 #include <cstdlib>
 #include <cstring>
 #include <map>
+#include <sstream>
 
 #include "app/plan_folder.h"
 #include "app/scene_world.h"
@@ -19,9 +20,13 @@
 namespace limber::app {
 namespace {
 
-// Beside the robot and the soft block: a rigid body that falls, and one that stands.
+// Beside the robot, by Phong Deformation, and the soft block, linear: a rigid body that falls, and one that
+// stands.
 std::string scene_with_rigid_bodies() {
   std::string text = small_scene;
+  for (const auto& [role, deformation] : {std::pair("role = \"robot\"\n", "deformation = \"phong\"\n"),
+                                          {"role = \"obstacle\"\n", "deformation = \"linear\"\n"}})
+    text.insert(text.find(role), deformation);
   const std::string without = "gravity_m_s2 = [0, 0, 0]";
   text.replace(text.find(without), without.size(), "gravity_m_s2 = [0, 0, -1]");
   const std::string goal = "[goal]\n";
@@ -68,9 +73,12 @@ struct Truth {
   Points surface(int b, int frame) const {
     const PreparedBody& body = bodies[std::size_t(b)];
     if (!world.bodies[std::size_t(b)].moving) return body.surface.positions;
+    const Points nodes = fem::body_positions(world, planned.plan.trajectory.frames[std::size_t(frame)], b);
     Points p;
-    ffd::deform(body.binding, body.cage.tets,
-                fem::body_positions(world, planned.plan.trajectory.frames[std::size_t(frame)], b), p);
+    if (planned.scene.bodies[std::size_t(b)].deformation == scenes::Deformation::phong)
+      ffd::deform_phong(body.binding, body.cage, ffd::node_gradients(body.cage), nodes, p);
+    else
+      ffd::deform(body.binding, body.cage.tets, nodes, p);
     return p;
   }
   PlanFolder planned;
@@ -109,7 +117,7 @@ TEST_F(ExportMotion, GltfBySkinningIsTheBindingAtEveryFrame) {
   const int frames = int(truth.planned.plan.trajectory.frames.size());
   ASSERT_GT(frames, 5);
   EXPECT_NEAR(animation.mDuration / animation.mTicksPerSecond, (frames - 1) / 5.0, 1e-6);
-  double traveled = 0;
+  double traveled = 0, bent = 0;
   for (std::size_t b = 0; b < truth.bodies.size(); ++b) {
     const std::string& name = truth.planned.scene.bodies[b].name;
     SCOPED_TRACE(name);
@@ -140,9 +148,16 @@ TEST_F(ExportMotion, GltfBySkinningIsTheBindingAtEveryFrame) {
             std::max(worst, (Vec3(shown[v].x, -shown[v].z, shown[v].y) - wanted.row(v).transpose()).norm());
       EXPECT_LT(worst, 5e-6) << "frame " << f;
       traveled = std::max(traveled, (wanted - truth.surface(int(b), 0)).rowwise().norm().maxCoeff());
+      if (b != 0) continue;
+      Points linear;
+      ffd::deform(truth.bodies[b].binding, truth.bodies[b].cage.tets,
+                  fem::body_positions(truth.world, truth.planned.plan.trajectory.frames[std::size_t(f)], 0),
+                  linear);
+      bent = std::max(bent, (wanted - linear).rowwise().norm().maxCoeff());
     }
   }
   EXPECT_GT(traveled, 0.3);
+  EXPECT_GT(bent, 1e-3) << "the robot is not just turned and stretched";
 }
 
 TEST_F(ExportMotion, PointCacheIsAHeadAndThePointsOfEachFrame) {
@@ -165,9 +180,37 @@ TEST_F(ExportMotion, PointCacheIsAHeadAndThePointsOfEachFrame) {
     EXPECT_EQ(number(32 + 4 * std::size_t(k), 0.0f), float(first(0, k)));
     EXPECT_EQ(number(cache.size() - 12 + 4 * std::size_t(k), 0.0f), float(last(last.rows() - 1, k)));
   }
+  const std::string robot = read_file(file("pc2/robot.pc2"));
+  const Points bent = truth.surface(0, 10);
+  ASSERT_EQ(robot.size(), 32 + 3 * 12 * std::size_t(bent.rows()));
+  const std::vector<float> expected(bent.data(), bent.data() + bent.size());
+  EXPECT_EQ(std::memcmp(robot.data() + 32 + 2 * 12 * bent.rows(), expected.data(), 12 * expected.size() / 3),
+            0);
   EXPECT_FALSE(fs::exists(file("pc2/table.pc2"))) << "it stands still";
   EXPECT_TRUE(fs::exists(file("pc2/table.obj")));
   EXPECT_NE(read_file(file("pc2/README.txt")).find("1.25 frames a second"), std::string::npos);
+}
+
+TEST_F(ExportMotion, UsdHoldsThePointsOfEachFrame) {
+  ASSERT_EQ(exported("usd", {"--frames", "0,9"}).code, exit_done);
+  const Truth truth(out());
+  const Points wanted = truth.surface(0, 9);
+  const std::string usd = read_file(file("motion.usda"));
+  const auto samples = usd.find("point3f[] points.timeSamples", usd.find("def Mesh \"robot\""));
+  ASSERT_NE(samples, usd.npos);
+  std::string points = usd.substr(usd.find(" 9: [", samples) + 4);
+  points.resize(points.find(']'));
+  for (char& c : points)
+    if (std::strchr("[](),", c)) c = ' ';
+  std::istringstream numbers(points);
+  double worst = 0;
+  for (Eigen::Index i = 0; i < wanted.size(); ++i) {
+    double number = std::nan("");
+    numbers >> number;
+    ASSERT_TRUE(numbers) << i;
+    worst = std::max(worst, std::abs(number - wanted.data()[i]));
+  }
+  EXPECT_LT(worst, 1e-6 * truth.world.bounds_m.diagonal());
 }
 
 TEST_F(ExportMotion, SameMotionSameBytesAndAnEarlierSeriesGoes) {
