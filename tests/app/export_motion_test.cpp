@@ -91,9 +91,11 @@ aiMatrix4x4 local_at(const aiNode& node, const aiAnimation& animation, unsigned 
     const aiNodeAnim& channel = *animation.mChannels[c];
     if (channel.mNodeName != node.mName) continue;
     const auto at = [&](const auto* keys, unsigned count) { return keys[std::min(key, count - 1)].mValue; };
-    return aiMatrix4x4(at(channel.mScalingKeys, channel.mNumScalingKeys),
-                       at(channel.mRotationKeys, channel.mNumRotationKeys),
-                       at(channel.mPositionKeys, channel.mNumPositionKeys));
+    // Not by aiMatrix4x4(scale, turn, shift), which scales after the turn.
+    aiMatrix4x4 shift, scale;
+    aiMatrix4x4::Translation(at(channel.mPositionKeys, channel.mNumPositionKeys), shift);
+    aiMatrix4x4::Scaling(at(channel.mScalingKeys, channel.mNumScalingKeys), scale);
+    return shift * aiMatrix4x4(at(channel.mRotationKeys, channel.mNumRotationKeys).GetMatrix()) * scale;
   }
   return node.mTransformation;
 }
