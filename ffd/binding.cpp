@@ -225,10 +225,14 @@ Gradients node_deformation_gradients(const NodeGradients& gradients, const Point
   LIMBER_CHECK(Eigen::Index(gradients.begin.size()) == nodes + 1, gradients.begin.size(), nodes);
   Gradients result(nodes, 9);
   for (Eigen::Index i = 0; i < nodes; ++i) {
-    Eigen::Matrix3d f = Eigen::Matrix3d::Zero();
-    for (int k = gradients.begin[std::size_t(i)]; k < gradients.begin[std::size_t(i) + 1]; ++k)
-      f += cage_positions.row(gradients.neighbour[std::size_t(k)]).transpose() * gradients.gradient.row(k);
-    for (int row = 0; row < 3; ++row) result.row(i).segment<3>(3 * row) = f.row(row);
+    double f[9] = {};
+    for (int k = gradients.begin[std::size_t(i)]; k < gradients.begin[std::size_t(i) + 1]; ++k) {
+      const double* const x = cage_positions.data() + 3 * std::ptrdiff_t(gradients.neighbour[std::size_t(k)]);
+      const double* const g = gradients.gradient.data() + 3 * std::ptrdiff_t(k);
+      for (int row = 0; row < 3; ++row)
+        for (int column = 0; column < 3; ++column) f[3 * row + column] += x[row] * g[column];
+    }
+    std::copy_n(f, 9, &result(i, 0));
   }
   return result;
 }

@@ -106,6 +106,41 @@ TEST_F(Report, PackedMotionUnpacksToTheSurfacesOfAllFrames) {
   }
 }
 
+// What the page's own viewer does with it, run by node.
+TEST_F(Report, TheViewerMovesSurfacesAsFilmsDo) {
+  plan(replaced("role = \"obstacle\"\n", "role = \"obstacle\"\ndeformation = \"phong\"\n"));
+  ASSERT_EQ(limber_program({"report", out()}).code, exit_done);
+  if (std::system("node --version > /dev/null 2>&1") != 0) GTEST_SKIP() << "nodejs is missing";
+  const std::string script = std::string(limber_source_dir) + "/tools/readers/viewer.js";
+  ASSERT_EQ(std::system(("node '" + script + "' '" + out() + "/report.html' '" + out() + "/points'").c_str()),
+            0);
+  const std::string points = read_file(fs::path(out()) / "points");
+  const PlanFolder planned = read_plan_folder(out());
+  const std::vector<PreparedBody> bodies = read_bodies_of(planned, out());
+  const fem::World world = build_world(planned.scene, bodies);
+  EXPECT_EQ(bodies[1].deformation, scenes::Deformation::phong);
+  const double level = world.bounds_m.diagonal() / 65535;
+  std::size_t at = 0;
+  double worst = 0, bent = 0;
+  for (std::size_t b = 0; b < bodies.size(); ++b)
+    for (const State& state : planned.plan.trajectory.frames) {
+      const Points nodes = fem::body_positions(world, state, int(b));
+      Points wanted, linear;
+      deform(bodies[b], nodes, wanted);
+      ffd::deform(bodies[b].binding, bodies[b].cage.tets, nodes, linear);
+      bent = std::max(bent, (wanted - linear).cwiseAbs().maxCoeff());
+      ASSERT_LE(at + sizeof(float) * std::size_t(wanted.size()), points.size());
+      for (Eigen::Index i = 0; i < wanted.size(); ++i, at += sizeof(float)) {
+        float shown = 0;
+        std::memcpy(&shown, points.data() + at, sizeof shown);
+        worst = std::max(worst, std::abs(double(shown) - wanted.data()[i]));
+      }
+    }
+  EXPECT_EQ(at, points.size());
+  EXPECT_LT(worst, 2 * level);
+  EXPECT_GT(bent, 20 * level);
+}
+
 TEST_F(Report, HoldsEveryPromiseOnceAndTextOfTheUserOnlyAsText) {
   const std::string hostile = "</script><script>alert(1)</script>&\\\"'";
   plan(replaced("name = \"small\"\n", "name = \"small\"\ndescription = \"" + hostile + "\"\n"));
