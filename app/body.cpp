@@ -221,6 +221,7 @@ PreparedBody read_body(const fs::path& folder) {
     body.cage = read_msh(folder / "cage.msh", &body.shell_from_tet);
     body.binding = ffd::read_binding(folder / "binding.npz", body.surface, body.cage);
     body.contact = read_contact_shape(folder / "contact.npz", body.surface, body.cage);
+    body.gradients = ffd::node_gradients(body.cage);
   } catch (const InputError& error) {
     throw InputError(fmt::format(
         "{}; make the body anew with limber prepare, or the scene's bodies with limber plan", error.what()));
@@ -231,6 +232,18 @@ PreparedBody read_body(const fs::path& folder) {
                     (folder / "report.json").string(), error.what()));
   }
   return body;
+}
+
+void deform(const PreparedBody& body, const Points& cage_positions, Points& surface_positions) {
+  deform(body, body.binding, cage_positions, surface_positions);
+}
+
+void deform(const PreparedBody& body, const ffd::Binding& part, const Points& cage_positions,
+            Points& surface_positions) {
+  if (body.deformation == scenes::Deformation::phong)
+    ffd::deform_phong(part, body.cage, body.gradients, cage_positions, surface_positions);
+  else
+    ffd::deform(part, body.cage.tets, cage_positions, surface_positions);
 }
 
 std::string summary_of_report(const Json& report) {

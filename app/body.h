@@ -12,6 +12,7 @@
 #include "core/mesh.h"
 #include "ffd/binding.h"
 #include "meshing/import.h"
+#include "scenes/scene.h"
 
 namespace limber::app {
 
@@ -44,11 +45,20 @@ struct PreparedBody {
   std::vector<int> shell_from_tet;  // (T)
   ffd::Binding binding;
   ContactShape contact;
+  ffd::NodeGradients gradients;  // of the cage
+  scenes::Deformation deformation = scenes::usual_deformation;
   Json report;
 };
 // Throws InputError naming the file and the command that renews it when one is missing, damaged, or of
 // another body.
 PreparedBody read_body(const fs::path& folder);
+
+// Where the fine surface is (V × 3), overwritten, when the cage's nodes are there: the one answer of films,
+// exports and reports.
+void deform(const PreparedBody&, const Points& cage_positions, Points& surface_positions);
+// The same of some vertices only, bound to the body's cage by `part`.
+void deform(const PreparedBody&, const ffd::Binding& part, const Points& cage_positions,
+            Points& surface_positions);
 
 // The figures of a report as a few lines.
 std::string summary_of_report(const Json& report);

@@ -314,7 +314,7 @@ int run_command_line(int argc, const char* const* argv) {
   render_command
       .add_option("--set", render_options.sets,
                   "edit how it is filmed: film.KEY=VALUE, camera.KEY=VALUE, bodies.NAME.color=… (also "
-                  "opacity, roughness, metallic)")
+                  "opacity, roughness, metallic, deformation)")
       ->type_name("KEY=VALUE")
       ->allow_extra_args(false);
   render_command.add_flag("--resume", render_options.resume,

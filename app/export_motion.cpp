@@ -27,15 +27,14 @@ Points surface_at(const PlannedMotion& motion, int body, int frame) {
   const PreparedBody& prepared = motion.bodies[std::size_t(body)];
   if (!motion.world.bodies[std::size_t(body)].moving) return prepared.surface.positions;
   Points surface;
-  ffd::deform(prepared.binding, prepared.cage.tets,
-              fem::body_positions(motion.world, motion.frames[std::size_t(frame)], body), surface);
+  deform(prepared, fem::body_positions(motion.world, motion.frames[std::size_t(frame)], body), surface);
   return surface;
 }
 
 Points surface_at_rest(const fem::Body& body, const PreparedBody& prepared) {
   if (!body.moving) return prepared.surface.positions;
   Points surface;
-  ffd::deform(prepared.binding, prepared.cage.tets, prepared.cage.positions, surface);
+  deform(prepared, prepared.cage.positions, surface);
   return surface;
 }
 
@@ -94,10 +93,14 @@ Outcome export_motion(const ExportOptions& options) {
                         written.files > 1 ? fmt::format("{} files, ", written.files) : "",
                         1e-6 * double(written.bytes));
   }
+  Json deformations;
+  for (const scenes::BodySpec& body : planned.scene.bodies)
+    deformations[body.name] = body.deformation == scenes::Deformation::phong ? "phong" : "linear";
   const Json result{{"frames", motion.wanted.size()},
                     {"frame_list", motion.wanted},
                     {"trajectory_hash", hex(plan::hash_of(path))},
                     {"folder", out.string()},
+                    {"deformation", deformations},
                     {"formats", formats}};
   update_manifest(options.folder, "export", result);
   return {exit_done, result,

@@ -38,9 +38,10 @@ struct WrittenFiles {
 // Each writes into the folder, which is there, and throws DiskError, or Interrupted between two frames.
 
 // motion.glb: binary glTF 2.0, y up. Each deformable body is a mesh with a skin: the joints are its cage's
-// nodes, a vertex' weights its barycentric ones, so that Σ wᵢ (x + pᵢ − pᵢ⁰) = Σ wᵢ pᵢ, the very binding.
-// Skins know no negative weights: those of vertices outside their tet are set to 0, with a warning that says
-// how far they end up at most.
+// nodes, a vertex' weights its barycentric ones, so that Σ wᵢ (x + pᵢ − pᵢ⁰) = Σ wᵢ pᵢ, the very binding;
+// where it is deformed by Phong Deformation, two joints a node hold ½ Fᵢ as well. Skins know no negative
+// weights: those of vertices outside their tet are set to 0, with a warning that says how far they end up at
+// most.
 WrittenFiles write_gltf(const PlannedMotion&, const fs::path& folder);
 
 // motion.usda: meshes with their points at each frame.

@@ -222,7 +222,7 @@ struct Shot::Painter::View {
     }
     surface.resize(prepared.surface.positions.rows(), 3);
     normals.resize(surface.rows(), 3);
-    ffd::deform(prepared.binding, prepared.cage.tets, hull, surface);
+    deform(prepared, hull, surface);
     ffd::deform_normals(prepared.binding, prepared.cage, hull, rest_normals[b], normals);
     renderer.set_positions(meshes[b], surface, normals);
     if (casters[b].mesh >= 0) renderer.set_positions(casters[b].mesh, casters[b].stand_in.positions(surface));

@@ -98,13 +98,15 @@ scenes::Scene filmed_as(const scenes::Scene& planned, const std::vector<std::str
   for (const std::string& set : sets) {
     const std::string key = set.substr(0, set.find('='));
     const auto last = key.substr(key.rfind('.') + 1);
-    const bool look = key.starts_with("bodies.") &&
-                      (last == "color" || last == "opacity" || last == "roughness" || last == "metallic");
+    const bool look =
+        key.starts_with("bodies.") && (last == "color" || last == "opacity" || last == "roughness" ||
+                                       last == "metallic" || last == "deformation");
     const bool film = key.starts_with("film.") && key != "film.speed" && key != "film.frames_per_second";
     if (!look && !film && !key.starts_with("camera.") && !key.starts_with("cameras."))
       throw InputError(fmt::format(
           "--set {}: the motion is planned already; what can be set here are film (but speed and "
-          "frames_per_second), camera, cameras, and color, opacity, roughness and metallic of bodies; "
+          "frames_per_second), camera, cameras, and color, opacity, roughness, metallic and deformation of "
+          "bodies; "
           "for the rest plan anew with limber plan",
           set));
   }
@@ -127,8 +129,9 @@ std::string suffix_of(const RenderOptions& options) {
 
 Outcome render(const RenderOptions& options) {
   const std::string suffix = suffix_of(options);
-  const PlanFolder planned = read_plan_folder(options.folder);
-  const scenes::Scene scene = filmed_as(planned.scene, options.sets);
+  PlanFolder planned = read_plan_folder(options.folder);
+  planned.scene = filmed_as(planned.scene, options.sets);
+  const scenes::Scene& scene = planned.scene;
   const std::vector<PreparedBody> bodies = read_bodies_of(planned, options.folder);
   const std::vector<SurfaceMesh> scenery = read_scenery(scene, options.folder);
   const fem::World world = build_world(scene, bodies);

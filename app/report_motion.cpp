@@ -85,6 +85,7 @@ PackedMotion pack_motion(const fem::World& world, const std::vector<PreparedBody
       entry["tets"] = packer.add(as(prepared.cage.tets, std::uint32_t()));
       entry["edges"] = packer.add(edges_of(body.surface));
       entry["tet_from_vertex"] = packer.add(as(prepared.binding.tet_from_vertex, std::uint32_t()));
+      entry["phong"] = prepared.deformation == scenes::Deformation::phong;
       entry["frames"] = packer.add(levels);
       entry["frames_low"] = json_of(reach.lower);
       entry["frames_step"] = json_of(Packer::step_of(reach));

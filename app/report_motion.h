@@ -17,6 +17,7 @@ struct PackedMotion {
   //   cage               float32 (3N) at rest, metres
   //   tets, edges        uint32 (4T), (2E) of its boundary
   //   tet_from_vertex    uint32 (V)
+  //   phong              whether the surface follows by Phong Deformation, or linearly
   //   frames             uint16 (frames × 3N); × frames_step + frames_low is metres
   // 16 bits are a 65,535th of the box of all that the array holds.
   Json bodies = Json::array();

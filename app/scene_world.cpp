@@ -159,8 +159,10 @@ std::vector<SurfaceMesh> read_scenery(const scenes::Scene& scene, const fs::path
 
 std::vector<PreparedBody> read_bodies(const scenes::Scene& scene, const fs::path& work_folder) {
   std::vector<PreparedBody> bodies;
-  for (const scenes::BodySpec& body : scene.bodies)
+  for (const scenes::BodySpec& body : scene.bodies) {
     bodies.push_back(read_body(body_folder(work_folder, body)));
+    bodies.back().deformation = body.deformation;
+  }
   return bodies;
 }
 

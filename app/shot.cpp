@@ -131,15 +131,13 @@ Points Shot::outline_of_motion(int subject) const {
     if (subject >= 0 && int(b) != subject) continue;
     const PreparedBody& body = bodies_[b];
     const std::vector<Eigen::Index> outermost = outermost_of(body.surface.positions);
+    const ffd::Binding part{body.binding.tet_from_vertex(outermost),
+                            body.binding.weights(outermost, Eigen::all)};
+    Points places;
     for (const State& state : plan_.trajectory.frames) {
       const Points nodes = fem::body_positions(world_, state, int(b));
-      for (const Eigen::Index v : outermost) {
-        Vec3 place = Vec3::Zero();
-        for (int i = 0; i < 4; ++i)
-          place += body.binding.weights(v, i) *
-                   nodes.row(body.cage.tets(body.binding.tet_from_vertex[v], i)).transpose();
-        points.push_back(place);
-      }
+      deform(body, part, nodes, places);
+      for (Eigen::Index i = 0; i < places.rows(); ++i) points.push_back(places.row(i));
       for (Eigen::Index n = 0; cages && n < nodes.rows(); ++n) points.push_back(nodes.row(n));
       if (!world_.bodies[b].moving) break;
     }
@@ -327,6 +325,7 @@ std::uint64_t Shot::hash_of_look() const {
   };
   for (std::size_t b = 0; b < bodies_.size(); ++b) {
     hasher.value(limber::hash_of(bodies_[b].surface)).value(limber::hash_of(bodies_[b].cage));
+    hasher.value(int(bodies_[b].deformation));
     add_look(scene_.bodies[b]);
   }
   for (std::size_t s = 0; s < scenery_.size(); ++s) {

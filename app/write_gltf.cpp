@@ -1,5 +1,6 @@
 #include <Eigen/SVD>
 #include <algorithm>
+#include <array>
 #include <limits>
 
 #include "app/motion_files.h"
@@ -42,6 +43,48 @@ Pose best_fit(const Points& from, const Points& to) {
   pose.turn = Eigen::Quaterniond(Eigen::Quaterniond(turn).cast<float>()).normalized();
   pose.shift = to_middle - pose.turn * from_middle;
   return pose;
+}
+
+// A linear map as turn · scale · turn; one number of the scale is negative where the map mirrors.
+struct Stretch {
+  Eigen::Matrix3d outer = Eigen::Matrix3d::Identity(), inner = Eigen::Matrix3d::Identity();  // U, V: U S Vᵀ
+  Vec3 scale = Vec3::Ones();
+};
+
+// The axes of a stretch have 24 orders and signs. That whose V is nearest to the one before is taken: then U
+// and V turn alike from frame to frame, and what viewers show between two frames is near to both.
+Stretch stretch_of(const Eigen::Matrix3d& map, const Stretch& before) {
+  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(map, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  Eigen::Matrix3d u = svd.matrixU(), v = svd.matrixV();
+  Vec3 scale = svd.singularValues();
+  if (v.determinant() < 0) v.col(2) *= -1, u.col(2) *= -1;
+  if (u.determinant() < 0) u.col(2) *= -1, scale[2] *= -1;
+  Stretch nearest;
+  double most = -std::numeric_limits<double>::infinity();
+  std::array<int, 3> order{0, 1, 2};
+  do {
+    for (int signs = 0; signs < 8; ++signs) {
+      Eigen::Matrix3d axes;
+      for (int k = 0; k < 3; ++k) axes.col(k) = (signs >> k & 1 ? -1 : 1) * v.col(order[std::size_t(k)]);
+      const double likeness = (before.inner.transpose() * axes).trace();
+      if (axes.determinant() < 0 || likeness <= most) continue;
+      most = likeness;
+      nearest.inner = axes;
+      for (int k = 0; k < 3; ++k) {
+        nearest.outer.col(k) = (signs >> k & 1 ? -1 : 1) * u.col(order[std::size_t(k)]);
+        nearest.scale[k] = scale[order[std::size_t(k)]];
+      }
+    }
+  } while (std::next_permutation(order.begin(), order.end()));
+  return nearest;
+}
+
+// As x y z w, in that of its two signs which is nearer to the one before.
+void append(std::vector<float>& turns, const Eigen::Quaterniond& turn) {
+  double likeness = 0;
+  for (std::size_t k = 0; k < 4 && !turns.empty(); ++k)
+    likeness += double(turns[turns.size() - 4 + k]) * turn.coeffs()[Eigen::Index(k)];
+  for (int k = 0; k < 4; ++k) turns.push_back(float(likeness < 0 ? -turn.coeffs()[k] : turn.coeffs()[k]));
 }
 
 std::vector<float> floats_of(const auto& rows) { return {rows.data(), rows.data() + rows.size()}; }
@@ -148,12 +191,10 @@ class Writer {
     }
     std::vector<Pose> poses;
     for (const Points& cage : cages) poses.push_back(best_fit(rest, cage));
-    for (std::size_t f = 1; f < poses.size(); ++f)  // the short way from one to the next
-      if (poses[f].turn.dot(poses[f - 1].turn) < 0) poses[f].turn.coeffs() *= -1;
     if (body.kind == fem::BodyKind::rigid)
       animate(add_root(node), poses);
     else
-      add_skin(add_root(node), body.name, rest, cages, poses);
+      add_skin(add_root(node), b, rest, cages, poses);
   }
 
   std::string binary() {
@@ -230,17 +271,20 @@ class Writer {
 
   void warn_of_error(int b) const {
     const PreparedBody& prepared = motion_.bodies[std::size_t(b)];
+    const Points rest = surface_at_rest(motion_.world.bodies[std::size_t(b)], prepared);
     const Weights kept = prepared.binding.weights.cwiseMax(0);
     double farthest = 0;
     for (const int f : motion_.wanted) {
       const Points cage = fem::body_positions(motion_.world, motion_.frames[std::size_t(f)], b);
+      const std::vector<Eigen::Matrix3d> maps = maps_of_nodes(b, prepared.gradients, cage);
       for (Eigen::Index v = 0; v < kept.rows(); ++v) {
         if (prepared.binding.weights.row(v).minCoeff() >= 0) continue;
         Vec3 error = Vec3::Zero();
         for (int k = 0; k < 4; ++k) {
           const int node = prepared.cage.tets(prepared.binding.tet_from_vertex[v], k);
+          const Vec3 from_node = (rest.row(v) - prepared.cage.positions.row(node)).transpose();
           error += (kept(v, k) / kept.row(v).sum() - prepared.binding.weights(v, k)) *
-                   (cage.row(node) - prepared.cage.positions.row(node)).transpose();
+                   (cage.row(node).transpose() + maps[std::size_t(node)] * from_node);
         }
         farthest = std::max(farthest, error.norm());
       }
@@ -252,25 +296,52 @@ class Writer {
         motion_.scene.bodies[std::size_t(b)].name, farthest);
   }
 
-  // A joint for the body as a whole, which turns normals with it, and below it one for each node of the cage.
-  void add_skin(int mesh_node, const std::string& name, const Points& rest, const std::vector<Points>& cages,
+  bool bends(int b) const { return motion_.bodies[std::size_t(b)].deformation == scenes::Deformation::phong; }
+
+  // The surface is the mean, by the binding's weights, of maps X ↦ x + L (X − X⁰), one a node of the cage: L
+  // is 1 in linear deformation and ½ F in Phong's.
+  std::vector<Eigen::Matrix3d> maps_of_nodes(int b, const ffd::NodeGradients& gradients,
+                                             const Points& cage) const {
+    std::vector<Eigen::Matrix3d> maps(std::size_t(cage.rows()), Eigen::Matrix3d::Identity());
+    if (!bends(b)) return maps;
+    const ffd::Gradients f = ffd::node_deformation_gradients(gradients, cage);
+    for (std::size_t n = 0; n < maps.size(); ++n)
+      maps[n] = 0.5 * Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(&f(Eigen::Index(n), 0));
+    return maps;
+  }
+
+  // A joint for the body as a whole, which turns normals with it, and below it one for each node of the cage,
+  // with that node's map. A joint can turn, scale and shift only, so a map that does more takes a second
+  // joint: the one above turns by U and scales, the one below it turns by Vᵀ.
+  void add_skin(int mesh_node, int b, const Points& rest, const std::vector<Points>& cages,
                 const std::vector<Pose>& poses) {
+    const std::string& name = motion_.world.bodies[std::size_t(b)].name;
     const Eigen::Index count = rest.rows();
-    std::vector<int> joints;
-    for (Eigen::Index n = 0; n < count; ++n)
-      joints.push_back(gltf_.add("nodes", {{"translation", {rest(n, 0), rest(n, 1), rest(n, 2)}}}));
-    const int root = add_root({{"name", name + ".cage"}, {"children", joints}});
+    std::vector<int> joints, upper;
+    for (Eigen::Index n = 0; n < count; ++n) {
+      Json node{{"translation", {rest(n, 0), rest(n, 1), rest(n, 2)}}};
+      if (bends(b)) {
+        joints.push_back(gltf_.add("nodes", Json::object()));
+        node["scale"] = {0.5, 0.5, 0.5};
+        node["children"] = {joints.back()};
+      }
+      upper.push_back(gltf_.add("nodes", node));
+    }
+    if (!bends(b)) joints = upper;
+    const int root = add_root({{"name", name + ".cage"}, {"children", upper}});
     animate(root, poses);
 
+    std::vector<Points> places;  // (nodes × 3) a frame, as seen from the body's joint
+    for (std::size_t f = 0; f < cages.size(); ++f)
+      places.push_back((cages[f].rowwise() - poses[f].shift.transpose()) * poses[f].turn.toRotationMatrix());
     gltf_.begin_view(Gltf::none);
     for (Eigen::Index n = 0; n < count; ++n) {
-      std::vector<float> places;
-      for (std::size_t f = 0; f < cages.size(); ++f) {
-        const Vec3 place = poses[f].turn.conjugate() * (cages[f].row(n).transpose() - poses[f].shift);
-        for (int k = 0; k < 3; ++k) places.push_back(float(place[k]));
-      }
-      animate(joints[std::size_t(n)], "translation", gltf_.accessor(places, 3));
+      std::vector<float> shifts;
+      for (const Points& place : places)
+        for (int k = 0; k < 3; ++k) shifts.push_back(float(place(n, k)));
+      animate(upper[std::size_t(n)], "translation", gltf_.accessor(shifts, 3));
     }
+    if (bends(b)) animate_stretches(b, upper, joints, rest, places);
     std::vector<float> inverse_bind;
     for (Eigen::Index n = 0; n < count; ++n) {
       Eigen::Matrix4f m = Eigen::Matrix4f::Identity();
@@ -283,10 +354,38 @@ class Writer {
                             {"inverseBindMatrices", gltf_.accessor_alone(inverse_bind, 16, Gltf::none)}});
   }
 
+  void animate_stretches(int b, const std::vector<int>& upper, const std::vector<int>& lower,
+                         const Points& rest, const std::vector<Points>& places) {
+    struct Channels {
+      std::vector<float> outer, scale, inner;
+      Stretch last;
+    };
+    std::vector<Channels> channels(upper.size());
+    const ffd::NodeGradients gradients =
+        ffd::node_gradients({rest, motion_.bodies[std::size_t(b)].cage.tets});  // y up
+    for (const Points& place : places) {
+      throw_if_stopped();
+      const std::vector<Eigen::Matrix3d> maps = maps_of_nodes(b, gradients, place);
+      for (std::size_t n = 0; n < maps.size(); ++n) {
+        Channels& c = channels[n];
+        c.last = stretch_of(maps[n], c.last);
+        append(c.outer, Eigen::Quaterniond(c.last.outer));
+        append(c.inner, Eigen::Quaterniond(c.last.inner).conjugate());
+        for (int k = 0; k < 3; ++k) c.scale.push_back(float(c.last.scale[k]));
+      }
+    }
+    gltf_.begin_view(Gltf::none);
+    for (std::size_t n = 0; n < channels.size(); ++n) {
+      animate(upper[n], "rotation", gltf_.accessor(channels[n].outer, 4));
+      animate(upper[n], "scale", gltf_.accessor(channels[n].scale, 3));
+      animate(lower[n], "rotation", gltf_.accessor(channels[n].inner, 4));
+    }
+  }
+
   void animate(int node, const std::vector<Pose>& poses) {
     std::vector<float> turns, shifts;
     for (const Pose& pose : poses) {
-      for (int k = 0; k < 4; ++k) turns.push_back(float(pose.turn.coeffs()[k]));  // x y z w, as glTF
+      append(turns, pose.turn);
       for (int k = 0; k < 3; ++k) shifts.push_back(float(pose.shift[k]));
     }
     animate(node, "rotation", gltf_.accessor_alone(turns, 4, Gltf::none));

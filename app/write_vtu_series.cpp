@@ -48,6 +48,7 @@ struct Frame {
 Frame frame_of(const PlannedMotion& motion, int f) {
   const State& state = motion.frames[std::size_t(f)];
   Frame frame;
+  Points surface_velocity;
   for (int b = 0; b < int(motion.bodies.size()); ++b) {
     const fem::Body& body = motion.world.bodies[std::size_t(b)];
     const PreparedBody& prepared = motion.bodies[std::size_t(b)];
@@ -65,12 +66,10 @@ Frame frame_of(const PlannedMotion& motion, int f) {
       frame.volume_ratio.push_back(float(1 + change));
 
     const ffd::Binding& binding = prepared.binding;
+    deform(prepared, velocity, surface_velocity);  // it is linear in the nodes
     for (Eigen::Index v = 0; v < binding.weights.rows(); ++v) {
-      const int tet = binding.tet_from_vertex[v];
-      Eigen::RowVector3d sum = Eigen::RowVector3d::Zero();
-      for (int k = 0; k < 4; ++k) sum += binding.weights(v, k) * velocity.row(prepared.cage.tets(tet, k));
-      frame.surface_speed.push_back(float(sum.norm()));
-      frame.surface_strain.push_back(float(strains.largest[std::size_t(tet)]));
+      frame.surface_speed.push_back(float(surface_velocity.row(v).norm()));
+      frame.surface_strain.push_back(float(strains.largest[std::size_t(binding.tet_from_vertex[v])]));
     }
   }
   return frame;

@@ -1,7 +1,7 @@
 // binding_bench MODEL… TETS…: one line a model and budget: CPU ms to bind, million vertices a second that
-// deform() and deform_normals() move on one thread, the largest error of a round trip (bind, then deform with
-// the cage at rest) over the diagonal, and the floor: the seconds a copy of as many bytes takes in the same
-// run.
+// deform(), deform_phong() and deform_normals() move on one thread, the largest error of a round trip (bind,
+// then deform with the cage at rest) over the diagonal, and the floor: the seconds a copy of as many bytes
+// takes in the same run.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -48,6 +48,10 @@ void measure(const std::string& path, const SurfaceMesh& surface, int tets) {
   const double bind_s = seconds_of([&] { binding = ffd::bind(surface, cage); });
   Points moved, normals;
   const double deform_s = seconds_of([&] { ffd::deform(binding, cage.tets, cage.positions, moved); });
+  const ffd::NodeGradients gradients = ffd::node_gradients(cage);
+  Points bent;
+  const double phong_s =
+      seconds_of([&] { ffd::deform_phong(binding, cage, gradients, cage.positions, bent); });
   const Points rest = vertex_normals(surface.positions, surface.triangles);
   const double normals_s =
       seconds_of([&] { ffd::deform_normals(binding, cage, cage.positions, rest, normals); });
@@ -62,10 +66,11 @@ void measure(const std::string& path, const SurfaceMesh& surface, int tets) {
   const double vertices = double(surface.positions.rows());
   const double error =
       (moved - surface.positions).rowwise().norm().maxCoeff() / bounding_box(surface.positions).diagonal();
-  fmt::print("{:<24} {:>8.0f} {:>6} {:>8.2f} {:>8.0f} {:>8.0f} {:>9.1e} {:>8} {:>8.1f} {:>8.1f}\n",
+  fmt::print("{:<24} {:>8.0f} {:>6} {:>8.2f} {:>8.0f} {:>8.0f} {:>8.0f} {:>9.1e} {:>8} {:>8.1f} {:>8.1f}\n",
              fs::path(path).stem().string(), vertices, cage.tets.rows(), 1e3 * bind_s,
-             1e-6 * vertices / deform_s, 1e-6 * vertices / normals_s, error, binding.outside,
-             1e-9 * bytes_a_vertex * vertices / deform_s, 1e-9 * bytes_a_vertex * vertices / copy_s);
+             1e-6 * vertices / deform_s, 1e-6 * vertices / phong_s, 1e-6 * vertices / normals_s, error,
+             binding.outside, 1e-9 * bytes_a_vertex * vertices / deform_s,
+             1e-9 * bytes_a_vertex * vertices / copy_s);
 }
 
 }  // namespace
@@ -78,8 +83,8 @@ int main(int argc, char** argv) try {
       budgets.push_back(std::stoi(argument));
     else
       models.push_back(argument);
-  fmt::print("{:<24} {:>8} {:>6} {:>8} {:>8} {:>8} {:>9} {:>8} {:>8} {:>8}\n", "model", "vertices", "tets",
-             "bind ms", "deform", "normals", "trip", "outside", "GB/s", "copy");
+  fmt::print("{:<24} {:>8} {:>6} {:>8} {:>8} {:>8} {:>8} {:>9} {:>8} {:>8} {:>8}\n", "model", "vertices",
+             "tets", "bind ms", "deform", "phong", "normals", "trip", "outside", "GB/s", "copy");
   for (const std::string& path : models) {
     const SurfaceMesh surface = meshing::import_model(path, {.count_self_intersections = false}).surface;
     for (const int tets : budgets) measure(path, surface, tets);

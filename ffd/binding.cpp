@@ -2,6 +2,7 @@
 
 #include <Eigen/LU>
 #include <cmath>
+#include <map>
 
 #include "core/error.h"
 #include "ffd/detail/tet_locator.h"
@@ -187,6 +188,84 @@ void deform(const Binding& binding, const Tets& tets, const Points& cage_positio
     double* const p = surface_positions.data() + 3 * v;
     for (int axis = 0; axis < 3; ++axis)
       p[axis] = w[0] * a[axis] + w[1] * b[axis] + w[2] * c[axis] + w[3] * d[axis];
+  }
+}
+
+NodeGradients node_gradients(const TetMesh& rest) {
+  const std::size_t nodes = std::size_t(rest.positions.rows());
+  // Six volumes of a tet times the gradients of its corners' weights: no quotient, so flat tets do no harm.
+  std::vector<std::map<int, Vec3>> sums(nodes);
+  std::vector<double> volumes(nodes, 0.0);
+  for (Eigen::Index t = 0; t < rest.tets.rows(); ++t) {
+    const auto tet = rest.tets.row(t);
+    const Vec3 a = rest.positions.row(tet[0]), b = Vec3(rest.positions.row(tet[1])) - a,
+               c = Vec3(rest.positions.row(tet[2])) - a, d = Vec3(rest.positions.row(tet[3])) - a;
+    const Vec3 of_b = c.cross(d), of_c = d.cross(b), of_d = b.cross(c);
+    const Vec3 gradients[4] = {-(of_b + of_c + of_d), of_b, of_c, of_d};
+    for (int i = 0; i < 4; ++i) {
+      volumes[std::size_t(tet[i])] += b.dot(of_b);
+      for (int j = 0; j < 4; ++j)
+        sums[std::size_t(tet[i])].try_emplace(tet[j], Vec3::Zero()).first->second += gradients[j];
+    }
+  }
+  NodeGradients result;
+  result.begin.push_back(0);
+  for (const auto& row : sums) result.begin.push_back(result.begin.back() + int(row.size()));
+  result.gradient.resize(result.begin.back(), 3);
+  for (std::size_t i = 0; i < nodes; ++i)
+    for (const auto& [j, sum] : sums[i]) {
+      result.gradient.row(Eigen::Index(result.neighbour.size())) = sum / volumes[i];
+      result.neighbour.push_back(j);
+    }
+  return result;
+}
+
+Gradients node_deformation_gradients(const NodeGradients& gradients, const Points& cage_positions) {
+  const Eigen::Index nodes = cage_positions.rows();
+  LIMBER_CHECK(Eigen::Index(gradients.begin.size()) == nodes + 1, gradients.begin.size(), nodes);
+  Gradients result(nodes, 9);
+  for (Eigen::Index i = 0; i < nodes; ++i) {
+    double f[9] = {};
+    for (int k = gradients.begin[std::size_t(i)]; k < gradients.begin[std::size_t(i) + 1]; ++k) {
+      const double* const x = cage_positions.data() + 3 * std::ptrdiff_t(gradients.neighbour[std::size_t(k)]);
+      const double* const g = gradients.gradient.data() + 3 * std::ptrdiff_t(k);
+      for (int row = 0; row < 3; ++row)
+        for (int column = 0; column < 3; ++column) f[3 * row + column] += x[row] * g[column];
+    }
+    std::copy_n(f, 9, &result(i, 0));
+  }
+  return result;
+}
+
+void deform_phong(const Binding& binding, const TetMesh& rest_cage, const NodeGradients& gradients,
+                  const Points& cage_positions, Points& surface_positions) {
+  const Eigen::Index vertices = binding.tet_from_vertex.size(), nodes = rest_cage.positions.rows();
+  LIMBER_CHECK(binding.weights.rows() == vertices, binding.weights.rows(), vertices);
+  LIMBER_CHECK(cage_positions.rows() == nodes, cage_positions.rows(), nodes);
+  const Gradients f = node_deformation_gradients(gradients, cage_positions);
+  // A node's share of a vertex is w_i (x_i − ½ F_i X_i) + w_i ½ F_i X. Rows: X_i, x_i − ½ F_i X_i, ½ F_i, and
+  // a number that makes a row whole cache lines.
+  constexpr int numbers = 16;
+  Eigen::Matrix<double, Eigen::Dynamic, numbers, Eigen::RowMajor> maps(nodes, numbers);
+  for (Eigen::Index i = 0; i < nodes; ++i) {
+    const Eigen::Matrix3d half =
+        0.5 * Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(&f(i, 0));
+    const Vec3 rest = rest_cage.positions.row(i);
+    maps.row(i) << rest.transpose(), cage_positions.row(i) - (half * rest).transpose(), 0.5 * f.row(i), 0;
+  }
+  surface_positions.resize(vertices, 3);
+  for (Eigen::Index v = 0; v < vertices; ++v) {
+    const int* const tet = rest_cage.tets.data() + 4 * std::ptrdiff_t(binding.tet_from_vertex[v]);
+    const double* const w = binding.weights.data() + 4 * v;
+    const double *const a = maps.data() + numbers * std::ptrdiff_t(tet[0]),
+                        *const b = maps.data() + numbers * std::ptrdiff_t(tet[1]),
+                        *const c = maps.data() + numbers * std::ptrdiff_t(tet[2]),
+                        *const d = maps.data() + numbers * std::ptrdiff_t(tet[3]);
+    double m[numbers];
+    for (int k = 0; k < numbers; ++k) m[k] = w[0] * a[k] + w[1] * b[k] + w[2] * c[k] + w[3] * d[k];
+    double* const p = surface_positions.data() + 3 * v;
+    for (int axis = 0; axis < 3; ++axis)
+      p[axis] = m[3 + axis] + (m[6 + 3 * axis] * m[0] + m[7 + 3 * axis] * m[1] + m[8 + 3 * axis] * m[2]);
   }
 }
 

@@ -23,6 +23,27 @@ Binding bind(const SurfaceMesh& surface, const TetMesh& cage);
 // surface_positions (V × 3) is overwritten; it allocates only where it has another size.
 void deform(const Binding&, const Tets&, const Points& cage_positions, Points& surface_positions);
 
+// What turns positions of a cage's nodes into deformation gradients at the nodes: F_i = Σ_j x_j g_ijᵀ is the
+// mean of the gradients of the tets round node i, by their rest volumes. Σ_j g_ij = 0; 0 for a node of no
+// tet.
+struct NodeGradients {
+  std::vector<int> begin;      // (N + 1) node i has the entries begin[i] … begin[i + 1] − 1 of the others
+  std::vector<int> neighbour;  // j: i itself and all that share a tet with it, ascending
+  Points gradient;             // g_ij, 1/m
+};
+NodeGradients node_gradients(const TetMesh& rest_cage);
+
+// F of each node, row after row.
+using Gradients = Eigen::Matrix<double, Eigen::Dynamic, 9, Eigen::RowMajor>;  // (N × 9)
+Gradients node_deformation_gradients(const NodeGradients&, const Points& cage_positions);
+
+// As deform(), by Phong Deformation (James, SIGGRAPH 2020): x(X) = Σ w_i (x_i + ½ F_i (X − X_i)) over the
+// corners of the vertex' tet, X and X_i at rest. Exact under affine maps and continuous as deform(), but the
+// surface bends where that one folds; a vertex may leave its tet. Linear in cage_positions, so velocities of
+// the nodes give those of the vertices.
+void deform_phong(const Binding&, const TetMesh& rest_cage, const NodeGradients&,
+                  const Points& cage_positions, Points& surface_positions);
+
 // Unit normals (V × 3) of the deformed surface from those at rest: the cofactor of the deformation gradient,
 // averaged at the cage's nodes and interpolated between them, so that no kink shows at tet borders. A normal
 // that vanishes there (a cage folded flat) keeps its rest direction. normals may be rest_normals.

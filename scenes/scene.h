@@ -96,6 +96,10 @@ struct FixedSpec {
   std::vector<Box> boxes_m;  // all that lie in one of these boxes, in world coordinates at the start
 };
 
+// How the fine surface follows the nodes of its cage: docs/binding.md.
+enum class Deformation { linear, phong };
+constexpr Deformation usual_deformation = Deformation::linear;  // of a scene that does not say
+
 struct BodySpec {
   std::string name;  // letters, digits, _ and -: it names a folder
   Role role = Role::obstacle;
@@ -103,6 +107,7 @@ struct BodySpec {
   Contact contact = Contact::surface;
   std::optional<bool>
       self_contact;  // parts of it push one another apart; nothing: wherever it can reach itself
+  Deformation deformation = usual_deformation;
   double max_volume_change = 0.1;  // |V − V0|/V0 in all states of a plan, in (0, 1]
   Model model;
   CageSpec cage;

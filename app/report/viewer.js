@@ -1,5 +1,5 @@
-// Plays a motion in WebGL 2. Every vertex of a fine surface hangs on the four nodes of its tet; only the nodes move by frames, so a
-// page holds the motion of the cages and each surface once. z is up, metres. Light as in limber's films: a key light with a shadow
+// Plays a motion in WebGL 2. Every vertex of a fine surface hangs on the four nodes of its tet (or, by Phong Deformation, on those
+// and the nodes round them: docs/binding.md); only the nodes move by frames, so a page holds the motion of the cages and each surface once. z is up, metres. Light as in limber's films: a key light with a shadow
 // over the photographer's left shoulder, sky, and a ground that fades out.
 "use strict";
 
@@ -19,8 +19,68 @@ function unpackMotion(meta, bytes) {
       weights.set(barycentric(nodes, c, rest.subarray(3 * v, 3 * v + 3)), 4 * v);
     }
     return { ...body, nodes: new Float32Array(nodes.length), frames: array(Uint16Array, m.frames), low: m.frames_low,
-      step: m.frames_step, corners, weights, edges: array(Uint32Array, m.edges) };
+      step: m.frames_step, corners, weights, edges: array(Uint32Array, m.edges), points: rest.slice(),
+      gradients: m.phong ? nodeGradients(nodes, tets) : null, cage: nodes };
   });
+}
+
+// As ffd::node_gradients: of node i the neighbours j and g_ij with F_i = Σ x_j g_ijᵀ.
+function nodeGradients(nodes, tets) {
+  const count = nodes.length / 3, volume = new Float64Array(count), rows = Array.from({ length: count }, () => new Map());
+  const at = (k) => nodes.subarray(3 * k, 3 * k + 3);
+  for (let t = 0; t < tets.length; t += 4) {
+    const tet = tets.subarray(t, t + 4), [b, c, d] = [1, 2, 3].map((k) => minus(at(tet[k]), at(tet[0])));
+    const faces = [cross(c, d), cross(d, b), cross(b, c)], six = dot(b, faces[0]);
+    const shares = [minus([0, 0, 0], faces.reduce((sum, face) => plus(sum, face))), ...faces];
+    for (const i of tet) {
+      volume[i] += six;
+      shares.forEach((share, k) => rows[i].set(tet[k], plus(rows[i].get(tet[k]) || [0, 0, 0], share)));
+    }
+  }
+  const begin = Uint32Array.from({ length: count + 1 }), size = rows.reduce((sum, row) => sum + row.size, 0);
+  const neighbours = new Uint32Array(size), gradients = new Float64Array(3 * size);
+  rows.forEach((row, i) => {
+    let k = begin[i];
+    for (const [j, sum] of row) neighbours[k] = j, gradients.set(sum.map((s) => s / volume[i]), 3 * k), ++k;
+    begin[i + 1] = k;
+  });
+  return { begin, neighbours, gradients, maps: new Float64Array(12 * count) };
+}
+
+// Nodes at a frame, between two of which they move straight, and the surface by them.
+function deform(body, frame, frames) {
+  const first = Math.min(Math.floor(frame), frames - 1), next = Math.min(first + 1, frames - 1), share = frame - first;
+  const { nodes, frames: f, corners: c, weights: w, points: p } = body, n = nodes.length;
+  for (let i = 0; i < n; ++i)
+    nodes[i] = body.low[i % 3] + body.step[i % 3] * (f[first * n + i] * (1 - share) + f[next * n + i] * share);
+  if (body.gradients) return deformPhong(body);
+  for (let v = 0, i = 0; i < p.length; v += 4, i += 3)
+    for (let k = 0; k < 3; ++k)
+      p[i + k] = w[v] * nodes[3 * c[v] + k] + w[v + 1] * nodes[3 * c[v + 1] + k] + w[v + 2] * nodes[3 * c[v + 2] + k] +
+        w[v + 3] * nodes[3 * c[v + 3] + k];
+}
+
+// As ffd::deform_phong: a map a node, x_i − ½ F_i X_i and ½ F_i, coordinate after coordinate.
+function deformPhong({ nodes, cage, corners: c, weights: w, points: p, rest, gradients }) {
+  const { begin, neighbours, gradients: g, maps } = gradients;
+  for (let i = 0; i < nodes.length / 3; ++i)
+    for (let k = 0; k < 3; ++k) {
+      let a = 0, b = 0, d = 0;
+      for (let e = begin[i]; e < begin[i + 1]; ++e) {
+        const x = 0.5 * nodes[3 * neighbours[e] + k];
+        a += x * g[3 * e], b += x * g[3 * e + 1], d += x * g[3 * e + 2];
+      }
+      maps.set([nodes[3 * i + k] - a * cage[3 * i] - b * cage[3 * i + 1] - d * cage[3 * i + 2], a, b, d], 12 * i + 4 * k);
+    }
+  for (let v = 0, i = 0; i < p.length; v += 4, i += 3)
+    for (let k = 0; k < 3; ++k) {
+      let sum = 0;
+      for (let e = 0; e < 4; ++e) {
+        const m = 12 * c[v + e] + 4 * k;
+        sum += w[v + e] * (maps[m] + maps[m + 1] * rest[i] + maps[m + 2] * rest[i + 1] + maps[m + 3] * rest[i + 2]);
+      }
+      p[i + k] = sum;
+    }
 }
 
 const minus = (a, b) => [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
@@ -215,7 +275,7 @@ function makeViewer(canvas, meta, bodies) {
     [middle[0] + size * x, middle[1] + size * y, z]))]);
 
   for (const body of bodies) {
-    body.points = body.rest.slice();
+    body.points = body.points || body.rest;
     body.normals = new Float32Array(body.rest.length);
     turnNormals(body);
     body.mesh = shape([body.points, body.normals], body.triangles);
@@ -254,18 +314,10 @@ function makeViewer(canvas, meta, bodies) {
       n[c] += x, n[c + 1] += y, n[c + 2] += w;
     }
   }
-  // Between two frames nodes move straight.
   function move(body, frame) {
-    const first = Math.min(Math.floor(frame), meta.frames - 1), next = Math.min(first + 1, meta.frames - 1), share = frame - first;
-    const { nodes, frames, corners: c, weights: w, points: p } = body, n = nodes.length;
-    for (let i = 0; i < n; ++i)
-      nodes[i] = body.low[i % 3] + body.step[i % 3] * (frames[first * n + i] * (1 - share) + frames[next * n + i] * share);
-    for (let v = 0, i = 0; i < p.length; v += 4, i += 3)
-      for (let k = 0; k < 3; ++k)
-        p[i + k] = w[v] * nodes[3 * c[v] + k] + w[v + 1] * nodes[3 * c[v + 1] + k] + w[v + 2] * nodes[3 * c[v + 2] + k] +
-          w[v + 3] * nodes[3 * c[v + 3] + k];
+    deform(body, frame, meta.frames);
     turnNormals(body);
-    body.mesh.fill(0, p), body.mesh.fill(1, body.normals), body.lines.fill(0, nodes);
+    body.mesh.fill(0, body.points), body.mesh.fill(1, body.normals), body.lines.fill(0, nodes);
   }
 
   const start = () => {

@@ -1,5 +1,7 @@
 #include "scenes/detail/schema.h"
 
+#include "scenes/scene.h"
+
 #include <fmt/ranges.h>
 
 #include <algorithm>
@@ -93,6 +95,16 @@ constexpr Key all_keys[] = {
      "with "
      "`planner.preset = \"paper\"` `\"cage\"`",
      "surface, cage",
+     ""},
+    {"bodies[].deformation",
+     Type::choice,
+     {},
+     0,
+     usual_deformation == Deformation::phong ? "\"phong\"" : "\"linear\"",
+     "how the fine surface follows its cage in films, exports and reports: linear in each tet, or bent "
+     "smoothly by Phong "
+     "Deformation (docs/binding.md)",
+     "linear, phong",
      ""},
     {"bodies[].self_contact",
      Type::boolean,

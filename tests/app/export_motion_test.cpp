@@ -9,9 +9,12 @@
 #include <cstdlib>
 #include <cstring>
 #include <map>
+#include <sstream>
 
+#include "app/motion_files.h"
 #include "app/plan_folder.h"
 #include "app/scene_world.h"
+#include "core/random.h"
 #include "fem/observe.h"
 #include "tests/app/program.h"
 #include "tests/places.h"
@@ -19,9 +22,13 @@
 namespace limber::app {
 namespace {
 
-// Beside the robot and the soft block: a rigid body that falls, and one that stands.
+// Beside the robot, by Phong Deformation, and the soft block, linear: a rigid body that falls, and one that
+// stands.
 std::string scene_with_rigid_bodies() {
   std::string text = small_scene;
+  for (const auto& [role, deformation] : {std::pair("role = \"robot\"\n", "deformation = \"phong\"\n"),
+                                          {"role = \"obstacle\"\n", "deformation = \"linear\"\n"}})
+    text.insert(text.find(role), deformation);
   const std::string without = "gravity_m_s2 = [0, 0, 0]";
   text.replace(text.find(without), without.size(), "gravity_m_s2 = [0, 0, -1]");
   const std::string goal = "[goal]\n";
@@ -68,9 +75,12 @@ struct Truth {
   Points surface(int b, int frame) const {
     const PreparedBody& body = bodies[std::size_t(b)];
     if (!world.bodies[std::size_t(b)].moving) return body.surface.positions;
+    const Points nodes = fem::body_positions(world, planned.plan.trajectory.frames[std::size_t(frame)], b);
     Points p;
-    ffd::deform(body.binding, body.cage.tets,
-                fem::body_positions(world, planned.plan.trajectory.frames[std::size_t(frame)], b), p);
+    if (planned.scene.bodies[std::size_t(b)].deformation == scenes::Deformation::phong)
+      ffd::deform_phong(body.binding, body.cage, ffd::node_gradients(body.cage), nodes, p);
+    else
+      ffd::deform(body.binding, body.cage.tets, nodes, p);
     return p;
   }
   PlanFolder planned;
@@ -83,9 +93,11 @@ aiMatrix4x4 local_at(const aiNode& node, const aiAnimation& animation, unsigned 
     const aiNodeAnim& channel = *animation.mChannels[c];
     if (channel.mNodeName != node.mName) continue;
     const auto at = [&](const auto* keys, unsigned count) { return keys[std::min(key, count - 1)].mValue; };
-    return aiMatrix4x4(at(channel.mScalingKeys, channel.mNumScalingKeys),
-                       at(channel.mRotationKeys, channel.mNumRotationKeys),
-                       at(channel.mPositionKeys, channel.mNumPositionKeys));
+    // Not by aiMatrix4x4(scale, turn, shift), which scales after the turn.
+    aiMatrix4x4 shift, scale;
+    aiMatrix4x4::Translation(at(channel.mPositionKeys, channel.mNumPositionKeys), shift);
+    aiMatrix4x4::Scaling(at(channel.mScalingKeys, channel.mNumScalingKeys), scale);
+    return shift * aiMatrix4x4(at(channel.mRotationKeys, channel.mNumRotationKeys).GetMatrix()) * scale;
   }
   return node.mTransformation;
 }
@@ -96,7 +108,33 @@ aiMatrix4x4 world_at(const aiNode* node, const aiAnimation& animation, unsigned 
   return m;
 }
 
-// Every vertex of every key, skinned as the format says, is where the binding puts it; glTF has y up.
+// Our z up, of a body at a key, skinned as the format says; glTF has y up.
+Points shown_by_gltf(const aiScene& scene, std::size_t b, const std::string& name, int f) {
+  const aiMesh& mesh = *scene.mMeshes[b];
+  const aiAnimation& animation = *scene.mAnimations[0];
+  std::vector<aiVector3D> shown(mesh.mNumVertices);
+  if (!mesh.HasBones()) {
+    const aiMatrix4x4 world = world_at(scene.mRootNode->FindNode(name.c_str()), animation, unsigned(f));
+    for (unsigned v = 0; v < mesh.mNumVertices; ++v) shown[v] = world * mesh.mVertices[v];
+  }
+  for (unsigned i = 0; i < mesh.mNumBones; ++i) {
+    const aiBone& bone = *mesh.mBones[i];
+    const aiMatrix4x4 skin =
+        world_at(scene.mRootNode->FindNode(bone.mName), animation, unsigned(f)) * bone.mOffsetMatrix;
+    for (unsigned w = 0; w < bone.mNumWeights; ++w) {
+      const unsigned v = bone.mWeights[w].mVertexId;
+      shown[v] += bone.mWeights[w].mWeight * (skin * mesh.mVertices[v]);
+    }
+  }
+  Points points(Eigen::Index(shown.size()), 3);
+  for (Eigen::Index v = 0; v < points.rows(); ++v) {
+    const aiVector3D& p = shown[std::size_t(v)];
+    points.row(v) << p.x, -p.z, p.y;
+  }
+  return points;
+}
+
+// Every vertex of every key is where the binding puts it.
 TEST_F(ExportMotion, GltfBySkinningIsTheBindingAtEveryFrame) {
   ASSERT_EQ(exported("gltf").code, exit_done);
   const Truth truth(out());
@@ -109,7 +147,7 @@ TEST_F(ExportMotion, GltfBySkinningIsTheBindingAtEveryFrame) {
   const int frames = int(truth.planned.plan.trajectory.frames.size());
   ASSERT_GT(frames, 5);
   EXPECT_NEAR(animation.mDuration / animation.mTicksPerSecond, (frames - 1) / 5.0, 1e-6);
-  double traveled = 0;
+  double traveled = 0, bent = 0;
   for (std::size_t b = 0; b < truth.bodies.size(); ++b) {
     const std::string& name = truth.planned.scene.bodies[b].name;
     SCOPED_TRACE(name);
@@ -120,29 +158,42 @@ TEST_F(ExportMotion, GltfBySkinningIsTheBindingAtEveryFrame) {
     for (int f = 0; f < frames; f += 3) {
       const Points wanted = truth.surface(int(b), f);
       ASSERT_EQ(mesh.mNumVertices, wanted.rows());
-      std::vector<aiVector3D> shown(mesh.mNumVertices);
-      if (!mesh.HasBones()) {
-        const aiMatrix4x4 world = world_at(node, animation, unsigned(f));
-        for (unsigned v = 0; v < mesh.mNumVertices; ++v) shown[v] = world * mesh.mVertices[v];
-      }
-      for (unsigned i = 0; i < mesh.mNumBones; ++i) {
-        const aiBone& bone = *mesh.mBones[i];
-        const aiMatrix4x4 skin =
-            world_at(scene->mRootNode->FindNode(bone.mName), animation, unsigned(f)) * bone.mOffsetMatrix;
-        for (unsigned w = 0; w < bone.mNumWeights; ++w) {
-          const unsigned v = bone.mWeights[w].mVertexId;
-          shown[v] += bone.mWeights[w].mWeight * (skin * mesh.mVertices[v]);
-        }
-      }
-      double worst = 0;
-      for (unsigned v = 0; v < mesh.mNumVertices; ++v)
-        worst =
-            std::max(worst, (Vec3(shown[v].x, -shown[v].z, shown[v].y) - wanted.row(v).transpose()).norm());
-      EXPECT_LT(worst, 5e-6) << "frame " << f;
+      EXPECT_LT((shown_by_gltf(*scene, b, name, f) - wanted).rowwise().norm().maxCoeff(), 5e-6)
+          << "frame " << f;
       traveled = std::max(traveled, (wanted - truth.surface(int(b), 0)).rowwise().norm().maxCoeff());
+      if (b != 0) continue;
+      Points linear;
+      ffd::deform(truth.bodies[b].binding, truth.bodies[b].cage.tets,
+                  fem::body_positions(truth.world, truth.planned.plan.trajectory.frames[std::size_t(f)], 0),
+                  linear);
+      bent = std::max(bent, (wanted - linear).rowwise().norm().maxCoeff());
     }
   }
   EXPECT_GT(traveled, 0.3);
+  EXPECT_GT(bent, 1e-3) << "the robot is not just turned and stretched";
+}
+
+// A robot turned inside out, crushed to a point, and torn node by node: gradients that mirror, vanish, and
+// anything.
+TEST_F(ExportMotion, GltfHoldsAnyDeformation) {
+  Truth truth(out());
+  std::vector<State>& frames = truth.planned.plan.trajectory.frames;
+  const fem::Body& robot = truth.world.bodies[0];
+  Rng rng(31, 0);
+  for (int n = robot.first_node; n < robot.first_node + robot.node_count(); ++n) {
+    const auto at = [&](std::size_t f) { return Vec3f::Map(&frames[f].positions[3 * std::size_t(n)]); };
+    at(1).x() *= -1;
+    at(2).setConstant(1);
+    at(3) += 0.3f * rng.direction().cast<float>();
+  }
+  const PlannedMotion motion{truth.planned.scene, truth.bodies, truth.world, frames, 5, {0, 1, 2, 3, 4}};
+  write_gltf(motion, folder.path());
+  Assimp::Importer importer;
+  const aiScene* scene = importer.ReadFile((folder / "motion.glb").string(), 0);
+  ASSERT_TRUE(scene) << importer.GetErrorString();
+  for (const int f : motion.wanted)
+    EXPECT_LT((shown_by_gltf(*scene, 0, "robot", f) - truth.surface(0, f)).rowwise().norm().maxCoeff(), 5e-6)
+        << "frame " << f;
 }
 
 TEST_F(ExportMotion, PointCacheIsAHeadAndThePointsOfEachFrame) {
@@ -165,9 +216,37 @@ TEST_F(ExportMotion, PointCacheIsAHeadAndThePointsOfEachFrame) {
     EXPECT_EQ(number(32 + 4 * std::size_t(k), 0.0f), float(first(0, k)));
     EXPECT_EQ(number(cache.size() - 12 + 4 * std::size_t(k), 0.0f), float(last(last.rows() - 1, k)));
   }
+  const std::string robot = read_file(file("pc2/robot.pc2"));
+  const Points bent = truth.surface(0, 10);
+  ASSERT_EQ(robot.size(), 32 + 3 * 12 * std::size_t(bent.rows()));
+  const std::vector<float> expected(bent.data(), bent.data() + bent.size());
+  EXPECT_EQ(std::memcmp(robot.data() + 32 + 2 * 12 * bent.rows(), expected.data(), 12 * expected.size() / 3),
+            0);
   EXPECT_FALSE(fs::exists(file("pc2/table.pc2"))) << "it stands still";
   EXPECT_TRUE(fs::exists(file("pc2/table.obj")));
   EXPECT_NE(read_file(file("pc2/README.txt")).find("1.25 frames a second"), std::string::npos);
+}
+
+TEST_F(ExportMotion, UsdHoldsThePointsOfEachFrame) {
+  ASSERT_EQ(exported("usd", {"--frames", "0,9"}).code, exit_done);
+  const Truth truth(out());
+  const Points wanted = truth.surface(0, 9);
+  const std::string usd = read_file(file("motion.usda"));
+  const auto samples = usd.find("point3f[] points.timeSamples", usd.find("def Mesh \"robot\""));
+  ASSERT_NE(samples, usd.npos);
+  std::string points = usd.substr(usd.find(" 9: [", samples) + 4);
+  points.resize(points.find(']'));
+  for (char& c : points)
+    if (std::strchr("[](),", c)) c = ' ';
+  std::istringstream numbers(points);
+  double worst = 0;
+  for (Eigen::Index i = 0; i < wanted.size(); ++i) {
+    double number = std::nan("");
+    numbers >> number;
+    ASSERT_TRUE(numbers) << i;
+    worst = std::max(worst, std::abs(number - wanted.data()[i]));
+  }
+  EXPECT_LT(worst, 1e-6 * truth.world.bounds_m.diagonal());
 }
 
 TEST_F(ExportMotion, SameMotionSameBytesAndAnEarlierSeriesGoes) {

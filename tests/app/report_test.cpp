@@ -35,6 +35,7 @@ TEST_F(Report, PackedMotionUnpacksToTheSurfacesOfAllFrames) {
   const PlanFolder planned = read_plan_folder(out());
   std::vector<PreparedBody> bodies = read_bodies_of(planned, out());
   const fem::World world = build_world(planned.scene, bodies);
+  bodies[1].deformation = scenes::Deformation::phong;
   bodies[0].binding.weights.row(0) << -0.2, 0.5, 0.4,
       0.3;  // as where weights were clamped: not where surface.ply has it
   const std::vector<State>& frames = planned.plan.trajectory.frames;
@@ -76,22 +77,68 @@ TEST_F(Report, PackedMotionUnpacksToTheSurfacesOfAllFrames) {
     for (std::size_t f = 0; f < frames.size(); f += 4) {
       const Points now = unpacked(levels, entry.at("frames_low"), entry.at("frames_step"),
                                   f * 3 * std::size_t(nodes), nodes);
+      const bool phong = b == 1;
+      EXPECT_EQ(entry.at("phong"), phong);
+      const Points places = fem::body_positions(world, frames[f], int(b));
       Points wanted;
-      ffd::deform(body.binding, body.cage.tets, fem::body_positions(world, frames[f], int(b)), wanted);
+      if (phong)
+        ffd::deform_phong(body.binding, body.cage, ffd::node_gradients(body.cage), places, wanted);
+      else
+        ffd::deform(body.binding, body.cage.tets, places, wanted);
+      const ffd::Gradients gradients = ffd::node_deformation_gradients(ffd::node_gradients(body.cage), now);
       double worst = 0;
       for (Eigen::Index v = 0; v < vertices; ++v) {
-        Eigen::Matrix4d corners, places;
+        Eigen::Matrix4d corners, ends;
         for (int k = 0; k < 4; ++k) {
           const std::uint32_t node = tets.at(4 * of.at(std::size_t(v)) + std::size_t(k));
           corners.col(k) << cage[3 * node], cage[3 * node + 1], cage[3 * node + 2], 1;
-          places.col(k) << now.row(node).transpose(), 1;
+          ends.col(k) << now.row(node).transpose(), 1;
+          if (phong)
+            ends.col(k).head<3>() +=
+                0.5 * Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(&gradients(node, 0)) *
+                (rest.row(v).transpose() - corners.col(k).head<3>());
         }
-        const Eigen::Vector4d shown = places * corners.inverse() * rest.row(v).transpose().homogeneous();
+        const Eigen::Vector4d shown = ends * corners.inverse() * rest.row(v).transpose().homogeneous();
         worst = std::max(worst, (shown.head<3>() - wanted.row(v).transpose()).norm());
       }
       EXPECT_LT(worst, 5 * step) << "frame " << f;
     }
   }
+}
+
+// What the page's own viewer does with it, run by node.
+TEST_F(Report, TheViewerMovesSurfacesAsFilmsDo) {
+  plan(replaced("role = \"obstacle\"\n", "role = \"obstacle\"\ndeformation = \"phong\"\n"));
+  ASSERT_EQ(limber_program({"report", out()}).code, exit_done);
+  if (std::system("node --version > /dev/null 2>&1") != 0) GTEST_SKIP() << "nodejs is missing";
+  const std::string script = std::string(limber_source_dir) + "/tools/readers/viewer.js";
+  ASSERT_EQ(std::system(("node '" + script + "' '" + out() + "/report.html' '" + out() + "/points'").c_str()),
+            0);
+  const std::string points = read_file(fs::path(out()) / "points");
+  const PlanFolder planned = read_plan_folder(out());
+  const std::vector<PreparedBody> bodies = read_bodies_of(planned, out());
+  const fem::World world = build_world(planned.scene, bodies);
+  EXPECT_EQ(bodies[1].deformation, scenes::Deformation::phong);
+  const double level = world.bounds_m.diagonal() / 65535;
+  std::size_t at = 0;
+  double worst = 0, bent = 0;
+  for (std::size_t b = 0; b < bodies.size(); ++b)
+    for (const State& state : planned.plan.trajectory.frames) {
+      const Points nodes = fem::body_positions(world, state, int(b));
+      Points wanted, linear;
+      deform(bodies[b], nodes, wanted);
+      ffd::deform(bodies[b].binding, bodies[b].cage.tets, nodes, linear);
+      bent = std::max(bent, (wanted - linear).cwiseAbs().maxCoeff());
+      ASSERT_LE(at + sizeof(float) * std::size_t(wanted.size()), points.size());
+      for (Eigen::Index i = 0; i < wanted.size(); ++i, at += sizeof(float)) {
+        float shown = 0;
+        std::memcpy(&shown, points.data() + at, sizeof shown);
+        worst = std::max(worst, std::abs(double(shown) - wanted.data()[i]));
+      }
+    }
+  EXPECT_EQ(at, points.size());
+  EXPECT_LT(worst, 2 * level);
+  EXPECT_GT(bent, 20 * level);
 }
 
 TEST_F(Report, HoldsEveryPromiseOnceAndTextOfTheUserOnlyAsText) {

@@ -285,6 +285,181 @@ TEST(Binding, BadMeshesAreInputErrors) {
   EXPECT_THROW(bind(surface, bad_cage), InputError);
 }
 
+// Moved node by node, each its own way.
+Points shaken(const Points& positions, double by, std::uint64_t seed) {
+  Points moved = positions;
+  Rng rng(seed, 2);
+  for (Eigen::Index i = 0; i < moved.rows(); ++i) moved.row(i) += by * rng.direction();
+  return moved;
+}
+
+TEST(Phong, ReproducesAffineMaps) {
+  for (const auto& [name, surface, cage] : bound_meshes()) {
+    SCOPED_TRACE(name);
+    const Binding binding = bind(surface, cage);
+    const NodeGradients gradients = node_gradients(cage);
+    for (std::uint64_t seed = 0; seed < 5; ++seed) {
+      const Affine map = random_affine(seed);
+      Points moved;
+      deform_phong(binding, cage, gradients, map * cage.positions, moved);
+      EXPECT_LT(max_difference(moved, map * surface.positions), 1e-12);
+    }
+  }
+}
+
+// F of a tet by its edges' matrices, and the mean by volumes in so many words.
+std::vector<Eigen::Matrix3d> gradients_tet_by_tet(const TetMesh& rest, const Points& moved) {
+  const auto edges = [](const Points& p, const auto& tet) {
+    Eigen::Matrix3d e;
+    for (int k = 0; k < 3; ++k) e.col(k) = p.row(tet[k + 1]) - p.row(tet[0]);
+    return e;
+  };
+  std::vector<Eigen::Matrix3d> sums(std::size_t(rest.positions.rows()), Eigen::Matrix3d::Zero());
+  std::vector<double> volumes(sums.size(), 0);
+  for (Eigen::Index t = 0; t < rest.tets.rows(); ++t) {
+    const Eigen::Matrix3d at_rest = edges(rest.positions, rest.tets.row(t));
+    const Eigen::Matrix3d f = edges(moved, rest.tets.row(t)) * at_rest.inverse();
+    for (int k = 0; k < 4; ++k) {
+      sums[std::size_t(rest.tets(t, k))] += at_rest.determinant() * f;
+      volumes[std::size_t(rest.tets(t, k))] += at_rest.determinant();
+    }
+  }
+  for (std::size_t i = 0; i < sums.size(); ++i) sums[i] /= volumes[i];
+  return sums;
+}
+
+TEST(Phong, IsItsFormulaWithGradientsTetByTet) {
+  for (const auto& [name, surface, cage] : bound_meshes()) {
+    SCOPED_TRACE(name);
+    const Points moved = shaken(cage.positions, 0.2, 21);
+    const std::vector<Eigen::Matrix3d> expected = gradients_tet_by_tet(cage, moved);
+    const NodeGradients gradients = node_gradients(cage);
+    const Gradients f = node_deformation_gradients(gradients, moved);
+    for (std::size_t i = 0; i < expected.size(); ++i) {
+      const Eigen::Matrix3d by_rows =
+          Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(&f(Eigen::Index(i), 0));
+      EXPECT_LT((by_rows - expected[i]).norm(), 1e-12 * (1 + expected[i].norm())) << "node " << i;
+    }
+    const Binding binding = bind(surface, cage);
+    Points shown;
+    deform_phong(binding, cage, gradients, moved, shown);
+    for (Eigen::Index v = 0; v < shown.rows(); ++v) {
+      Vec3 sum = Vec3::Zero();
+      for (int k = 0; k < 4; ++k) {
+        const int node = cage.tets(binding.tet_from_vertex[v], k);
+        const Vec3 from_node = surface.positions.row(v) - cage.positions.row(node);
+        sum += binding.weights(v, k) *
+               (moved.row(node).transpose() + 0.5 * expected[std::size_t(node)] * from_node);
+      }
+      EXPECT_LT((shown.row(v).transpose() - sum).norm(), 1e-12);
+    }
+  }
+}
+
+TEST(Phong, IsLinearInTheNodes) {
+  const auto [name, surface, cage] = bound_meshes()[1];
+  const Binding binding = bind(surface, cage);
+  const NodeGradients gradients = node_gradients(cage);
+  const Points a = shaken(cage.positions, 0.3, 22), b = shaken(cage.positions, 0.3, 23);
+  Points of_a, of_b, of_both;
+  deform_phong(binding, cage, gradients, a, of_a);
+  deform_phong(binding, cage, gradients, b, of_b);
+  deform_phong(binding, cage, gradients, 2 * a - 3 * b, of_both);
+  EXPECT_LT(max_difference(of_both, 2 * of_a - 3 * of_b), 1e-13);
+}
+
+// One point on a face, bound to the tets on either side of it: the same position.
+TEST(Phong, DoesNotTearAtTetBorders) {
+  const TetMesh cage = box_cage({Vec3(0, 0, 0), Vec3(1, 1, 1)}, {2, 2, 2}, 0.2, 9);
+  const Points moved = shaken(cage.positions, 0.15, 24);
+  const NodeGradients gradients = node_gradients(cage);
+  int faces = 0;
+  for (int s = 0; s < cage.tets.rows(); ++s)
+    for (int t = 0; t < s; ++t) {
+      Binding one{Eigen::VectorXi::Constant(1, s), Weights::Zero(1, 4)};
+      Binding other{Eigen::VectorXi::Constant(1, t), Weights::Zero(1, 4)};
+      const double shares[3] = {0.2, 0.3, 0.5};
+      int common = 0;
+      for (int i = 0; i < 4; ++i)
+        for (int k = 0; k < 4; ++k)
+          if (cage.tets(s, i) == cage.tets(t, k) && common < 3)
+            one.weights(0, i) = other.weights(0, k) = shares[common++];
+      if (common < 3) continue;
+      ++faces;
+      Points on_one, on_other;
+      deform_phong(one, cage, gradients, moved, on_one);
+      deform_phong(other, cage, gradients, moved, on_other);
+      EXPECT_LT(max_difference(on_one, on_other), 1e-14);
+    }
+  EXPECT_GT(faces, 60);
+}
+
+// Of a quadratic map f, f(X) = Σ w_i (f(X_i) + ½ ∇f(X_i) (X − X_i)); and where the tets round a node are each
+// other's mirror images, their mean gradient is ∇f(X_i). So it is exact away from the boundary, and near it
+// better than linear.
+TEST(Phong, BendsABarAsAQuadraticMapDoes) {
+  const TetMesh cage = box_cage({Vec3(-2, -0.5, -0.5), Vec3(2, 0.5, 0.5)}, {12, 4, 4}, 0, 1);
+  const auto bend = [](const Points& p) {
+    Points q = p;
+    q.col(2).array() += 0.2 * p.col(0).array().square() - 0.1 * p.col(0).array() * p.col(1).array();
+    q.col(0).array() -= 0.3 * p.col(0).array() * p.col(2).array();
+    return q;
+  };
+  std::vector<bool> inner(std::size_t(cage.positions.rows()), true);
+  for (const int node : vertices_of(boundary_triangles(cage.tets))) inner[std::size_t(node)] = false;
+  const SurfaceMesh surface = torus(Vec3(0, 0, 0), 0.35, 0.14, 40, 30);
+  SurfaceMesh stretched = surface;
+  stretched.positions.col(0) *= 4;
+  const Binding binding = bind(stretched, cage);
+  EXPECT_EQ(binding.outside, 0);
+  Points linear, phong;
+  deform(binding, cage.tets, bend(cage.positions), linear);
+  deform_phong(binding, cage, node_gradients(cage), bend(cage.positions), phong);
+  const Points truth = bend(stretched.positions);
+  double inner_linear = 0, inner_phong = 0;
+  int count = 0;
+  for (Eigen::Index v = 0; v < truth.rows(); ++v) {
+    bool all_inner = true;
+    for (int k = 0; k < 4; ++k) all_inner &= inner[std::size_t(cage.tets(binding.tet_from_vertex[v], k))];
+    if (!all_inner) continue;
+    ++count;
+    inner_linear = std::max(inner_linear, (linear.row(v) - truth.row(v)).norm());
+    inner_phong = std::max(inner_phong, (phong.row(v) - truth.row(v)).norm());
+  }
+  EXPECT_GT(count, 100);
+  EXPECT_GT(inner_linear, 1e-3);
+  EXPECT_LT(inner_phong, 1e-13);
+  const auto mean_error = [&](const Points& p) { return (p - truth).rowwise().norm().mean(); };
+  EXPECT_LT(mean_error(phong), 0.5 * mean_error(linear));
+}
+
+TEST(Phong, CollapsedInvertedAndFlatCagesGiveNumbers) {
+  auto [name, surface, cage] = bound_meshes().front();
+  const Binding binding = bind(surface, cage);
+  const NodeGradients gradients = node_gradients(cage);
+  Points moved;
+  deform_phong(binding, cage, gradients, Points::Zero(cage.positions.rows(), 3), moved);
+  EXPECT_EQ(moved, Points::Zero(moved.rows(), 3).eval());
+  deform_phong(binding, cage, gradients, shaken(cage.positions, 5, 25), moved);
+  EXPECT_TRUE(moved.allFinite());
+  // A flat tet, and a node of no tet.
+  TetMesh flat{Points(5, 3), Tets(1, 4)};
+  flat.positions << 0, 0, 0, 1, 0, 0, 0, 1, 0, 0.3, 0.3, 1e-12, 7, 7, 7;
+  flat.tets << 0, 1, 2, 3;
+  const Gradients f = node_deformation_gradients(node_gradients(flat), shaken(flat.positions, 1, 26));
+  EXPECT_TRUE(f.allFinite());
+  EXPECT_TRUE(f.row(4).isZero(0));
+}
+
+TEST(Phong, KeepsThePlaceOfItsResult) {
+  const auto [name, surface, cage] = bound_meshes().front();
+  const Binding binding = bind(surface, cage);
+  Points moved(surface.positions.rows(), 3);
+  const double* const place = moved.data();
+  deform_phong(binding, cage, node_gradients(cage), cage.positions, moved);
+  EXPECT_EQ(moved.data(), place);
+}
+
 TEST(Normals, UnderAffineMapsAreTheInverseTranspose) {
   for (const auto& [name, surface, cage] : bound_meshes()) {
     SCOPED_TRACE(name);

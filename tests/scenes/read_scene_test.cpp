@@ -112,6 +112,16 @@ TEST(ReadScene, ReadsPartsAndRigidRobots) {
   EXPECT_EQ(s.bodies[0].material.density_kg_m3, 300);
 }
 
+TEST(ReadScene, ReadsHowSurfacesFollowTheirCages) {
+  const Scene s = read_scene(
+      replaced(good, "role = \"obstacle\"\n", "role = \"obstacle\"\ndeformation = \"phong\"\n"), "s.toml");
+  EXPECT_EQ(s.bodies[0].deformation, usual_deformation);
+  EXPECT_EQ(s.bodies[1].deformation, Deformation::phong);
+  EXPECT_EQ(read_scene(s.text, "s.toml", {"bodies.gate.deformation=linear"}).bodies[1].deformation,
+            Deformation::linear);
+  EXPECT_THAT(complaint(good, {"bodies.gate.deformation=cubic"}), HasSubstr("\"linear\" or \"phong\""));
+}
+
 TEST(ReadScene, SceneryIsSeenAndNoBody) {
   const Scene s =
       read_scene(good +
@@ -616,6 +626,7 @@ std::string all_of(const Scene& s) {
                      m.mesh_independent, v(body.pose.position_m), v(body.pose.axis), body.pose.angle_deg,
                      body.pose.anchor, v(body.color_srgb));
     t += fmt::format(" {} {} {} {}", body.opacity, body.roughness, body.metallic, body.max_volume_change);
+    t += fmt::format(" {}", int(body.deformation));
     t += fmt::format(" {}", body.fixed.walls);
     for (const Box& box : body.fixed.boxes_m) t += b(box);
     for (const PartSpec& part : body.parts)
