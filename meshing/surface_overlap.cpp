@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "core/error.h"
 #include "core/highest_along.h"
@@ -34,7 +35,8 @@ double squared_reach(const Box& box, const Vec3& p) {
 Box box_of(const Tri& t) { return {t[0].cwiseMin(t[1]).cwiseMin(t[2]), t[0].cwiseMax(t[1]).cwiseMax(t[2])}; }
 
 // Calls leaves(node of a, node of b) for the pairs of leaves that, like all above them, are not rejected. Of
-// a surface and itself each pair comes once, a leaf and itself too.
+// a surface and itself each pair comes once, a leaf and itself too, and rejects(n, n) asks of the pairs
+// within n.
 template <class Rejects, class Leaves>
 void for_each_pair_of_leaves(const PlacedSurface& a, const PlacedSurface& b, const Rejects& rejects,
                              const Leaves& leaves) {
@@ -44,17 +46,12 @@ void for_each_pair_of_leaves(const PlacedSurface& a, const PlacedSurface& b, con
   while (!pending.empty()) {
     const auto [m, n] = pending.back();
     pending.pop_back();
-    const auto &p = a.shape().tree.nodes[std::size_t(m)], &q = b.shape().tree.nodes[std::size_t(n)];
-    if (same && m == n) {
-      if (p.leaf())
-        leaves(m, n);
-      else
-        pending.insert(pending.end(), {{p.left, p.left}, {p.right, p.right}, {p.left, p.right}});
-      continue;
-    }
     if (rejects(m, n)) continue;
+    const auto &p = a.shape().tree.nodes[std::size_t(m)], &q = b.shape().tree.nodes[std::size_t(n)];
     if (p.leaf() && q.leaf()) {
       leaves(m, n);
+    } else if (same && m == n) {
+      pending.insert(pending.end(), {{p.left, p.left}, {p.right, p.right}, {p.left, p.right}});
     } else if (!p.leaf() && (q.leaf() || p.end - p.begin >= q.end - q.begin)) {
       pending.insert(pending.end(), {{p.right, n}, {p.left, n}});
     } else {
@@ -281,6 +278,42 @@ SurfaceGap gap(const PlacedSurface& a, const PlacedSurface& b, double farthest_m
 
 namespace {
 
+// That holds the normals of a node's triangles. A piece of surface all of whose normals have a common
+// half-space hardly ever passes through itself (Volino and Magnenat-Thalmann 1994).
+struct Cone {
+  Vec3 axis;
+  double half_angle;
+};
+double angle_between(const Vec3& a, const Vec3& b) { return std::acos(std::clamp(a.dot(b), -1.0, 1.0)); }
+bool in_one_half(const Cone& a, const Cone& b) {
+  const double both = a.half_angle + b.half_angle;
+  return both < std::numbers::pi && a.axis.dot(b.axis) > -std::cos(both);
+}
+
+std::vector<Cone> cones_of(const PlacedSurface& surface) {
+  std::vector<Cone> cones(surface.nodes().size());
+  for (std::size_t n = cones.size(); n-- > 0;) {
+    const auto& place = surface.shape().tree.nodes[n];
+    Cone& cone = cones[n];
+    cone = {surface.nodes()[n].area_vector.normalized(), 0};
+    if (place.leaf()) {
+      double least = 1;
+      for (int t = place.begin; t < place.end; ++t) {
+        const Tri tri = surface.corners(t);
+        const Vec3 area = (tri[1] - tri[0]).cross(tri[2] - tri[0]);
+        least = std::min(least, cone.axis.dot(area) / area.norm());
+      }
+      cone.half_angle = least > -1 ? std::acos(std::min(1.0, least)) : std::numbers::pi;
+    } else {
+      for (const int child : {place.left, place.right})
+        cone.half_angle = std::max(cone.half_angle, angle_between(cone.axis, cones[std::size_t(child)].axis) +
+                                                        cones[std::size_t(child)].half_angle);
+    }
+    if (!(cone.half_angle < std::numbers::pi)) cone.half_angle = std::numbers::pi;
+  }
+  return cones;
+}
+
 // A surface and where it was at rest.
 class OwnSurface {
  public:
@@ -289,12 +322,15 @@ class OwnSurface {
 
   std::vector<Crossing> crossings(std::vector<int>& corners) const {
     std::vector<Crossing> found;
+    const std::vector<Cone> cones = cones_of(now_);
     for_each_pair_of_leaves(
         now_, now_,
         [&](int m, int n) {
           const std::size_t i = std::size_t(m), k = std::size_t(n);
+          const Box &a = rest_.nodes()[i].box, &b = rest_.nodes()[k].box;
           return !meet(now_.nodes()[i].box, now_.nodes()[k].box) ||
-                 squared_reach(rest_.nodes()[i].box, rest_.nodes()[k].box) <= near_m_ * near_m_;
+                 (squared_gap(a, b) <= near_m_ * near_m_ &&
+                  (in_one_half(cones[i], cones[k]) || squared_reach(a, b) <= near_m_ * near_m_));
         },
         [&](int m, int n) {
           const auto &p = now_.shape().tree.nodes[std::size_t(m)],
