@@ -86,11 +86,50 @@ MotionFigures measure_motion(const fem::World& world, const plan::Trajectory& pa
   return figures;
 }
 
+namespace {
+
+GapFigures gaps_of(const fem::World& world, const std::vector<SeenFrame>& frames, bool to_walls,
+                   double SeenFrame::Gap::*distance) {
+  GapFigures figures;
+  std::vector<double> all;
+  for (const SeenFrame& frame : frames)
+    for (const SeenFrame::Gap& gap : frame.gaps) {
+      if ((gap.other < 0) != to_walls) continue;
+      if (all.empty() || gap.*distance > figures.worst_m)
+        figures.worst_m = gap.*distance, figures.worst_between = between(world, gap.body, gap.other);
+      all.push_back(gap.*distance);
+    }
+  if (all.empty()) return figures;
+  figures.count = int(all.size());
+  const auto middle = all.begin() + std::ptrdiff_t(all.size() / 2);
+  std::nth_element(all.begin(), middle, all.end());
+  figures.median_m = *middle;
+  return figures;
+}
+
+// The widest gap of the frame's pairs, or of its bodies and walls; null where nothing presses.
+const SeenFrame::Gap* widest(const SeenFrame& frame, bool to_walls, double SeenFrame::Gap::*distance) {
+  const SeenFrame::Gap* found = nullptr;
+  for (const SeenFrame::Gap& gap : frame.gaps)
+    if ((gap.other < 0) == to_walls && (!found || gap.*distance > found->*distance)) found = &gap;
+  return found;
+}
+
+Json json_of(const GapFigures& gap, double size) {
+  return {{"pairs_and_frames", gap.count},
+          {"median_m", gap.median_m},
+          {"median_of_robot_size", gap.median_m / size},
+          {"worst_m", gap.worst_m},
+          {"worst_of_robot_size", gap.worst_m / size},
+          {"worst_between", gap.worst_between}};
+}
+
+}  // namespace
+
 MotionFigures measure_motion(const fem::World& world, const std::vector<PreparedBody>& bodies,
                              const plan::Trajectory& path) {
   MotionFigures figures = measure_motion(world, path);
   std::vector<SeenFrame> seen = measure_seen(world, bodies, path.frames);
-  std::vector<double> gaps;
   for (std::size_t f = 0; f < seen.size(); ++f) {
     const SeenFrame& frame = seen[f];
     if (frame.overlap_m > figures.deepest_overlap_m) {
@@ -101,21 +140,11 @@ MotionFigures measure_motion(const fem::World& world, const std::vector<Prepared
       figures.deepest_self_overlap_m = frame.self_overlap_m;
       figures.self_overlap_of = world.bodies[std::size_t(frame.self_overlap_body)].name;
     }
-    for (const SeenFrame::Gap& gap : frame.gaps) {
-      if (gaps.empty() || gap.distance_m > figures.worst_gap_m) {
-        figures.worst_gap_m = gap.distance_m;
-        figures.worst_gap_between = between(world, gap.body, gap.other);
-      }
-      gaps.push_back(gap.distance_m);
-    }
-    figures.frames[f].seen = std::move(seen[f]);
   }
-  figures.pressing = int(gaps.size());
-  if (!gaps.empty()) {
-    const auto middle = gaps.begin() + std::ptrdiff_t(gaps.size() / 2);
-    std::nth_element(gaps.begin(), middle, gaps.end());
-    figures.median_gap_m = *middle;
-  }
+  figures.gap = gaps_of(world, seen, false, &SeenFrame::Gap::least_m);
+  figures.gap_at_contact = gaps_of(world, seen, false, &SeenFrame::Gap::at_contact_m);
+  figures.gap_to_wall = gaps_of(world, seen, true, &SeenFrame::Gap::at_contact_m);
+  for (std::size_t f = 0; f < seen.size(); ++f) figures.frames[f].seen = std::move(seen[f]);
   figures.robot_surface_size_m =
       bounding_box(bodies[std::size_t(world.robot)].surface.positions).size().maxCoeff();
   return figures;
@@ -142,12 +171,9 @@ Json json_of(const MotionFigures& figures) {
           {"deepest_self_overlap_m", figures.deepest_self_overlap_m},
           {"deepest_self_overlap_of_robot_size", figures.deepest_self_overlap_m / size},
           {"self_overlap_of", figures.self_overlap_of},
-          {"pressing", figures.pressing},
-          {"median_gap_m", figures.median_gap_m},
-          {"median_gap_of_robot_size", figures.median_gap_m / size},
-          {"worst_gap_m", figures.worst_gap_m},
-          {"worst_gap_of_robot_size", figures.worst_gap_m / size},
-          {"worst_gap_between", figures.worst_gap_between},
+          {"gap", json_of(figures.gap, size)},
+          {"gap_at_contact", json_of(figures.gap_at_contact, size)},
+          {"gap_to_wall", json_of(figures.gap_to_wall, size)},
           {"largest_force_n", figures.largest_force_n}};
 }
 
@@ -159,8 +185,9 @@ void write_observables(const fs::path& csv, const fem::World& world, const Motio
       text += fmt::format(",{}.{}", body.name, what);
   text +=
       ",contact_force_n,contact_between,penetration_m,penetration_between,inverted_tets,overlap_m,overlap_"
-      "between,pressing,gap_m,"
-      "gap_between,self_overlap_m,self_overlap_of\n";
+      "between,"
+      "self_overlap_m,self_overlap_of,pressing,gap_m,gap_at_contact_m,gap_between,pressing_walls,gap_to_wall_"
+      "m\n";
   for (const FrameFigures& frame : figures.frames) {
     text += fmt::format("{}", frame.time_s);
     for (const BodyFigures& b : frame.bodies)
@@ -169,16 +196,22 @@ void write_observables(const fs::path& csv, const fem::World& world, const Motio
     text += fmt::format(",{},{},{},{},{}", frame.contact_force_n, frame.contact_between,
                         frame.penetration.depth_m, frame.penetration_between, frame.inverted_tets);
     const SeenFrame& seen = frame.seen;
-    const auto worst = std::max_element(
-        seen.gaps.begin(), seen.gaps.end(),
-        [](const SeenFrame::Gap& a, const SeenFrame::Gap& b) { return a.distance_m < b.distance_m; });
-    const bool presses = worst != seen.gaps.end();
     text += fmt::format(
-        ",{},{},{},{},{},{},{}\n", seen.overlap_m,
-        between(world, seen.overlap_body, seen.overlap_other, "nothing overlaps"), seen.gaps.size(),
-        presses ? worst->distance_m : 0.0,
-        presses ? between(world, worst->body, worst->other) : "nothing presses", seen.self_overlap_m,
-        seen.self_overlap_body < 0 ? "no body" : world.bodies[std::size_t(seen.self_overlap_body)].name);
+        ",{},{},{},{}", seen.overlap_m,
+        between(world, seen.overlap_body, seen.overlap_other, "nothing overlaps"), seen.self_overlap_m,
+        seen.self_overlap_body < 0 ? "no body"
+                                   : world.bodies[std::size_t(seen.self_overlap_body)].name.c_str());
+    const auto pressing = [&](bool walls) {
+      return std::count_if(seen.gaps.begin(), seen.gaps.end(),
+                           [&](const SeenFrame::Gap& gap) { return (gap.other < 0) == walls; });
+    };
+    const SeenFrame::Gap* const pair = widest(seen, false, &SeenFrame::Gap::at_contact_m);
+    const SeenFrame::Gap* const least = widest(seen, false, &SeenFrame::Gap::least_m);
+    const SeenFrame::Gap* const wall = widest(seen, true, &SeenFrame::Gap::at_contact_m);
+    text += fmt::format(",{},{},{},{},{},{}\n", pressing(false), least ? least->least_m : 0.0,
+                        pair ? pair->at_contact_m : 0.0,
+                        pair ? between(world, pair->body, pair->other) : "nothing presses", pressing(true),
+                        wall ? wall->at_contact_m : 0.0);
   }
   write_file(csv, text);
 }

@@ -31,6 +31,11 @@ struct FrameFigures {
   int inverted_tets = 0;
   SeenFrame seen;
 };
+struct GapFigures {  // over all frames and pairs that press one another
+  int count = 0;
+  double median_m = 0, worst_m = 0;
+  std::string worst_between = "nothing presses";
+};
 struct MotionFigures {
   std::vector<FrameFigures> frames;
   std::vector<double> largest_volume_change;  // [body], largest absolute value
@@ -51,9 +56,7 @@ struct MotionFigures {
   double robot_surface_size_m = 0;  // largest edge of the bounding box of its fine surface at rest
   double deepest_overlap_m = 0, deepest_self_overlap_m = 0;
   std::string overlap_between = "nothing overlaps", self_overlap_of = "no body";
-  int pressing = 0;                          // frames and pairs that press one another
-  double median_gap_m = 0, worst_gap_m = 0;  // over these
-  std::string worst_gap_between = "nothing presses";
+  GapFigures gap, gap_at_contact, gap_to_wall;
 };
 // Without surfaces: all but what is seen.
 MotionFigures measure_motion(const fem::World&, const plan::Trajectory&);

@@ -144,7 +144,8 @@ std::string text_of(const Json& s, const std::string& extra, const fs::path& fil
       s.at("penetration_between").get<std::string>(),
       100 * s.at("deepest_overlap_of_robot_size").get<double>(), s.at("overlap_between").get<std::string>(),
       100 * s.at("deepest_self_overlap_of_robot_size").get<double>(),
-      s.at("self_overlap_of").get<std::string>(), 100 * s.at("median_gap_of_robot_size").get<double>(),
+      s.at("self_overlap_of").get<std::string>(),
+      100 * s.at("gap_at_contact").at("median_of_robot_size").get<double>(),
       s.at("largest_strain").get<double>(), s.at("largest_strain_of").get<std::string>(),
       s.at("largest_contact_force_n").get<double>(), s.at("contact_between").get<std::string>(), extra,
       s.at("tree_hash").get<std::string>(), s.at("trajectory_hash").get<std::string>(), file.string());

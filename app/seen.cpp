@@ -20,7 +20,12 @@ struct Side {
   int axis = -1, upper = 0;
   auto operator<=>(const Side&) const = default;
 };
-using Pressing = std::map<Side, double>;  // the forces' lengths, summed
+struct Press {
+  double force_n = 0;  // the lengths of all forces, summed
+  double strongest_n = 0;
+  Vec3 place_m = Vec3::Zero();  // of the strongest
+};
+using Pressing = std::map<Side, Press>;
 
 Pressing pressing_in(const fem::World& world, const State& state) {
   Pressing pressing;
@@ -35,9 +40,21 @@ Pressing pressing_in(const fem::World& world, const State& state) {
       side.upper = above.maxCoeff() > below.maxCoeff();
       (side.upper ? above : below).maxCoeff(&side.axis);
     }
-    pressing[side] += contact.force_n.norm();
+    const double force = contact.force_n.norm();
+    Press& press = pressing[side];
+    press.force_n += force;
+    if (force > press.strongest_n) press.strongest_n = force, press.place_m = contact.place_m;
   }
   return pressing;
+}
+
+// From the nearest point of either surface, 0 where that is inside the other.
+double gap_near(const meshing::PlacedSurface& a, const meshing::PlacedSurface& b, const Vec3& place) {
+  const auto from = [&](const meshing::PlacedSurface& one, const meshing::PlacedSurface& other) {
+    const Vec3 point = one.closest_point(place);
+    return other.winding(point) > 0.5 ? 0.0 : other.distance(point);
+  };
+  return std::min(from(a, b), from(b, a));
 }
 
 double gap_to_wall(const Box& bounds, const Side& side, const Box& surface) {
@@ -45,6 +62,8 @@ double gap_to_wall(const Box& bounds, const Side& side, const Box& surface) {
                                 : surface.lower[side.axis] - bounds.lower[side.axis];
   return std::max(0.0, gap);
 }
+
+constexpr double no_limit = 1e100;  // m
 
 class Surfaces {
  public:
@@ -76,13 +95,18 @@ class Surfaces {
       const double depth = meshing::self_overlap(one, at_rest_[std::size_t(a)]).depth_m;
       if (depth > frame.self_overlap_m) frame.self_overlap_m = depth, frame.self_overlap_body = a;
     }
-    for (const auto& [side, force] : pressing) {
-      if (!(force > least_force_n)) continue;
+    for (const auto& [side, press] : pressing) {
+      if (!(press.force_n > least_force_n)) continue;
       const meshing::PlacedSurface& one = *now[std::size_t(side.body)];
-      frame.gaps.push_back({side.body, side.other,
-                            side.other < 0
-                                ? gap_to_wall(world_.bounds_m, side, one.box())
-                                : meshing::gap(one, *now[std::size_t(side.other)], 1e6).distance_m});
+      if (side.other < 0) {
+        const Vec3 near = one.closest_point(press.place_m);
+        frame.gaps.push_back({side.body, -1, gap_to_wall(world_.bounds_m, side, one.box()),
+                              gap_to_wall(world_.bounds_m, side, {near, near})});
+      } else {
+        const meshing::PlacedSurface& other = *now[std::size_t(side.other)];
+        frame.gaps.push_back({side.body, side.other, meshing::gap(one, other, no_limit).distance_m,
+                              gap_near(one, other, press.place_m)});
+      }
     }
     return frame;
   }
@@ -104,7 +128,7 @@ std::vector<SeenFrame> measure_seen(const fem::World& world, const std::vector<P
                [&](int f) { pressing[std::size_t(f)] = pressing_in(world, frames[std::size_t(f)]); });
   double largest_n = 0;
   for (const Pressing& of_frame : pressing)
-    for (const auto& [side, force] : of_frame) largest_n = std::max(largest_n, force);
+    for (const auto& [side, press] : of_frame) largest_n = std::max(largest_n, press.force_n);
   std::vector<SeenFrame> seen(frames.size());
   parallel_for(int(frames.size()), [&](int f) {
     const std::size_t i = std::size_t(f);

@@ -14,11 +14,11 @@ namespace limber::app {
 struct SeenFrame {
   double overlap_m = 0;  // deepest of two surfaces, at least one of which moves
   int overlap_body = -1, overlap_other = -1;
-  // Of each pair of bodies, or body and wall (other −1), that press one another: the least distance of their
-  // surfaces, 0 where they overlap.
+  // Of each pair of bodies, or body and wall (other −1), that press one another.
   struct Gap {
     int body, other;
-    double distance_m;
+    double least_m;       // distance of their surfaces, 0 where they overlap
+    double at_contact_m;  // where the strongest single force of contact acts
   };
   std::vector<Gap> gaps;
   double self_overlap_m = 0;  // deepest of a deformable body's surface in itself, beyond that at rest

@@ -101,14 +101,19 @@ void check_seen(const MotionFigures& figures, const SeenLimits& limits, Table& t
       figures.deepest_overlap_m <= limits.overlap * size,
       fmt::format("{:.4f} m, {} ({})", figures.deepest_overlap_m, of_size(figures.deepest_overlap_m),
                   figures.overlap_between));
-  row("what is seen: gap between surfaces that press each other",
-      fmt::format("in the median below {}, below {}", percent(limits.median_gap), percent(limits.worst_gap)),
-      figures.pressing == 0 ||
-          (figures.median_gap_m < limits.median_gap * size && figures.worst_gap_m < limits.worst_gap * size),
-      figures.pressing == 0
-          ? figures.worst_gap_between
-          : fmt::format("median {}, worst {} ({}), of {} pairs and frames", of_size(figures.median_gap_m),
-                        of_size(figures.worst_gap_m), figures.worst_gap_between, figures.pressing));
+  const auto gap_row = [&](const std::string& what, const GapFigures& gap) {
+    row("what is seen: " + what,
+        fmt::format("in the median below {}, below {}", percent(limits.median_gap),
+                    percent(limits.worst_gap)),
+        gap.count == 0 || (gap.median_m < limits.median_gap * size && gap.worst_m < limits.worst_gap * size),
+        gap.count == 0
+            ? gap.worst_between
+            : fmt::format("median {}, worst {} ({}), of {} pairs and frames", of_size(gap.median_m),
+                          of_size(gap.worst_m), gap.worst_between, gap.count));
+  };
+  gap_row("gap between surfaces that press each other", figures.gap);
+  gap_row("the same gap where the strongest force acts", figures.gap_at_contact);
+  gap_row("gap between a surface and a wall that it presses", figures.gap_to_wall);
   row("what is seen: a body's overlap with itself", "at most " + percent(limits.self_overlap),
       figures.deepest_self_overlap_m <= limits.self_overlap * size,
       fmt::format("{:.4f} m, {} ({})", figures.deepest_self_overlap_m,

@@ -145,13 +145,14 @@ double PlacedSurface::winding(const Vec3& point) const {
   return sum;
 }
 
-double PlacedSurface::distance(const Vec3& point, double above) const {
+Vec3 PlacedSurface::closest_point(const Vec3& point, double above) const {
   struct Pending {
     int node;
     double squared;
   } stack[max_depth];
   int count = 0;
   double best = 1e300;
+  Vec3 closest = point;
   if (!nodes_.empty()) stack[count++] = {0, squared_distance(nodes_[0].box, point)};
   while (count > 0) {
     const Pending top = stack[--count];
@@ -159,7 +160,8 @@ double PlacedSurface::distance(const Vec3& point, double above) const {
     const auto& place = shape_->tree.nodes[std::size_t(top.node)];
     if (place.leaf()) {
       for (int t = place.begin; t < place.end; ++t)
-        best = std::min(best, (detail::closest_on_triangle(corners(t), point) - point).squaredNorm());
+        if (const Vec3 q = detail::closest_on_triangle(corners(t), point); (q - point).squaredNorm() < best)
+          best = (q - point).squaredNorm(), closest = q;
       if (best <= above * above) break;
       continue;
     }
@@ -169,7 +171,7 @@ double PlacedSurface::distance(const Vec3& point, double above) const {
     stack[count++] = one;
     stack[count++] = other;
   }
-  return std::sqrt(best);
+  return closest;
 }
 
 }  // namespace limber::meshing

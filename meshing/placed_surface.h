@@ -50,8 +50,12 @@ class PlacedSurface {
   // How often the surface winds round the point, as meshing/winding_number.h says, far groups as single
   // dipoles: within 0.05 of exact.
   double winding(const Vec3& point) const;
-  // To the nearest triangle. Any value ≤ `above` where it is not above that: then it is quick to say so.
-  double distance(const Vec3& point, double above = 0) const;
+  // Of the nearest triangle, and how far that is. Where it is no farther than `above`, any that is as near
+  // will do, and then it is quick to say so. The point itself where there is no triangle.
+  Vec3 closest_point(const Vec3& point, double above = 0) const;
+  double distance(const Vec3& point, double above = 0) const {
+    return (closest_point(point, above) - point).norm();
+  }
 
  private:
   const SurfaceShape* shape_;
