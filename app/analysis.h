@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "app/seen.h"
 #include "core/file.h"
 #include "core/json.h"
 #include "fem/observe.h"
@@ -16,6 +17,7 @@ namespace limber::app {
 struct BodyFigures {          // of one frame; all 0 for a body that does not move, but for contact_force_n
   double volume_change = 0;   // V/V₀ − 1
   double largest_strain = 0;  // of its tets, Green's, absolute and principal
+  double least_stretch = 1, largest_stretch = 1;  // of its tets: singular values of the deformation gradient
   double elastic_energy_j = 0, kinetic_energy_j = 0;
   double contact_force_n = 0;  // of the sum of all contacts and walls on it
 };
@@ -27,6 +29,12 @@ struct FrameFigures {
   fem::Penetration penetration;
   std::string penetration_between;
   int inverted_tets = 0;
+  SeenFrame seen;
+};
+struct GapFigures {  // over all frames and pairs that press one another
+  int count = 0;
+  double median_m = 0, worst_m = 0;
+  std::string worst_between = "nothing presses";
 };
 struct MotionFigures {
   std::vector<FrameFigures> frames;
@@ -41,9 +49,19 @@ struct MotionFigures {
   int inverted_tets = 0;       // over all frames
   double largest_force_n = 0;  // of any control
   double mean_speed_at_end_m_s = 0;
+  double least_stretch = 1, largest_stretch = 1;
+  std::string least_stretch_of = "no body", largest_stretch_of = "no body";
+
+  // Of what is seen.
+  double robot_surface_size_m = 0;  // largest edge of the bounding box of its fine surface at rest
+  double deepest_overlap_m = 0, deepest_self_overlap_m = 0;
+  std::string overlap_between = "nothing overlaps", self_overlap_of = "no body";
+  GapFigures gap, gap_at_contact, gap_to_wall;
 };
+// Without surfaces: all but what is seen.
 MotionFigures measure_motion(const fem::World&, const plan::Trajectory&);
-Json json_of(const MotionFigures&);  // strain, contact and penetration, as plan and verify print them
+MotionFigures measure_motion(const fem::World&, const std::vector<PreparedBody>&, const plan::Trajectory&);
+Json json_of(const MotionFigures&);  // as plan, verify and bench print them
 
 // A row a frame, for each body its figures and then what is of all: docs/files.md.
 void write_observables(const fs::path& csv, const fem::World&, const MotionFigures&);

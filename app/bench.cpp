@@ -29,6 +29,7 @@ namespace {
 struct Setup {
   PlanOptions options;
   scenes::Scene scene;
+  std::vector<PreparedBody> bodies;
   std::unique_ptr<fem::World> world;
   std::unique_ptr<FemSystem> system;
 };
@@ -50,9 +51,8 @@ Setup set_up(const BenchOptions& options, const std::string& scene, const std::s
   setup.options.time_limit_s = options.time_limit_s;
   setup.options.in_flight = options.in_flight;
   setup.scene = read_scene(setup.options);
-  const std::vector<PreparedBody> bodies =
-      prepare_bodies(setup.scene, options.data, options.out / setup.scene.name);
-  setup.world = std::make_unique<fem::World>(build_world(setup.scene, bodies));
+  setup.bodies = prepare_bodies(setup.scene, options.data, options.out / setup.scene.name);
+  setup.world = std::make_unique<fem::World>(build_world(setup.scene, setup.bodies));
   setup.system = std::make_unique<FemSystem>(*setup.world, goal_rules_of(setup.scene));
   return setup;
 }
@@ -103,7 +103,7 @@ Json robot_path(const Setup& setup, const plan::Trajectory& path) {
 }
 
 Json record_of(const Setup& setup, const plan::Plan& plan, const Json& identity) {
-  const MotionFigures figures = measure_motion(*setup.world, plan.trajectory);
+  const MotionFigures figures = measure_motion(*setup.world, setup.bodies, plan.trajectory);
   std::string explanation = plan::explain(plan);
   if (!plan.solved()) explanation += " " + diagnose(*setup.world, *setup.system, plan).text;
   char host[256] = "unknown";

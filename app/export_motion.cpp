@@ -23,12 +23,15 @@ constexpr std::pair<const char*, WrittenFiles (*)(const PlannedMotion&, const fs
 
 }  // namespace
 
-Points surface_at(const PlannedMotion& motion, int body, int frame) {
-  const PreparedBody& prepared = motion.bodies[std::size_t(body)];
-  if (!motion.world.bodies[std::size_t(body)].moving) return prepared.surface.positions;
+Points surface_at(const fem::World& world, const PreparedBody& prepared, const State& state, int body) {
+  if (!world.bodies[std::size_t(body)].moving) return prepared.surface.positions;
   Points surface;
-  deform(prepared, fem::body_positions(motion.world, motion.frames[std::size_t(frame)], body), surface);
+  deform(prepared, fem::body_positions(world, state, body), surface);
   return surface;
+}
+
+Points surface_at(const PlannedMotion& motion, int body, int frame) {
+  return surface_at(motion.world, motion.bodies[std::size_t(body)], motion.frames[std::size_t(frame)], body);
 }
 
 Points surface_at_rest(const fem::Body& body, const PreparedBody& prepared) {

@@ -22,7 +22,8 @@ struct PlannedMotion {
   double time_s(int frame) const { return frame / frames_per_second; }
 };
 
-// (V × 3), metres: the fine surface of a body as the frame shows it.
+// (V × 3), metres: the fine surface of a body as it is drawn in that state, or frame.
+Points surface_at(const fem::World&, const PreparedBody&, const State&, int body);
 Points surface_at(const PlannedMotion&, int body, int frame);
 
 // The same where the cage is at rest. Not quite surface.ply where a vertex far outside its cage is bound with

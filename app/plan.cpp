@@ -125,6 +125,9 @@ std::string text_of(const Json& s, const std::string& extra, const fs::path& fil
       "  motion       {:.2f} s in {} frames, time step {:.3g} ms\n"
       "  volume       changes at most: {}\n"
       "  penetration  at most {:.4f} m, {:.2f} % of the robot's size ({})\n"
+      "  surfaces     overlap at most {:.2f} % ({}), in themselves {:.2f} % ({}), gap where they press "
+      "{:.2f} % "
+      "in the median\n"
       "  strain       at most {:.3f} ({})\n"
       "  contact      at most {:.1f} N ({})\n"
       "{}"
@@ -138,10 +141,14 @@ std::string text_of(const Json& s, const std::string& extra, const fs::path& fil
       d.at("store_us").get<double>(), s.at("motion_s").get<double>(), s.at("frames").get<int>(),
       1e3 * s.at("dt_s").get<double>(), volumes, s.at("deepest_penetration_m").get<double>(),
       100 * s.at("deepest_penetration_of_robot_size").get<double>(),
-      s.at("penetration_between").get<std::string>(), s.at("largest_strain").get<double>(),
-      s.at("largest_strain_of").get<std::string>(), s.at("largest_contact_force_n").get<double>(),
-      s.at("contact_between").get<std::string>(), extra, s.at("tree_hash").get<std::string>(),
-      s.at("trajectory_hash").get<std::string>(), file.string());
+      s.at("penetration_between").get<std::string>(),
+      100 * s.at("deepest_overlap_of_robot_size").get<double>(), s.at("overlap_between").get<std::string>(),
+      100 * s.at("deepest_self_overlap_of_robot_size").get<double>(),
+      s.at("self_overlap_of").get<std::string>(),
+      100 * s.at("gap_at_contact").at("median_of_robot_size").get<double>(),
+      s.at("largest_strain").get<double>(), s.at("largest_strain_of").get<std::string>(),
+      s.at("largest_contact_force_n").get<double>(), s.at("contact_between").get<std::string>(), extra,
+      s.at("tree_hash").get<std::string>(), s.at("trajectory_hash").get<std::string>(), file.string());
 }
 
 // `earlier` is the summary of the plan that this one goes on from, null for none: a solved one has its rounds
@@ -280,7 +287,7 @@ void remove_what_shows_another_plan(const fs::path& folder, const Json& summary)
 Outcome keep_plan(const fs::path& folder, const scenes::Scene& scene, const std::vector<PreparedBody>& bodies,
                   const fem::World& world, const FemSystem& system, const plan::Plan& plan, const Json& extra,
                   const std::string& extra_text) {
-  const MotionFigures figures = measure_motion(world, plan.trajectory);
+  const MotionFigures figures = measure_motion(world, bodies, plan.trajectory);
   Json summary = summary_of(plan, world, system.cost(), figures);
   if (!plan.solved()) {
     const Diagnosis diagnosis = diagnose(world, system, plan);

@@ -25,12 +25,19 @@ class Table {
     rows_.push_back({{"promise", promise}, {"kept", kept}, {"value", value}});
     all_kept_ = all_kept_ && kept;
   }
+  // What no promise is made of.
+  void measured(const std::string& what, const std::string& value) {
+    measured_.push_back({{"what", what}, {"value", value}});
+  }
   // `motion` is of the path, null where there is none.
   Outcome outcome(const Json& motion) const {
     std::string text;
     for (const Json& r : rows_)
       text += fmt::format("  {:6}  {:48}  {}\n", r.at("kept").get<bool>() ? "kept" : "BROKEN",
                           r.at("promise").get<std::string>(), r.at("value").get<std::string>());
+    for (const Json& r : measured_)
+      text += fmt::format("  {:8}{:48}  {}\n", "found", r.at("what").get<std::string>(),
+                          r.at("value").get<std::string>());
     if (!motion.is_null())
       text += fmt::format("largest strain {:.3f} ({}), strongest contact {:.1f} N ({})\n",
                           motion.at("largest_strain").get<double>(),
@@ -39,12 +46,12 @@ class Table {
                           motion.at("contact_between").get<std::string>());
     text += all_kept_ ? "every promise is kept\n" : "not every promise is kept\n";
     return {all_kept_ ? exit_done : exit_defect,
-            {{"all_kept", all_kept_}, {"promises", rows_}, {"motion", motion}},
+            {{"all_kept", all_kept_}, {"promises", rows_}, {"measured", measured_}, {"motion", motion}},
             text};
   }
 
  private:
-  std::vector<Json> rows_;
+  std::vector<Json> rows_, measured_;
   bool all_kept_ = true;
 };
 
@@ -82,7 +89,44 @@ void check_via(const plan::Plan& plan, const FemSystem& system, Table& table) {
   }
 }
 
-MotionFigures check_plan(const PlanFolder& planned, const fem::World& world, Table& table) {
+void check_seen(const MotionFigures& figures, const SeenLimits& limits, Table& table) {
+  const auto row = [&](const std::string& what, const std::string& limit, bool kept,
+                       const std::string& value) {
+    limits.promised ? table.row(what + ": " + limit, kept, value) : table.measured(what, value);
+  };
+  const double size = figures.robot_surface_size_m;
+  const auto percent = [](double share) { return fmt::format("{:g} %", 100 * share); };
+  const auto of_size = [&](double metres) { return fmt::format("{:.2f} %", 100 * metres / size); };
+  row("what is seen: deepest overlap of two surfaces", "at most " + percent(limits.overlap),
+      figures.deepest_overlap_m <= limits.overlap * size,
+      fmt::format("{:.4f} m, {} ({})", figures.deepest_overlap_m, of_size(figures.deepest_overlap_m),
+                  figures.overlap_between));
+  const auto gap_row = [&](const std::string& what, const GapFigures& gap) {
+    row("what is seen: " + what,
+        fmt::format("in the median below {}, below {}", percent(limits.median_gap),
+                    percent(limits.worst_gap)),
+        gap.count == 0 || (gap.median_m < limits.median_gap * size && gap.worst_m < limits.worst_gap * size),
+        gap.count == 0
+            ? gap.worst_between
+            : fmt::format("median {}, worst {} ({}), of {} pairs and frames", of_size(gap.median_m),
+                          of_size(gap.worst_m), gap.worst_between, gap.count));
+  };
+  gap_row("gap between surfaces that press each other", figures.gap);
+  gap_row("the same gap where the strongest force acts", figures.gap_at_contact);
+  gap_row("gap between a surface and a wall that it presses", figures.gap_to_wall);
+  row("what is seen: a body's overlap with itself", "at most " + percent(limits.self_overlap),
+      figures.deepest_self_overlap_m <= limits.self_overlap * size,
+      fmt::format("{:.4f} m, {} ({})", figures.deepest_self_overlap_m,
+                  of_size(figures.deepest_self_overlap_m), figures.self_overlap_of));
+  row("least and largest stretch of a tet",
+      fmt::format("within {:g} and {:g}", limits.least_stretch, limits.largest_stretch),
+      figures.least_stretch >= limits.least_stretch && figures.largest_stretch <= limits.largest_stretch,
+      fmt::format("{:.3f} ({}), {:.3f} ({})", figures.least_stretch, figures.least_stretch_of,
+                  figures.largest_stretch, figures.largest_stretch_of));
+}
+
+MotionFigures check_plan(const PlanFolder& planned, const std::vector<PreparedBody>& bodies,
+                         const fem::World& world, Table& table) {
   const plan::Plan& plan = planned.plan;
   const plan::Trajectory& path = plan.trajectory;
   const FemSystem system(world, goal_rules_of(planned.scene));
@@ -93,7 +137,7 @@ MotionFigures check_plan(const PlanFolder& planned, const fem::World& world, Tab
   table.row("replay gives the same bits", same,
             fmt::format("{} frames, end {}", replay.frames.size(), hex(hash_of(replay.end))));
 
-  const MotionFigures figures = measure_motion(world, replay);
+  const MotionFigures figures = measure_motion(world, bodies, replay);
   check_via(plan, system, table);
   const auto distance_in = [&](const State& state) {
     return (system.robot_center(state) - system.goal_shift(state) - plan.settings.goal.center_of_mass_m)
@@ -120,10 +164,11 @@ MotionFigures check_plan(const PlanFolder& planned, const fem::World& world, Tab
   table.row("no tet is inverted at a frame", figures.inverted_tets == 0,
             fmt::format("{}", figures.inverted_tets));
   table.row(
-      "penetration is at most 4 % of the robot's size",
+      "penetration of cages is at most 4 % of the robot's size",
       figures.deepest_penetration_m <= largest_penetration * figures.robot_size_m,
       fmt::format("{:.4f} m, {:.2f} % ({})", figures.deepest_penetration_m,
                   100 * figures.deepest_penetration_m / figures.robot_size_m, figures.penetration_between));
+  check_seen(figures, seen_limits, table);
   return figures;
 }
 
@@ -133,7 +178,7 @@ Outcome verify_plan(const PlanFolder& planned, const std::vector<PreparedBody>& 
                     const fem::World& world, MotionFigures& figures) {
   Table table;
   for (std::size_t b = 0; b < bodies.size(); ++b) check_body(planned.scene.bodies[b].name, bodies[b], table);
-  figures = check_plan(planned, world, table);
+  figures = check_plan(planned, bodies, world, table);
   return table.outcome(json_of(figures));
 }
 

@@ -117,6 +117,9 @@ Strains strains(const World& world, const State& state, int index) {
     const Eigen::Matrix3d deviator = green - green.trace() / 3 * Eigen::Matrix3d::Identity();
     const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(green, Eigen::EigenvaluesOnly);
     result.largest.push_back(solver.eigenvalues().cwiseAbs().maxCoeff());
+    const auto stretch_of = [](double strain) { return std::sqrt(std::max(0.0, 1 + 2 * strain)); };
+    result.longest.push_back(stretch_of(solver.eigenvalues().maxCoeff()));
+    result.shortest.push_back(stretch_of(solver.eigenvalues().minCoeff()));
     result.von_mises.push_back(std::sqrt(2.0 / 3 * deviator.squaredNorm()));
   }
   return result;

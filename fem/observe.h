@@ -28,9 +28,10 @@ double kinetic_energy_j(const World&, const State&, int body);
 // Of each tet of a body, (T): Green's strain G = (FᵀF − 1)/2, F = E E0⁻¹ from the edges E. `largest` is its
 // largest absolute principal value; `von_mises` = √(⅔ G′:G′), G′ its deviator, so that a small stretch e at
 // constant volume has von_mises e. (Bonet and Wood, Nonlinear Continuum Mechanics for Finite Element
-// Analysis.)
+// Analysis.) `longest` and `shortest` are the largest and least singular value of F: by how much the tet is
+// stretched along the direction in which that is most, and least.
 struct Strains {
-  std::vector<double> largest, von_mises;
+  std::vector<double> largest, von_mises, longest, shortest;
 };
 Strains strains(const World&, const State&, int body);
 std::vector<double> volume_changes(const World&, const State&, int body);  // (T) V/V0 − 1 of each tet

@@ -6,6 +6,8 @@
 #include <array>
 #include <cmath>
 
+#include "meshing/detail/closest_point.h"
+
 namespace limber::meshing {
 namespace {
 
@@ -32,6 +34,7 @@ int common(int first, Signs... rest) {
 }
 
 using Tri = std::array<Vec3, 3>;
+using detail::closest_on_triangle;
 using Tet = std::array<Vec3, 4>;
 
 // Two convex bodies are disjoint when some plane has one on one side and the other beyond it: one through a
@@ -105,26 +108,6 @@ bool triangles_meet(const Tri& a, const Tri& b) {
   });
   if (sorted[0] == sorted[2]) return triangle.has_on(exact(sorted[0]));
   return CGAL::do_intersect(triangle, Kernel::Segment_3(exact(sorted[0]), exact(sorted[2])));
-}
-
-Vec3 closest_on_segment(const Vec3& a, const Vec3& b, const Vec3& p) {
-  const Vec3 ab = b - a;
-  const double length = ab.squaredNorm();
-  return length > 0 ? Vec3(a + std::clamp((p - a).dot(ab) / length, 0.0, 1.0) * ab) : a;
-}
-
-Vec3 closest_on_triangle(const Tri& t, const Vec3& p) {
-  const Vec3 u = t[1] - t[0], v = t[2] - t[0], w = p - t[0];
-  const Vec3 n = u.cross(v);
-  const double area = n.squaredNorm();
-  if (area > 0) {
-    const double beta = w.cross(v).dot(n) / area, gamma = u.cross(w).dot(n) / area;
-    if (beta >= 0 && gamma >= 0 && beta + gamma <= 1) return t[0] + beta * u + gamma * v;
-  }
-  Vec3 best = closest_on_segment(t[0], t[1], p);
-  for (const Vec3& q : {closest_on_segment(t[1], t[2], p), closest_on_segment(t[2], t[0], p)})
-    if ((q - p).squaredNorm() < (best - p).squaredNorm()) best = q;
-  return best;
 }
 
 std::vector<Box> boxes_of(const Points& positions, const Triangles& triangles) {

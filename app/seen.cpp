@@ -1,0 +1,140 @@
+#include "app/seen.h"
+
+#include <algorithm>
+#include <deque>
+#include <map>
+#include <optional>
+
+#include "app/motion_files.h"
+#include "core/threads.h"
+#include "fem/observe.h"
+#include "meshing/surface_overlap.h"
+
+namespace limber::app {
+
+namespace {
+
+// Whom a body presses: another body, or a wall of the bounds.
+struct Side {
+  int body, other;  // other −1: a wall
+  int axis = -1, upper = 0;
+  auto operator<=>(const Side&) const = default;
+};
+struct Press {
+  double force_n = 0;  // the lengths of all forces, summed
+  double strongest_n = 0;
+  Vec3 place_m = Vec3::Zero();  // of the strongest
+};
+using Pressing = std::map<Side, Press>;
+
+Pressing pressing_in(const fem::World& world, const State& state) {
+  Pressing pressing;
+  for (const fem::ContactForce& contact : fem::contact_forces(world, state)) {
+    if (contact.other == contact.body) continue;
+    Side side{contact.body, contact.other};
+    if (contact.other >= 0) {
+      side = {std::min(contact.body, contact.other), std::max(contact.body, contact.other)};
+    } else {
+      const Vec3 below = world.bounds_m.lower - contact.place_m,
+                 above = contact.place_m - world.bounds_m.upper;
+      side.upper = above.maxCoeff() > below.maxCoeff();
+      (side.upper ? above : below).maxCoeff(&side.axis);
+    }
+    const double force = contact.force_n.norm();
+    Press& press = pressing[side];
+    press.force_n += force;
+    if (force > press.strongest_n) press.strongest_n = force, press.place_m = contact.place_m;
+  }
+  return pressing;
+}
+
+// From the nearest point of either surface, 0 where that is inside the other.
+double gap_near(const meshing::PlacedSurface& a, const meshing::PlacedSurface& b, const Vec3& place) {
+  const auto from = [&](const meshing::PlacedSurface& one, const meshing::PlacedSurface& other) {
+    const Vec3 point = one.closest_point(place);
+    return other.winding(point) > 0.5 ? 0.0 : other.distance(point);
+  };
+  return std::min(from(a, b), from(b, a));
+}
+
+double gap_to_wall(const Box& bounds, const Side& side, const Box& surface) {
+  const double gap = side.upper ? bounds.upper[side.axis] - surface.upper[side.axis]
+                                : surface.lower[side.axis] - bounds.lower[side.axis];
+  return std::max(0.0, gap);
+}
+
+constexpr double no_limit = 1e100;  // m
+
+class Surfaces {
+ public:
+  Surfaces(const fem::World& world, const std::vector<PreparedBody>& bodies)
+      : world_(world), bodies_(bodies) {
+    for (std::size_t b = 0; b < bodies.size(); ++b) {
+      const Points rest = surface_at_rest(world.bodies[b], bodies[b]);
+      at_rest_.emplace_back(shapes_.emplace_back(rest, bodies[b].surface.triangles), rest);
+    }
+  }
+
+  SeenFrame measure(const State& state, const Pressing& pressing, double least_force_n) const {
+    std::deque<meshing::PlacedSurface> moved;
+    std::vector<const meshing::PlacedSurface*> now;
+    for (std::size_t b = 0; b < bodies_.size(); ++b)
+      now.push_back(world_.bodies[b].moving
+                        ? &moved.emplace_back(shapes_[b], surface_at(world_, bodies_[b], state, int(b)))
+                        : &at_rest_[b]);
+    SeenFrame frame;
+    for (int a = 0; a < int(now.size()); ++a) {
+      const fem::Body& body = world_.bodies[std::size_t(a)];
+      const meshing::PlacedSurface& one = *now[std::size_t(a)];
+      for (int b = a + 1; b < int(now.size()); ++b) {
+        if (!body.moving && !world_.bodies[std::size_t(b)].moving) continue;
+        const double depth = meshing::overlap(one, *now[std::size_t(b)]).depth_m;
+        if (depth > frame.overlap_m) frame.overlap_m = depth, frame.overlap_body = a, frame.overlap_other = b;
+      }
+      if (!body.moving || body.kind != fem::BodyKind::deformable) continue;
+      const double depth = meshing::self_overlap(one, at_rest_[std::size_t(a)]).depth_m;
+      if (depth > frame.self_overlap_m) frame.self_overlap_m = depth, frame.self_overlap_body = a;
+    }
+    for (const auto& [side, press] : pressing) {
+      if (!(press.force_n > least_force_n)) continue;
+      const meshing::PlacedSurface& one = *now[std::size_t(side.body)];
+      if (side.other < 0) {
+        const Vec3 near = one.closest_point(press.place_m);
+        frame.gaps.push_back({side.body, -1, gap_to_wall(world_.bounds_m, side, one.box()),
+                              gap_to_wall(world_.bounds_m, side, {near, near})});
+      } else {
+        const meshing::PlacedSurface& other = *now[std::size_t(side.other)];
+        frame.gaps.push_back({side.body, side.other, meshing::gap(one, other, no_limit).distance_m,
+                              gap_near(one, other, press.place_m)});
+      }
+    }
+    return frame;
+  }
+
+ private:
+  const fem::World& world_;
+  const std::vector<PreparedBody>& bodies_;
+  std::deque<meshing::SurfaceShape> shapes_;
+  std::deque<meshing::PlacedSurface> at_rest_;
+};
+
+}  // namespace
+
+std::vector<SeenFrame> measure_seen(const fem::World& world, const std::vector<PreparedBody>& bodies,
+                                    const std::vector<State>& frames) {
+  const Surfaces surfaces(world, bodies);
+  std::vector<Pressing> pressing(frames.size());
+  parallel_for(int(frames.size()),
+               [&](int f) { pressing[std::size_t(f)] = pressing_in(world, frames[std::size_t(f)]); });
+  double largest_n = 0;
+  for (const Pressing& of_frame : pressing)
+    for (const auto& [side, press] : of_frame) largest_n = std::max(largest_n, press.force_n);
+  std::vector<SeenFrame> seen(frames.size());
+  parallel_for(int(frames.size()), [&](int f) {
+    const std::size_t i = std::size_t(f);
+    seen[i] = surfaces.measure(frames[i], pressing[i], pressing_share * largest_n);
+  });
+  return seen;
+}
+
+}  // namespace limber::app

@@ -1,0 +1,36 @@
+// What is seen of a motion: how the fine surfaces lie to one another at every stored frame. Method:
+// docs/seen.md.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "app/body.h"
+#include "core/state.h"
+#include "fem/world.h"
+
+namespace limber::app {
+
+struct SeenFrame {
+  double overlap_m = 0;  // deepest of two surfaces, at least one of which moves
+  int overlap_body = -1, overlap_other = -1;
+  // Of each pair of bodies, or body and wall (other −1), that press one another.
+  struct Gap {
+    int body, other;
+    double least_m;       // distance of their surfaces, 0 where they overlap
+    double at_contact_m;  // where the strongest single force of contact acts
+  };
+  std::vector<Gap> gaps;
+  double self_overlap_m = 0;  // deepest of a deformable body's surface in itself, beyond that at rest
+  int self_overlap_body = -1;
+};
+
+// Bodies press one another in a frame where the forces between them, lengths summed, are more than this share
+// of the largest such sum of the whole motion.
+constexpr double pressing_share = 1e-3;
+
+// One a frame.
+std::vector<SeenFrame> measure_seen(const fem::World&, const std::vector<PreparedBody>&,
+                                    const std::vector<State>& frames);
+
+}  // namespace limber::app

@@ -1,0 +1,177 @@
+#include "meshing/placed_surface.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <numeric>
+
+#include "core/error.h"
+#include "meshing/detail/closest_point.h"
+#include "meshing/winding_number.h"
+
+namespace limber::meshing {
+
+namespace {
+
+constexpr int leaf_size = 4;
+constexpr int max_depth = 64;    // median splits: the tree's depth is below 32
+constexpr double far_radii = 3;  // a group is a dipole to points this many radii away
+
+double squared_distance(const Box& box, const Vec3& p) {
+  return (box.lower - p).cwiseMax(p - box.upper).cwiseMax(0.0).squaredNorm();
+}
+
+}  // namespace
+
+SurfaceShape::SurfaceShape(const Points& rest, const Triangles& given)
+    : triangles(given.rows(), 3),
+      tree(detail::build_triangle_bvh(rest, given, leaf_size)),
+      vertices(int(rest.rows())),
+      own_edges(std::size_t(given.rows()), 0),
+      triangle_from_vertex(std::size_t(vertices), -1),
+      first_neighbour(std::size_t(vertices) + 1, 0),
+      box(bounding_box(rest)) {
+  for (Eigen::Index t = 0; t < given.rows(); ++t) triangles.row(t) = given.row(tree.order[std::size_t(t)]);
+  std::iota(tree.order.begin(), tree.order.end(), 0);
+
+  struct Edge {
+    int low, high, triangle, corner;
+  };
+  std::vector<Edge> edges;
+  edges.reserve(3 * own_edges.size());
+  std::vector<double> largest(std::size_t(vertices), -1.0);
+  for (int t = 0; t < int(triangles.rows()); ++t) {
+    const auto row = triangles.row(t);
+    const Vec3 a = rest.row(row[0]), b = rest.row(row[1]), c = rest.row(row[2]);
+    const double area = (b - a).cross(c - a).norm();
+    for (int k = 0; k < 3; ++k) {
+      const int v = row[k], w = row[(k + 1) % 3];
+      edges.push_back({std::min(v, w), std::max(v, w), t, k});
+      if (area > largest[std::size_t(v)])
+        largest[std::size_t(v)] = area, triangle_from_vertex[std::size_t(v)] = t;
+    }
+  }
+  std::sort(edges.begin(), edges.end(), [](const Edge& x, const Edge& y) {
+    return std::tie(x.low, x.high, x.triangle, x.corner) < std::tie(y.low, y.high, y.triangle, y.corner);
+  });
+  const auto is_new = [&](std::size_t i) {
+    return i == 0 || edges[i].low != edges[i - 1].low || edges[i].high != edges[i - 1].high;
+  };
+  for (std::size_t i = 0; i < edges.size(); ++i) {
+    if (!is_new(i)) continue;
+    own_edges[std::size_t(edges[i].triangle)] |= std::uint8_t(1 << edges[i].corner);
+    ++first_neighbour[std::size_t(edges[i].low) + 1], ++first_neighbour[std::size_t(edges[i].high) + 1];
+  }
+  std::partial_sum(first_neighbour.begin(), first_neighbour.end(), first_neighbour.begin());
+  neighbours.resize(std::size_t(first_neighbour.back()));
+  std::vector<int> next(first_neighbour.begin(), first_neighbour.end() - 1);
+  for (std::size_t i = 0; i < edges.size(); ++i) {
+    if (!is_new(i)) continue;
+    neighbours[std::size_t(next[std::size_t(edges[i].low)]++)] = edges[i].high;
+    neighbours[std::size_t(next[std::size_t(edges[i].high)]++)] = edges[i].low;
+  }
+
+  std::vector<bool> seen(std::size_t(vertices), false);
+  std::vector<int> open;
+  for (int v = 0; v < vertices; ++v) {
+    if (seen[std::size_t(v)] || triangle_from_vertex[std::size_t(v)] < 0) continue;
+    vertex_of_component.push_back(v);
+    seen[std::size_t(v)] = true;
+    open.push_back(v);
+    while (!open.empty()) {
+      const std::size_t at = std::size_t(open.back());
+      open.pop_back();
+      for (int n = first_neighbour[at]; n < first_neighbour[at + 1]; ++n)
+        if (const int w = neighbours[std::size_t(n)]; !seen[std::size_t(w)])
+          seen[std::size_t(w)] = true, open.push_back(w);
+    }
+  }
+}
+
+PlacedSurface::PlacedSurface(const SurfaceShape& shape, Points positions)
+    : shape_(&shape), positions_(std::move(positions)), nodes_(shape.tree.nodes.size()) {
+  LIMBER_CHECK(int(positions_.rows()) == shape.vertices, positions_.rows(), shape.vertices);
+  for (std::size_t n = nodes_.size(); n-- > 0;) {
+    const auto& place = shape.tree.nodes[n];
+    Node& node = nodes_[n];
+    const auto add = [&](const Vec3& center, const Vec3& area_vector, double area) {
+      node.center += area * center;
+      node.area_vector += area_vector;
+      node.area += area;
+    };
+    if (place.leaf()) {
+      for (int t = place.begin; t < place.end; ++t) {
+        const auto [a, b, c] = corners(t);
+        node.box.include(a), node.box.include(b), node.box.include(c);
+        const Vec3 area_vector = 0.5 * (b - a).cross(c - a);
+        add((a + b + c) / 3, area_vector, area_vector.norm());
+      }
+    } else {
+      for (const int child : {place.left, place.right}) {
+        const Node& part = nodes_[std::size_t(child)];
+        node.box.include(part.box);
+        add(part.center, part.area_vector, part.area);
+      }
+    }
+    node.center = node.area > 0 ? Vec3(node.center / node.area) : node.box.center();
+    node.squared_radius = (node.center - node.box.lower).cwiseMax(node.box.upper - node.center).squaredNorm();
+  }
+}
+
+double PlacedSurface::winding(const Vec3& point) const {
+  if (nodes_.empty()) return 0;
+  int stack[max_depth];
+  int count = 0;
+  stack[count++] = 0;
+  double sum = 0;
+  while (count > 0) {
+    const int n = stack[--count];
+    const Node& node = nodes_[std::size_t(n)];
+    const auto& place = shape_->tree.nodes[std::size_t(n)];
+    const Vec3 r = node.center - point;
+    const double r2 = r.squaredNorm();
+    if (r2 > far_radii * far_radii * node.squared_radius) {
+      sum += node.area_vector.dot(r) / (4 * std::numbers::pi * r2 * std::sqrt(r2));
+    } else if (place.leaf()) {
+      for (int t = place.begin; t < place.end; ++t) {
+        const auto [a, b, c] = corners(t);
+        sum += solid_angle_share(a, b, c, point);
+      }
+    } else {
+      stack[count++] = place.right;
+      stack[count++] = place.left;
+    }
+  }
+  return sum;
+}
+
+Vec3 PlacedSurface::closest_point(const Vec3& point, double above) const {
+  struct Pending {
+    int node;
+    double squared;
+  } stack[max_depth];
+  int count = 0;
+  double best = 1e300;
+  Vec3 closest = point;
+  if (!nodes_.empty()) stack[count++] = {0, squared_distance(nodes_[0].box, point)};
+  while (count > 0) {
+    const Pending top = stack[--count];
+    if (top.squared >= best) continue;
+    const auto& place = shape_->tree.nodes[std::size_t(top.node)];
+    if (place.leaf()) {
+      for (int t = place.begin; t < place.end; ++t)
+        if (const Vec3 q = detail::closest_on_triangle(corners(t), point); (q - point).squaredNorm() < best)
+          best = (q - point).squaredNorm(), closest = q;
+      if (best <= above * above) break;
+      continue;
+    }
+    Pending one{place.left, squared_distance(nodes_[std::size_t(place.left)].box, point)},
+        other{place.right, squared_distance(nodes_[std::size_t(place.right)].box, point)};
+    if (one.squared < other.squared) std::swap(one, other);
+    stack[count++] = one;
+    stack[count++] = other;
+  }
+  return closest;
+}
+
+}  // namespace limber::meshing

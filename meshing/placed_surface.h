@@ -1,0 +1,66 @@
+// A surface whose vertices move while its triangles stay: a tree over them that is built once and fitted anew
+// to each place, and what is asked of it there. docs/seen.md.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "meshing/detail/triangle_bvh.h"
+
+namespace limber::meshing {
+
+// What stays. Any triangle soup will do: open, doubled, passing through itself.
+struct SurfaceShape {
+  SurfaceShape(const Points& rest, const Triangles&);
+
+  Triangles triangles;       // in the order of the tree's leaves
+  detail::TriangleBvh tree;  // built at rest
+  int vertices;
+  // Each edge and vertex is asked for once, by one of its triangles: bit k of a row is the edge from corner k
+  // to corner k + 1.
+  std::vector<std::uint8_t> own_edges;
+  std::vector<int> triangle_from_vertex;         // the largest at rest, −1: none
+  std::vector<int> first_neighbour, neighbours;  // of vertex v: neighbours[first_neighbour[v] … [v + 1])
+  std::vector<int> vertex_of_component;          // the first of each piece that edges join
+  Box box;                                       // at rest
+  double size_m() const { return box.size().maxCoeff(); }
+};
+
+// Where it is. The shape must outlive it. Safe to ask from many threads.
+class PlacedSurface {
+ public:
+  PlacedSurface(const SurfaceShape&, Points positions);  // (V × 3) for the shape's vertices
+
+  struct Node {
+    Box box;
+    // Of the area vector ∫ n dA as a dipole: where it stands and how far its triangles reach from there.
+    Vec3 center = Vec3::Zero(), area_vector = Vec3::Zero();
+    double area = 0, squared_radius = 0;
+  };
+  const SurfaceShape& shape() const { return *shape_; }
+  const Points& positions() const { return positions_; }
+  const std::vector<Node>& nodes() const { return nodes_; }  // as in shape().tree
+  Box box() const { return nodes_.empty() ? Box{} : nodes_[0].box; }
+  Vec3 vertex(int v) const { return positions_.row(v); }
+  std::array<Vec3, 3> corners(int triangle) const {
+    const auto t = shape_->triangles.row(triangle);
+    return {vertex(t[0]), vertex(t[1]), vertex(t[2])};
+  }
+
+  // How often the surface winds round the point, as meshing/winding_number.h says, far groups as single
+  // dipoles: within 0.05 of exact.
+  double winding(const Vec3& point) const;
+  // Of the nearest triangle, and how far that is. Where it is no farther than `above`, any that is as near
+  // will do, and then it is quick to say so. The point itself where there is no triangle.
+  Vec3 closest_point(const Vec3& point, double above = 0) const;
+  double distance(const Vec3& point, double above = 0) const {
+    return (closest_point(point, above) - point).norm();
+  }
+
+ private:
+  const SurfaceShape* shape_;
+  Points positions_;
+  std::vector<Node> nodes_;
+};
+
+}  // namespace limber::meshing
