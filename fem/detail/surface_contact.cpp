@@ -12,6 +12,9 @@ namespace {
 // Share of a distance that movement may use up, and of the reach, by which less; the rest is for rounding.
 // And what is farther than this share of the reach is apart, however it is computed.
 constexpr float kept = 0.9f, rounding = 0.02f, certain = 0.004f;
+// Candidates that a list holds without costing much, and how far lists reach, in skins.
+constexpr std::size_t few_candidates = 600, many_candidates = 1800;
+constexpr float nearest_reach = 0.5f, farthest_reach = 6;
 // A column that holds no sample: in no box.
 constexpr float nowhere = 1e30f;
 
@@ -205,15 +208,24 @@ void SurfaceContacts<Real>::find_pair(int lane, const LaneView<Real>& view, std:
     if (view.lower[ka] - offset > view.upper[kb] || view.lower[kb] - offset > view.upper[ka]) return;
   }
   List& list = lists_[lane * pairs_.size() + pair];
-  const Real reach = (tables_.skin[a] + tables_.skin[b]) / 2, travel = travel_of(lane, view, a, b);
-  if (!list.built || travel - list.travel_at_build > kept * reach) {
+  const Real travel = travel_of(lane, view, a, b);
+  if (!list.built || travel - list.travel_at_build > kept * list.reach) {
+    // A list that holds little may as well reach farther, and so last longer; its results are the same.
+    const std::size_t held = list.near[0].candidates.size() + list.near[1].candidates.size();
+    const Real skin = (tables_.skin[a] + tables_.skin[b]) / 2;
+    if (list.reach == 0) list.reach = skin;
+    if (list.built && held < few_candidates)
+      list.reach = std::min(Real(1.5) * list.reach, farthest_reach * skin);
+    if (list.built && held > many_candidates)
+      list.reach = std::max(list.reach / Real(1.5), nearest_reach * skin);
     list.built = true, list.travel_at_build = travel;
-    build(view, a, b, reach, list.near[0]);
-    if (a != b) build(view, b, a, reach, list.near[1]);
+    build(view, a, b, list.reach, list.near[0]);
+    if (a != b) build(view, b, a, list.reach, list.near[1]);
     for (Near& near : list.near)
       for (std::size_t k = 0; k < near.candidates.size(); ++k)
-        near.asleep_until[k] = travel + kept * near.asleep_until[k] - rounding * reach;
+        near.asleep_until[k] = travel + kept * near.asleep_until[k] - rounding * list.reach;
   }
+  const Real reach = list.reach;
   find_in(view, a, b, reach, travel, list.near[0]);
   if (a != b) find_in(view, b, a, reach, travel, list.near[1]);
 }
@@ -257,6 +269,36 @@ void SurfaceContacts<Real>::collect_groups(const LaneView<Real>& view, int from,
   }
 }
 
+// Into slabs by their middles, along the longest axis of their box.
+template <class Real>
+void SurfaceContacts<Real>::sort_groups(const Real lower[3], const Real upper[3]) {
+  slab_axis_ = 0, slab_half_ = 0;
+  for (int c = 1; c < 3; ++c)
+    if (upper[c] - lower[c] > upper[slab_axis_] - lower[slab_axis_]) slab_axis_ = c;
+  slab_lower_ = lower[slab_axis_];
+  slabs_a_metre_ = Real(slabs) / std::max(upper[slab_axis_] - slab_lower_, std::numeric_limits<Real>::min());
+  std::fill(std::begin(slab_begin_), std::end(slab_begin_), 0);
+  const auto slab = [&](const Group& group) {
+    return slab_of((group.lower[slab_axis_] + group.upper[slab_axis_]) / 2);
+  };
+  for (const Group& group : groups_) {
+    ++slab_begin_[slab(group) + 1];
+    slab_half_ = std::max(slab_half_, (group.upper[slab_axis_] - group.lower[slab_axis_]) / 2);
+  }
+  for (int k = 0; k < slabs; ++k) slab_begin_[k + 1] += slab_begin_[k];
+  unsorted_groups_ = groups_;
+  int next[slabs];
+  std::copy_n(slab_begin_, slabs, next);
+  for (const Group& group : unsorted_groups_) groups_[next[slab(group)]++] = group;
+  for (int c = 0; c < 3; ++c) {
+    group_boxes_[c].clear(), group_boxes_[3 + c].clear();
+    for (const Group& group : groups_)
+      group_boxes_[c].push_back(group.lower[c]), group_boxes_[3 + c].push_back(group.upper[c]);
+    for (int k : {c, 3 + c}) group_boxes_[k].resize(groups_.size() + block_size, 0);
+  }
+  meeting_.resize(groups_.size() + block_size);
+}
+
 // Candidates, with their distances in the place of what they sleep until.
 template <class Real>
 void SurfaceContacts<Real>::build(const LaneView<Real>& view, int from, int into, Real reach, Near& near) {
@@ -288,6 +330,9 @@ void SurfaceContacts<Real>::build(const LaneView<Real>& view, int from, int into
       if (meet) near_tets_.push_back({{row, row + 1, row + 2, row + 3}, -1, -1, tet, -1});
     }
   }
+  const int first = groups_.empty() ? 0 : surface_.first_sample[groups_.front().tet],
+            last = groups_.empty() ? 0 : surface_.first_sample[groups_.back().tet + 1];
+  sort_groups(lower, upper);
   planes_.resize((near_tets_.size() + block_size - 1) / block_size);
   kernels_.find_planes(near_tets_.data(), int(near_tets_.size()), &places_[0].at[0], reach, planes_.data());
   const auto mark_beside = [&](int tet, unsigned char mark) {
@@ -297,12 +342,17 @@ void SurfaceContacts<Real>::build(const LaneView<Real>& view, int from, int into
   for (std::size_t k = 0; k < near_tets_.size(); ++k) {
     const TetPlanes<Real>& planes = planes_[k / block_size];
     const int column = int(k % block_size);
-    Real tet_lower[3], tet_upper[3];
-    for (int c = 0; c < 3; ++c)
-      tet_lower[c] = planes.lower[c][column], tet_upper[c] = planes.upper[c][column];
+    const Real tet_lower = planes.lower[slab_axis_][column], tet_upper = planes.upper[slab_axis_][column];
     if (from == into) mark_beside(near_tets_[k].tet, 1);
-    for (const Group& group : groups_) {
-      if (!boxes_meet(group.lower, group.upper, tet_lower, tet_upper) || beside_[group.tet]) continue;
+    const int begin = slab_begin_[slab_of(tet_lower - slab_half_)],
+              end = slab_begin_[slab_of(tet_upper + slab_half_) + 1];
+    const Real *const lowers[3] = {&group_boxes_[0][begin], &group_boxes_[1][begin], &group_boxes_[2][begin]},
+                      *const uppers[3] = {&group_boxes_[3][begin], &group_boxes_[4][begin],
+                                          &group_boxes_[5][begin]};
+    const int meeting = kernels_.meeting_boxes(planes, column, lowers, uppers, end - begin, meeting_.data());
+    for (int m = 0; m < meeting; ++m) {
+      const Group& group = groups_[begin + meeting_[m]];
+      if (beside_[group.tet]) continue;
       const Real* const at[3] = {&columns_[0][group.begin], &columns_[1][group.begin],
                                  &columns_[2][group.begin]};
       near_tet_.resize(std::size_t(group.count));
@@ -317,8 +367,6 @@ void SurfaceContacts<Real>::build(const LaneView<Real>& view, int from, int into
     if (from == into) mark_beside(near_tets_[k].tet, 0);
   }
   // Counting sort by sample, which keeps the tets of each ascending.
-  const int first = groups_.empty() ? 0 : surface_.first_sample[groups_.front().tet],
-            last = groups_.empty() ? 0 : surface_.first_sample[groups_.back().tet + 1];
   counts_.assign(std::size_t(last - first + 1), 0);
   for (const TetAndEdge& found : found_) ++counts_[found.point - first + 1];
   for (std::size_t k = 1; k < counts_.size(); ++k) counts_[k] += counts_[k - 1];

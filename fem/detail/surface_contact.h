@@ -48,7 +48,7 @@ class SurfaceContacts {
   };
   struct List {
     bool built = false;
-    Real travel_at_build = 0;
+    Real travel_at_build = 0, reach = 0;
     Near near[2];  // samples of a in b, of b in a
   };
   // x y z and nothing: added and scaled at once.
@@ -73,6 +73,11 @@ class SurfaceContacts {
   Real travel_of(int lane, const LaneView<Real>&, int a, int b);
   void build(const LaneView<Real>&, int from, int into, Real reach, Near&);
   void collect_groups(const LaneView<Real>&, int from, const Real lower[3], const Real upper[3], Real reach);
+  void sort_groups(const Real lower[3], const Real upper[3]);
+  int slab_of(Real x) const {  // never falls as x grows
+    const Real slab = (x - slab_lower_) * slabs_a_metre_;
+    return slab > 0 ? (slab < Real(slabs) ? int(slab) : slabs - 1) : 0;
+  }
   void find_pair(int lane, const LaneView<Real>&, std::size_t pair);
   void find_in(const LaneView<Real>&, int from, int into, Real reach, Real travel, Near&);
   bool measure(const LaneView<Real>&, int from, int into, int sample, int tet, const Real weight[4]);
@@ -106,7 +111,12 @@ class SurfaceContacts {
   std::vector<Real> loads_;        // a node: Σ area × depth × weight of its touches
   std::vector<Bearing> bearings_;  // a body; empty without rigid ones
   // Scratch of a list's building.
-  std::vector<Group> groups_;
+  static constexpr int slabs = 32;
+  std::vector<Group> groups_, unsorted_groups_;
+  std::vector<Real> group_boxes_[6];  // lower x y z, upper x y z; filled up for the kernel
+  std::vector<int> meeting_;
+  int slab_axis_ = 0, slab_begin_[slabs + 1];
+  Real slab_lower_ = 0, slabs_a_metre_ = 0, slab_half_ = 0;
   std::vector<int> sample_of_column_, counts_;
   std::vector<Real> columns_[3];
   std::vector<TetAndEdge> near_tets_, found_;
