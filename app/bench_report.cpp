@@ -61,6 +61,18 @@ Json report_of_group(const std::vector<const Json*>& runs) {
     for (const Json* run : solved) value = std::max(value, run->at(key).get<double>());
     return value;
   };
+  const auto largest_share = [&](const char* key) { return 100 * largest(key); };
+  // Of the runs' medians the median; null where nothing presses in any.
+  std::vector<double> medians;
+  double gap_worst = 0, least_stretch = 1;
+  for (const Json* run : solved) {
+    const Json& gap = run->at("gap_at_contact");
+    if (gap.at("pairs_and_frames").get<int>() > 0)
+      medians.push_back(100 * gap.at("median_of_robot_size").get<double>());
+    gap_worst = std::max(gap_worst, 100 * gap.at("worst_of_robot_size").get<double>());
+    least_stretch = std::min(least_stretch, run->at("least_stretch").get<double>());
+  }
+  const Json gap_median = medians.empty() ? Json() : Json(quartiles(medians).median);
   std::int64_t inverted = 0;
   for (const Json* run : solved) inverted += run->at("inverted_tets").get<std::int64_t>();
   return {{"scene", runs.front()->at("scene")},
@@ -73,6 +85,12 @@ Json report_of_group(const std::vector<const Json*>& runs) {
           {"wall_s", spread(runs, "wall_s")},
           {"motion_s", spread(solved, "motion_s")},
           {"largest_penetration_percent", largest("deepest_penetration_percent")},
+          {"largest_overlap_percent", largest_share("deepest_overlap_of_robot_size")},
+          {"largest_self_overlap_percent", largest_share("deepest_self_overlap_of_robot_size")},
+          {"median_gap_percent", gap_median},
+          {"largest_gap_percent", gap_worst},
+          {"least_stretch", least_stretch},
+          {"largest_stretch", largest("largest_stretch")},
           {"inverted_tets", inverted},
           {"largest_force_n", largest("largest_force_n")},
           {"volume", volumes_of(solved)},
@@ -167,7 +185,8 @@ Json report_of(const RunRecords& records) {
 
 std::string text_of_report(const Json& report) {
   std::vector<std::vector<std::string>> runs{{"scene", "preset", "solved", "iterations", "CPU s", "wall s",
-                                              "motion s", "penetration %", "inverted", "force N"}},
+                                              "motion s", "penetration %", "overlap %", "in itself %",
+                                              "gap %", "stretch", "inverted", "force N"}},
       volumes{{"scene", "preset", "body", "change at most %"}};
   for (const double limit : volume_limits_percent) volumes[0].push_back(fmt::format("≤ {:g} %", limit));
   std::string notes;
@@ -178,6 +197,14 @@ std::string text_of_report(const Json& report) {
                     text_of_quartiles(g.at("cpu_s"), "{:.2f}"), text_of_quartiles(g.at("wall_s"), "{:.2f}"),
                     text_of_quartiles(g.at("motion_s"), "{:.1f}"),
                     fmt::format("{:.2f}", g.at("largest_penetration_percent").get<double>()),
+                    fmt::format("{:.2f}", g.at("largest_overlap_percent").get<double>()),
+                    fmt::format("{:.2f}", g.at("largest_self_overlap_percent").get<double>()),
+                    g.at("median_gap_percent").is_null()
+                        ? std::string("-")
+                        : fmt::format("{:.2f} {:.2f}", g.at("median_gap_percent").get<double>(),
+                                      g.at("largest_gap_percent").get<double>()),
+                    fmt::format("{:.2f} {:.2f}", g.at("least_stretch").get<double>(),
+                                g.at("largest_stretch").get<double>()),
                     fmt::format("{}", g.at("inverted_tets").get<std::int64_t>()),
                     fmt::format("{:.1f}", g.at("largest_force_n").get<double>())});
     for (const auto& [name, body] : g.at("volume").items()) {
@@ -196,7 +223,9 @@ std::string text_of_report(const Json& report) {
                       scene, preset, g.at("programs").size());
   }
   std::string text = table(runs, 2);
-  text += "(quartiles: first, median, third; unsolved runs count with what they took)\n";
+  text +=
+      "(quartiles: first, median, third; unsolved runs count with what they took; overlap, gap (median, "
+      "worst) and stretch: docs/seen.md)\n";
   if (volumes.size() > 1)
     text += "\n" + table(volumes, 3) + "(share of the frames of all solved paths, in per cent)\n";
   return text + notes;

@@ -70,6 +70,7 @@ struct Findings {
   const FemSystem& system;
   const MotionFigures& figures;
   const Json& promises;
+  const Json& measured;
   const fs::path& folder;
 
   const plan::Plan& plan() const { return planned.plan; }
@@ -206,6 +207,25 @@ void plots(const Findings& f, Page& page) {
        curves_of([](const BodyFigures& b) { return b.contact_force_n; }, false));
   plot("Largest strain of a tet", "Green's strain",
        curves_of([](const BodyFigures& b) { return b.largest_strain; }, true));
+  const double percent = 100 / f.figures.robot_surface_size_m;
+  render::Curve two{"two surfaces", {0.80, 0.20, 0.15}, {}, {}}, own{"in itself", {0.16, 0.50, 0.73}, {}, {}},
+      gap{"nearest", {0.16, 0.50, 0.73}, {}, {}}, at_contact{"where they press", {0.90, 0.49, 0.13}, {}, {}};
+  for (const FrameFigures& frame : f.figures.frames) {
+    two.x.push_back(frame.time_s), two.y.push_back(percent * frame.seen.overlap_m);
+    own.x.push_back(frame.time_s), own.y.push_back(percent * frame.seen.self_overlap_m);
+    double least = 0, pressed = 0;
+    for (const SeenFrame::Gap& g : frame.seen.gaps)
+      if (g.other >= 0) least = std::max(least, g.least_m), pressed = std::max(pressed, g.at_contact_m);
+    gap.x.push_back(frame.time_s), gap.y.push_back(percent * least);
+    at_contact.x.push_back(frame.time_s), at_contact.y.push_back(percent * pressed);
+  }
+  const SeenLimits& limits = seen_limits;
+  plot("Overlap that is seen", "% of the robot's size", {two, own}, {100 * limits.overlap});
+  plot("Gap between bodies that press", "% of the robot's size", {gap, at_contact}, {100 * limits.worst_gap});
+  plot("Stretch of a tet, largest", "singular value",
+       curves_of([](const BodyFigures& b) { return b.largest_stretch; }, true), {limits.largest_stretch});
+  plot("Stretch of a tet, least", "singular value",
+       curves_of([](const BodyFigures& b) { return b.least_stretch; }, true), {limits.least_stretch});
   page.add("</div>\n");
 }
 
@@ -243,9 +263,12 @@ void promises(const Findings& f, Page& page) {
     page.add("<tr><td class=\"{0}\">{1} {0}</td><td>{2}</td><td>{3}</td></tr>\n",
              p.at("kept").get<bool>() ? "kept" : "broken", p.at("kept").get<bool>() ? "✓" : "✗",
              escaped(p.at("promise").get<std::string>()), escaped(p.at("value").get<std::string>()));
+  for (const Json& m : f.measured)
+    page.add("<tr><td>found</td><td>{}</td><td>{}</td></tr>\n", escaped(m.at("what").get<std::string>()),
+             escaped(m.at("value").get<std::string>()));
   page.add(
       "</table></div>\n<p class=\"note\">Checked anew for this page, as by <code>limber "
-      "verify</code>.</p>\n");
+      "verify</code>; what is found is no promise.</p>\n");
 }
 
 void tree(const Findings& f, Page& page) {
@@ -417,7 +440,9 @@ Outcome report(const fs::path& folder, const std::optional<fs::path>& file) {
   const FemSystem system(world, goal_rules_of(planned.scene));
   MotionFigures figures;
   const Outcome verified = verify_plan(planned, bodies, world, figures);
-  const Findings findings{planned, bodies, world, system, figures, verified.json.at("promises"), folder};
+  const Findings findings{
+      planned, bodies, world, system, figures, verified.json.at("promises"), verified.json.at("measured"),
+      folder};
 
   const fs::path path = file.value_or(folder / "report.html");
   Json result{{"file", path.string()}, {"bytes", 0}, {"all_kept", verified.json.at("all_kept")}};

@@ -46,7 +46,8 @@ int inverted_tets(const World&, const State&);  // of all moving bodies: volume 
 bool is_sound(const World&, const State&);
 
 // The deepest point of one body in another, or beyond a wall of the bounds: distance to the nearest surface,
-// over vertices and surface edges, measured apart from the contact code. Pairs of static bodies do not count.
+// over vertices and along surface edges to a hundredth of it, measured apart from the contact code. Pairs of
+// static bodies do not count.
 struct Penetration {
   double depth_m = 0;         // 0: nothing touches
   int body = -1, other = -1;  // other −1: a wall

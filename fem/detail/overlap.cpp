@@ -4,6 +4,8 @@
 #include <set>
 #include <vector>
 
+#include "core/highest_along.h"
+
 namespace limber::fem::detail {
 namespace {
 
@@ -136,18 +138,30 @@ void for_each_crossing_edge(const Shape& a, const Near& near, const Box& region,
   }
 }
 
+constexpr int halvings = 7;  // of a stretch inside, in search of its deepest point
+
 // `side` is 1 where the overlap's way is a's, −1 where it is told for b.
 void include_points_of(const Shape& a, const Shape& b, const Box& region, double side, Overlap& deepest) {
   const Near near(b, region);
-  const auto consider = [&](const Vec3& p) {
-    if (!meet(region, {p, p}) || !near.contains(p)) return;
-    if (const double depth = near.depth(p); depth > deepest.depth_m)
-      deepest = {depth, p, side * near.way_out(p)};
+  const auto include = [&](const Vec3& p, double depth) {
+    if (depth > deepest.depth_m) deepest = {depth, p, side * near.way_out(p)};
   };
-  for (int v : vertices_of(a.surface)) consider(a.positions.row(v));
+  const auto is_inside = [&](const Vec3& p) { return meet(region, {p, p}) && near.contains(p); };
+  for (int v : vertices_of(a.surface))
+    if (const Vec3 p = a.positions.row(v); is_inside(p)) include(p, near.depth(p));
   for_each_crossing_edge(a, near, region, [&](const Vec3& p, const Vec3& q, std::vector<double> at) {
     at.insert(at.begin(), 0.0), at.push_back(1.0);
-    for (std::size_t k = 0; k + 1 < at.size(); ++k) consider(p + 0.5 * (at[k] + at[k + 1]) * (q - p));
+    const double length = (q - p).norm();
+    const auto place = [&](double share) -> Vec3 { return p + share * (q - p); };
+    const auto depth = [&](double share) { return near.depth(place(share)); };
+    for (std::size_t k = 0; k + 1 < at.size(); ++k) {
+      if (!is_inside(place(0.5 * (at[k] + at[k + 1])))) continue;
+      // Where it crosses it is on the surface.
+      const double from = k == 0 ? depth(0) : 0, to = k + 2 == at.size() ? depth(1) : 0;
+      Highest highest{deepest.depth_m, 0};
+      raise_along(at[k], from, at[k + 1], to, length, halvings, depth, highest);
+      include(place(highest.at), highest.value);
+    }
   });
 }
 

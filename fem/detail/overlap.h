@@ -21,9 +21,8 @@ struct Overlap {
       Vec3::Zero();  // of that length: a moved by it, or b by its opposite, has that place no longer inside
 };
 
-// The largest distance to the other body's surface, over points of each body's surface edges that are inside
-// the other: the vertices, and the middle of each stretch of an edge that lies inside (so an edge that cuts a
-// corner is seen too).
+// The largest distance to the other body's surface, to a hundredth of it, over the points of each body's
+// surface edges that cross the other's surface and over its vertices, where they are inside the other.
 Overlap deepest_overlap(const Shape& a, const Shape& b);
 
 // Surface edges of either body that pass through the other with no end inside.

@@ -35,6 +35,14 @@ Json record(const std::string& preset, int seed, bool solved, double iterations,
               {"within_6_percent", 100},
               {"within_10_percent", 100}}}}},
           {"deepest_penetration_percent", change_percent / 2},
+          {"deepest_overlap_of_robot_size", 1e-4 * change_percent},
+          {"deepest_self_overlap_of_robot_size", 2e-4 * change_percent},
+          {"gap_at_contact",
+           {{"pairs_and_frames", seed == 2 ? 0 : 5},
+            {"median_of_robot_size", 1e-3 * change_percent},
+            {"worst_of_robot_size", 2e-3 * change_percent}}},
+          {"least_stretch", 1 - change_percent / 10},
+          {"largest_stretch", 1 + change_percent / 10},
           {"inverted_tets", 0},
           {"largest_force_n", 5},
           {"threads", 1},
@@ -72,6 +80,12 @@ TEST(BenchReport, UnsolvedRunsCountInTheSearchAndNotInTheMotion) {
   EXPECT_EQ(fast.at("cpu_s"), Json({30.0, 40.0, 120.0}));
   EXPECT_EQ(fast.at("motion_s"), Json({125.0, 150.0, 175.0}));
   EXPECT_EQ(fast.at("largest_penetration_percent"), 2);
+  EXPECT_NEAR(fast.at("largest_overlap_percent").get<double>(), 0.04, 1e-12);
+  EXPECT_NEAR(fast.at("largest_self_overlap_percent").get<double>(), 0.08, 1e-12);
+  EXPECT_NEAR(fast.at("median_gap_percent").get<double>(), 0.2, 1e-12);  // the second run has none
+  EXPECT_NEAR(fast.at("largest_gap_percent").get<double>(), 0.8, 1e-12);
+  EXPECT_NEAR(fast.at("least_stretch").get<double>(), 0.6, 1e-12);
+  EXPECT_NEAR(fast.at("largest_stretch").get<double>(), 1.4, 1e-12);
   const Json& robot = fast.at("volume").at("robot");
   EXPECT_EQ(robot.at("largest_percent"), 4);
   EXPECT_EQ(robot.at("frames"), 200);

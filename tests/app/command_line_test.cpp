@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cstdlib>
 #include <fstream>
+#include <numeric>
 #include <sstream>
 
 #include "app/commands.h"
@@ -80,6 +81,28 @@ TEST_F(Program_slow, ObservablesOfAPathAgreeWithItsSummary) {
             motion.at("largest_strain"));
   EXPECT_EQ(largest("contact_force_n"), motion.at("largest_contact_force_n"));
   EXPECT_EQ(largest("penetration_m"), motion.at("deepest_penetration_m"));
+  EXPECT_EQ(largest("overlap_m"), motion.at("deepest_overlap_m"));
+  EXPECT_EQ(largest("self_overlap_m"), motion.at("deepest_self_overlap_m"));
+  EXPECT_EQ(largest("gap_m"), motion.at("gap").at("worst_m"));
+  EXPECT_EQ(largest("gap_at_contact_m"), motion.at("gap_at_contact").at("worst_m"));
+  EXPECT_EQ(largest("gap_to_wall_m"), motion.at("gap_to_wall").at("worst_m"));
+  const std::vector<double> pressing = column("pressing");
+  EXPECT_GT(largest("pressing"), 0);
+  EXPECT_EQ(std::accumulate(pressing.begin(), pressing.end(), 0.0),
+            motion.at("gap").at("pairs_and_frames").get<double>());
+  // The surfaces of the boxes are within their cages, and the nearest is not farther than where they press.
+  EXPECT_LE(largest("overlap_m"), largest("penetration_m"));
+  EXPECT_LE(motion.at("gap").at("worst_m").get<double>(),
+            motion.at("gap_at_contact").at("worst_m").get<double>());
+  EXPECT_EQ(std::max(largest("robot.largest_stretch"), largest("block.largest_stretch")),
+            motion.at("largest_stretch"));
+  // What is found is told beside the promises, and is the same on any number of threads.
+  EXPECT_EQ(verified.json().at("measured").size(), 6u);
+  const std::string again = out("again.csv");
+  for (const char* threads : {"1", "2"}) {
+    limber_program({"verify", out(), "--observables", again, "--threads", threads});
+    EXPECT_EQ(read_file(again), read_file(csv)) << threads;
+  }
   EXPECT_GT(largest("robot.contact_force_n"), 0);
   EXPECT_GT(largest("robot.kinetic_energy_j"), largest("robot.elastic_energy_j"));
   for (const auto& [key, value] : motion.items()) EXPECT_EQ(planned.json().at(key), value) << key;

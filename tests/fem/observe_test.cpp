@@ -62,6 +62,53 @@ TEST(Observe, StrainsOfAffineMapsAreThoseOfTheBook) {
        [&](double, double von_mises) { EXPECT_NEAR(von_mises, e, 1e-4); });
 }
 
+// The singular values of the map itself, in every tet, whatever turn comes before and after.
+TEST(Observe, StretchOfAnAffineMapIsItsSingularValues) {
+  const World world = build_world(alone({"ball", ball({0, 0, 0}, 0.5, 3), {}, {}}));
+  const Eigen::Matrix3d before = Eigen::AngleAxisd(0.7, Vec3(3, -1, 2).normalized()).toRotationMatrix(),
+                        after = Eigen::AngleAxisd(1.2, Vec3(1, 2, -1).normalized()).toRotationMatrix();
+  for (const Vec3& stretch : {Vec3(1, 1, 1), Vec3(1.7, 1, 0.8), Vec3(0.4, 2.5, 1.1), Vec3(0.05, 0.9, 3)}) {
+    const Strains s =
+        strains(world, deformed(world, after * Eigen::Matrix3d(stretch.asDiagonal()) * before), 0);
+    ASSERT_EQ(int(s.longest.size()), world.bodies[0].cage.tets.rows());
+    for (std::size_t t = 0; t < s.longest.size(); ++t) {
+      EXPECT_NEAR(s.longest[t], stretch.maxCoeff(), 1e-5);
+      EXPECT_NEAR(s.shortest[t], stretch.minCoeff(), 2e-4 * stretch.maxCoeff());
+    }
+  }
+}
+
+// A bar's ridge, along x, goes d deep into the ridge, along y, of a bar turned by `turn` about y: its deepest
+// point lies on the other ridge's bisector, d / (√2 cos turn) from both faces, and is not the middle of what
+// is inside.
+TEST(Observe, ThePenetrationOfAnEdgeIsThatOfItsDeepestPoint) {
+  const double quarter = 0.25 * 3.14159265358979, d = 0.1;
+  for (const double turn : {0.0, 0.3, -0.5}) {
+    const auto turned = [](TetMesh mesh, double angle, const Vec3& axis, const Vec3& shift) {
+      const Eigen::Matrix3d rotation = Eigen::AngleAxisd(angle, axis).toRotationMatrix();
+      mesh.positions = (mesh.positions * rotation.transpose()).eval();
+      mesh.positions.rowwise() += shift.transpose();
+      return mesh;
+    };
+    WorldSpec spec;
+    spec.bounds_m = {Vec3::Constant(-9), Vec3::Constant(9)};
+    spec.bodies = {
+        {"along x",
+         turned(testing::grid({-4, -1, -1}, {8, 1, 1}, 1, 1, 1), quarter, Vec3::UnitX(), {0, 0, -3}),
+         {},
+         {}},
+        {"along y",
+         turned(testing::grid({0, -4, 0}, {1, 8, 1}, 1, 1, 1), turn - quarter, Vec3::UnitY(), {0, 0, -d}),
+         {},
+         {}}};
+    const World world = build_world(spec);
+    State state = rest_state(world);
+    for (int n = 0; n < world.bodies[0].node_count(); ++n) state.positions[std::size_t(3 * n + 2)] += 3;
+    const double depth = d / (std::sqrt(2.0) * std::cos(turn));
+    EXPECT_NEAR(deepest_penetration(world, state).depth_m, depth, 0.01 * depth) << turn;
+  }
+}
+
 // Two soft cubes, a rigid one and a static block pressed together in a corner of the room, under gravity.
 // A body stretched by 1 + s along an axis has changed by s; mirrored, all its tets are inverted. In the state
 // of another body nothing of that shows.
