@@ -14,6 +14,7 @@
 #include "core/log.h"
 #include "core/progress.h"
 #include "meshing/cage.h"
+#include "meshing/contact_shape.h"
 #include "meshing/import.h"
 #include "scenes/models.h"
 #include "scenes/scene.h"
@@ -60,8 +61,9 @@ constexpr double least_thickness = 0.02;
 // share of all organs' diagonal.
 constexpr double scale_step = 0.05, least_scale = 0.3;
 constexpr double reach = 0.03;
-constexpr double room = 0.005;  // cages are parted by so much larger than they are, and by more in each round
-constexpr int most_rounds = 8;
+constexpr double room = 0.004;  // between two surfaces, as a share of the robot's size: so near they push
+// Good enough to part organs by; a plan takes the usual ones.
+constexpr meshing::ContactShapeSettings rough{.cells = 48, .most_cells = 64, .most_nodes = 300'000};
 constexpr int most_triangles_seen_through = 30'000;
 constexpr int points_looked_at = 150;  // of the robot
 
@@ -72,7 +74,9 @@ struct Organ {
   double volume_m3 = 0, thickness_m = 0;
   bool see_through = false, bone = false;
   int pieces = 1;
-  TetMesh cage;               // of its true size and at its true place; none when seen through
+  // Of its true size and at its true place; none when seen through.
+  TetMesh cage;
+  std::shared_ptr<const ContactShape> shape;
   Vec3 way_m = Vec3::Zero();  // from there
 };
 
@@ -165,6 +169,21 @@ void make_cage(const NewSceneOptions& options, Organ& organ) {
   SurfaceMesh surface = organ.surface;
   to_our_frame(options, surface.positions);
   organ.cage = meshing::build_cage(surface, {}, {.tets = organ.bone ? bone_tets : options.tets}).mesh;
+  ContactShape shape = meshing::make_contact_shape(surface, organ.cage, rough);
+  if (!shape.usable)  // as in a scene: touched at its cage
+    shape = meshing::make_contact_shape({organ.cage.positions, boundary_triangles(organ.cage.tets)},
+                                        organ.cage, rough);
+  organ.shape = std::make_shared<const ContactShape>(std::move(shape));
+}
+
+// About a point.
+std::shared_ptr<const ContactShape> scaled(const ContactShape& shape, const Vec3& center, double scale) {
+  ContactShape copy = shape;
+  copy.field.lower_m = center + scale * (shape.field.lower_m - center);
+  copy.field.cell_m *= scale, copy.field.unit_m *= scale;
+  copy.samples.positions_m =
+      ((copy.samples.positions_m.rowwise() - center.transpose()) * scale).rowwise() + center.transpose();
+  return std::make_shared<const ContactShape>(std::move(copy));
 }
 
 // About its own middle, and moved by its way.
@@ -183,15 +202,21 @@ std::vector<std::size_t> simulated(const std::vector<Organ>& organs) {
   return indices;
 }
 
-bool move_apart(std::vector<Organ>& organs, double scale, double reach_m, int round = 1) {
-  std::vector<LaidCage> cages;
+bool move_apart(std::vector<Organ>& organs, double scale, double room_m, double reach_m) {
+  std::vector<LaidBody> bodies;
   for (const std::size_t i : simulated(organs))
-    cages.push_back({placed(organs[i], scale * (1 + round * room)), organs[i].bone});
-  const auto ways = ways_apart(std::move(cages), reach_m);
+    bodies.push_back({scaled(*organs[i].shape, organs[i].box.center(), scale), organs[i].bone});
+  const auto ways = ways_apart(std::move(bodies), room_m, reach_m);
   if (!ways) return false;
   std::size_t next = 0;
   for (const std::size_t i : simulated(organs)) organs[i].way_m += (*ways)[next++];
   return true;
+}
+
+double longest(const std::vector<Organ>& organs, const std::string& name) {
+  return std::find_if(organs.begin(), organs.end(), [&](const Organ& organ) { return organ.name == name; })
+      ->box.size()
+      .maxCoeff();
 }
 
 // The largest scale at which all come apart.
@@ -207,7 +232,8 @@ double come_apart(const NewSceneOptions& options, std::vector<Organ>& organs) {
                       "--only, or ask for more --tets",
                       options.from.string(), scale + scale_step));
     log::info("parting the organs at {:.2f} of their size", scale);
-    if (move_apart(organs, scale, reach * all.diagonal())) return scale;
+    const double room_m = room * scale * longest(organs, options.robot);
+    if (move_apart(organs, scale, room_m, reach * all.diagonal())) return scale;
   }
 }
 
@@ -361,12 +387,11 @@ std::string scene_text(const std::vector<Organ>& organs, const NewSceneOptions& 
   const std::string description = fmt::format("{} moves to the {} among {} bodies", robot.name, options.goal,
                                               simulated(organs).size() - 1);
   std::string text = fmt::format(
-      "# Made by limber scene new. In a body organs touch, and cages are larger than what they enclose. So "
-      "every "
-      "organ is\n# {}, and some stand off their true places, so that no two\n"
-      "# cages overlap at the start. Materials are usual ones. Edit what is to be otherwise: docs/scene.md "
-      "has all "
-      "keys.\n"
+      "# Made by limber scene new. Every organ is {}.\n"
+      "# In an atlas some are a little in one another: those stand off their true places, so that no two "
+      "touch at "
+      "the\n"
+      "# start. Materials are usual ones. Edit what is to be otherwise: docs/scene.md has all keys.\n"
       "name = \"{}\"\ndescription = \"{}\"\n\n[world]\nbounds_m = [{}, "
       "{}]\ngravity_m_s2 = [0, 0, 0]\n",
       of_true_size, options.out.stem().string(), description, vector_text(bounds.lower),
@@ -402,55 +427,24 @@ std::vector<PreparedBody> bodies_of(const scenes::Scene& scene, const std::vecto
         *std::find_if(organs.begin(), organs.end(), [&](const Organ& o) { return o.name == body.name; });
     SurfaceMesh surface = organ.surface;
     scenes::transform(scenes::world_from_model(body, surface.positions, false), surface.positions);
-    bodies.emplace_back().cage = meshing::build_cage(surface, {}, {.tets = body.cage.tets}).mesh;
+    PreparedBody& prepared = bodies.emplace_back();
+    prepared.cage = meshing::build_cage(surface, {}, {.tets = body.cage.tets}).mesh;
+    prepared.contact = meshing::make_contact_shape(surface, prepared.cage, rough);
+    prepared.surface = std::move(surface);
   }
   return bodies;
 }
 
-bool overlap(const scenes::Scene& scene, const std::vector<PreparedBody>& bodies) {
-  for (std::size_t a = 0; a < bodies.size(); ++a)
-    for (std::size_t b = a + 1; b < bodies.size(); ++b) {
-      const bool static_ones =
-          scene.bodies[a].kind == scenes::Kind::rigid && scene.bodies[b].kind == scenes::Kind::rigid;
-      if (!static_ones && fem::cage_overlap(bodies[a].cage, bodies[b].cage).depth_m > 0) return true;
-    }
-  return false;
-}
-
-double longest(const std::vector<Organ>& organs, const std::string& name) {
-  return std::find_if(organs.begin(), organs.end(), [&](const Organ& organ) { return organ.name == name; })
-      ->box.size()
-      .maxCoeff();
-}
-
-// The scene, its organs parted. The cages that limber plan makes of organs of that size, at that place,
-// differ a little from those that were parted: where they overlap, they are parted once more.
-scenes::Scene laid_out(const NewSceneOptions& options, std::vector<Organ>& organs, double scale) {
-  for (int round = 0;; ++round) {
-    scenes::Scene scene;
-    std::vector<PreparedBody> bodies;
-    try {
-      scene = scenes::read_scene(scene_text(organs, options, scale), options.out.string());
-      bodies = bodies_of(scene, organs);
-      if (round == most_rounds || !overlap(scene, bodies)) {
-        build_world(scene, bodies);  // says what limber plan would say
-        return scene;
-      }
-    } catch (const InputError& error) {
-      throw InputError(
-          fmt::format("no scene is made of these ({} is {:.3g} m long with --scale {:g}; is that right?): {}",
-                      options.robot, longest(organs, options.robot), options.scale, error.what()));
-    }
-    for (std::size_t b = 0; b < bodies.size(); ++b) {
-      Organ& organ = *std::find_if(organs.begin(), organs.end(),
-                                   [&](const Organ& o) { return o.name == scene.bodies[b].name; });
-      const Vec3 center = organ.box.center();
-      organ.cage = bodies[b].cage;
-      organ.cage.positions =
-          ((organ.cage.positions.rowwise() - (center + organ.way_m).transpose()) / scale).rowwise() +
-          center.transpose();
-    }
-    move_apart(organs, scale, std::numeric_limits<double>::infinity(), round + 2);
+// The scene, after a look at what limber plan would say to it.
+scenes::Scene laid_out(const NewSceneOptions& options, const std::vector<Organ>& organs, double scale) {
+  try {
+    scenes::Scene scene = scenes::read_scene(scene_text(organs, options, scale), options.out.string());
+    build_world(scene, bodies_of(scene, organs));
+    return scene;
+  } catch (const InputError& error) {
+    throw InputError(
+        fmt::format("no scene is made of these ({} is {:.3g} m long with --scale {:g}; is that right?): {}",
+                    options.robot, longest(organs, options.robot), options.scale, error.what()));
   }
 }
 

@@ -12,8 +12,8 @@ double time_s(const World&, const State&);
 double volume_m3(const World&, const State&, int body);  // sum of signed tet volumes
 // Largest |V − V0|/V0 of all moving bodies.
 double largest_volume_change(const World&, const State&);
-// Radius of the largest ball round the centre of mass that the rest shape holds: the fine surface where that is
-// given and the centre is in it, else the cage.
+// Radius of the largest ball round the centre of mass that the rest shape holds: the fine surface where that
+// is given and the centre is in it, else the cage.
 double inner_radius_m(const World&, int body);
 Vec3 center_of_mass_m(const World&, const State&, int body);
 Vec3 center_velocity_m_s(const World&, const State&, int body);  // of the centre of mass

@@ -243,8 +243,8 @@ ContactShape make_contact_shape(const SurfaceMesh& surface, const TetMesh& cage,
                                 const ContactShapeSettings& settings, ContactShapeReport* report) {
   LIMBER_CHECK(settings.cells >= 8 && settings.cells <= settings.most_cells && settings.most_cells <= 1000,
                settings.cells, settings.most_cells);
-  LIMBER_CHECK(settings.most_nodes >= 1000 && settings.most_samples > 0, settings.most_nodes,
-               settings.most_samples);
+  LIMBER_CHECK(settings.most_nodes >= 1000 && settings.most_samples >= settings.fewest_most_samples,
+               settings.most_nodes, settings.most_samples);
   ContactShapeReport unread;
   ContactShapeReport& r = report ? *report : unread;
   r = {};
@@ -280,13 +280,16 @@ ContactShape make_contact_shape(const SurfaceMesh& surface, const TetMesh& cage,
     if (samples.empty()) {
       r.characteristic_m = std::min(size, 3 * thickness);
       if (!(volume > 0)) return give_up(no_inside);
+      const double squares = seen.area_m2 / (r.characteristic_m * r.characteristic_m);
+      const int most = int(std::clamp(settings.samples_a_square * squares,
+                                      double(settings.fewest_most_samples), double(settings.most_samples)));
       samples = detail::sample_surface(surface, seen, winding,
                                        {.missed_m = settings.missed_depth * r.characteristic_m,
                                         .least_m = settings.least_spacing * size,
                                         .most_m = settings.most_spacing * size,
                                         .most_flat_m = settings.most_flat_spacing * size,
                                         .offset_m = offset},
-                                       settings.most_samples);
+                                       most);
       if (samples.empty()) return give_up(no_inside);
     }
     std::tie(r.error_p99_m, r.error_max_m) = errors(shape.field, samples);

@@ -18,10 +18,13 @@ struct ContactShapeSettings {
   std::int64_t most_nodes = 3'000'000;  // of the field; 1,000 or more
   double field_error = 0.0025;          // distance that the field may have on 99 % of the surface
   double missed_depth = 0.005;          // of a flat body, between samples of a face that bends
-  double least_spacing = 0.008;         // of samples, over size
+  double least_spacing = 0.012;         // of samples, over size
   double most_spacing = 0.06;           // where the surface bends
-  double most_flat_spacing = 0.10;      // in flat faces
-  int most_samples = 4000;
+  double most_flat_spacing = 0.08;      // in flat faces
+  // Samples at most: so many for each square of the characteristic size that the surface has, within these
+  // ends.
+  double samples_a_square = 100;
+  int fewest_most_samples = 1000, most_samples = 5000;
 };
 
 struct ContactShapeReport {

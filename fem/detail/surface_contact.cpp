@@ -13,7 +13,7 @@ namespace {
 // And what is farther than this share of the reach is apart, however it is computed.
 constexpr float kept = 0.9f, rounding = 0.02f, certain = 0.004f;
 // Candidates that a list holds without costing much, and how far lists reach, in skins.
-constexpr std::size_t few_candidates = 600, many_candidates = 1800;
+constexpr std::size_t few_candidates = 1000, many_candidates = 3000;
 constexpr float nearest_reach = 0.5f, farthest_reach = 6;
 // A column that holds no sample: in no box.
 constexpr float nowhere = 1e30f;

@@ -166,19 +166,21 @@ TEST(ContactShape, TheSurfaceIsCoveredBySamplesThatKeepApart) {
     const SurfaceMesh& surface = made.surface;
     const double size = size_of(surface);
     const Points& samples = made.shape.samples.positions_m;
-    EXPECT_GT(samples.rows(), 500);
-    EXPECT_LE(samples.rows(), 4000);
+    EXPECT_GT(samples.rows(), 300);
+    EXPECT_LE(samples.rows(), ContactShapeSettings().most_samples);
     EXPECT_GT(made.shape.samples.area_m2.minCoeff(), 0);
     // No two closer than the least spacing, but for those on the two sides of an edge or a wall.
     int close = 0;
     for (Eigen::Index a = 0; a < samples.rows(); ++a)
-      for (Eigen::Index b = 0; b < a; ++b) close += (samples.row(a) - samples.row(b)).norm() < 0.008 * size;
+      for (Eigen::Index b = 0; b < a; ++b)
+        close += (samples.row(a) - samples.row(b)).norm() < ContactShapeSettings().least_spacing * size;
     EXPECT_LT(close, 0.02 * double(samples.rows()));
     Rng rng(4, 0);
     for (int i = 0; i < 3000; ++i) {
       const Vec3 p = surface_point(surface, rng);
       if (made.shape.field.at(p) < -0.01 * size) continue;  // an inner wall
-      EXPECT_LT((samples.rowwise() - p.transpose()).rowwise().norm().minCoeff(), 0.053 * size)
+      EXPECT_LT((samples.rowwise() - p.transpose()).rowwise().norm().minCoeff(),
+                1.06 * ContactShapeSettings().most_flat_spacing * size)
           << p.transpose();
     }
   }
@@ -201,8 +203,8 @@ TEST(ContactShape, WhatSticksOutIsSampled) {
   }
 }
 
-// A small ball pressed against a face, an edge or a rim finds a sample there, too: it is as if the body were
-// bent the other way, so twice as much is missed.
+// A small ball of radius R pressed against a face, an edge or a rim finds a sample within the spacing s of
+// it, and so goes s²/2R deeper at most.
 TEST(ContactShape, ABallThatIsPressedInMeetsASample) {
   for (const auto& [name, made] : solids()) {
     SCOPED_TRACE(name);
@@ -217,7 +219,8 @@ TEST(ContactShape, ABallThatIsPressedInMeetsASample) {
       const auto nearest = [&](const Points& p) {
         return (p.rowwise() - center.transpose()).rowwise().norm().minCoeff();
       };
-      EXPECT_LT(nearest(made.shape.samples.positions_m) - nearest(surface.positions), 0.005 * size);
+      EXPECT_LT(nearest(made.shape.samples.positions_m) - nearest(surface.positions),
+                std::pow(1.06 * ContactShapeSettings().most_flat_spacing * size, 2) / (2 * radius));
     }
   }
 }

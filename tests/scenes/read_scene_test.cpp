@@ -514,6 +514,7 @@ TEST(Keys, EveryKeyChangesTheScene) {
     if (key.path == "bodies[].cage.tets" || key.path == "bodies[].cage.mode" ||
         key.path == "bodies[].cage.shells")
       sets = {tets_robot};
+    if (key.path == "bodies[].contact") sets = {"planner.preset=fast"};
     if (key.path == "planner.guidance") sets = {"planner.lag=3"};
     if (key.path == "planner.stop_in_goal" || key.path == "planner.end_hopeless")
       sets = {"planner.look_s=0.2"};
@@ -620,11 +621,12 @@ std::string all_of(const Scene& s) {
   for (const BodySpec& body : s.bodies) {
     const MaterialSpec& m = body.material;
     t += fmt::format("{} {} {} {} {} | {} {} {} {} {} | {} {} {} {} {} {} {} | {} {} {} {} | {}", body.name,
-                     int(body.role), int(body.kind), 4 * int(body.contact) + int(body.self_contact.value_or(2)), all_of(body.model), body.cage.tets,
-                     v(body.cage.cells), body.cage.cell_m, body.cage.mode, body.cage.shells, m.model,
-                     m.youngs_modulus_pa, m.poisson_ratio, m.density_kg_m3, m.damping_ratio, m.friction,
-                     m.mesh_independent, v(body.pose.position_m), v(body.pose.axis), body.pose.angle_deg,
-                     body.pose.anchor, v(body.color_srgb));
+                     int(body.role), int(body.kind),
+                     4 * int(body.contact) + (body.self_contact ? int(*body.self_contact) : 2),
+                     all_of(body.model), body.cage.tets, v(body.cage.cells), body.cage.cell_m, body.cage.mode,
+                     body.cage.shells, m.model, m.youngs_modulus_pa, m.poisson_ratio, m.density_kg_m3,
+                     m.damping_ratio, m.friction, m.mesh_independent, v(body.pose.position_m),
+                     v(body.pose.axis), body.pose.angle_deg, body.pose.anchor, v(body.color_srgb));
     t += fmt::format(" {} {} {} {}", body.opacity, body.roughness, body.metallic, body.max_volume_change);
     t += fmt::format(" {}", int(body.deformation));
     t += fmt::format(" {}", body.fixed.walls);
