@@ -28,7 +28,7 @@ std::uint64_t hash_of(const fem::World& world) {
         .value(int(body.kind))
         .value(int(body.self_contact));
     for (const double v : {m.youngs_modulus_pa, m.poisson_ratio, m.density_kg_m3, m.damping_ratio, m.friction,
-                           body.stiffness_share, body.max_volume_change})
+                           body.stiffness_share, body.max_volume_change, body.max_stretch})
       hasher.value(v);
     for (const auto* of_tets : {&body.youngs_modulus_from_tet_pa, &body.density_from_tet_kg_m3})
       for (const double v : *of_tets) hasher.value(v);

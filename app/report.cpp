@@ -219,7 +219,7 @@ void plots(const Findings& f, Page& page) {
     gap.x.push_back(frame.time_s), gap.y.push_back(percent * least);
     at_contact.x.push_back(frame.time_s), at_contact.y.push_back(percent * pressed);
   }
-  const SeenLimits& limits = seen_limits;
+  const SeenLimits limits;
   plot("Overlap that is seen", "% of the robot's size", {two, own}, {100 * limits.overlap});
   plot("Gap between bodies that press", "% of the robot's size", {gap, at_contact}, {100 * limits.worst_gap});
   plot("Stretch of a tet, largest", "singular value",

@@ -179,6 +179,23 @@ int inverted_tets(const World& world, const State& state) {
   return count;
 }
 
+namespace {
+
+// Whether all singular values of F lie within 1/s and s, which is clear where their squares, or those of the
+// inverse, sum to no more than s².
+bool stretched_within(const Eigen::Matrix3d& f, double s) {
+  const double square = s * s;
+  const Eigen::Matrix3d c = f.transpose() * f;
+  const double determinant = f.determinant();
+  const double cofactors = 0.5 * (c.trace() * c.trace() - (c * c).trace());  // Σ of products of two squares
+  if (c.trace() <= square && cofactors <= square * determinant * determinant) return true;
+  const Vec3 squares =
+      Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(c, Eigen::EigenvaluesOnly).eigenvalues();
+  return squares[2] <= square && squares[0] * square >= 1;
+}
+
+}  // namespace
+
 bool is_sound(const World& world, const State& state) {
   for (int b = 0; b < int(world.bodies.size()); ++b) {
     const Body& body = world.bodies[b];
@@ -187,10 +204,17 @@ bool is_sound(const World& world, const State& state) {
       return Eigen::Map<const Vec3f>(at + 3 * node).cast<double>();
     };
     double volume = 0;
-    for (const auto& t : body.cage.tets.rowwise()) {
-      const double of_tet = signed_volume(corner(t[0]), corner(t[1]), corner(t[2]), corner(t[3]));
+    for (Eigen::Index k = 0; k < body.cage.tets.rows(); ++k) {
+      const auto t = body.cage.tets.row(k);
+      const Vec3 a = corner(t[0]);
+      Eigen::Matrix3d edges;
+      for (int i = 0; i < 3; ++i) edges.col(i) = corner(t[i + 1]) - a;
+      const double of_tet = edges.determinant() / 6;
       if (!(of_tet > 0)) return false;
       volume += of_tet;
+      if (std::isfinite(body.max_stretch) &&
+          !stretched_within(edges * body.inverse_rest_edges[std::size_t(k)], body.max_stretch))
+        return false;
     }
     if (!(std::abs(volume / body.rest_volume_m3 - 1) <= body.max_volume_change)) return false;
   }

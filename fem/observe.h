@@ -42,7 +42,8 @@ double turn_from_goal_shape_deg(const World&, const State&);
 double distance_from_goal_shape_m(const World&, const State&);
 
 int inverted_tets(const World&, const State&);  // of all moving bodies: volume ≤ 0
-// No tet is inverted, and no body's volume has changed by more than its max_volume_change.
+// No tet is inverted, or stretched by more than its body's max_stretch, and no body's volume has changed by
+// more than its max_volume_change.
 bool is_sound(const World&, const State&);
 
 // The deepest point of one body in another, or beyond a wall of the bounds: distance to the nearest surface,

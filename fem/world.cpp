@@ -8,6 +8,8 @@
 #include <numbers>
 #include <set>
 
+#include <Eigen/LU>
+
 #include "core/error.h"
 #include "core/threads.h"
 #include "fem/detail/locking.h"
@@ -110,6 +112,7 @@ Body make_body(const BodySpec& spec) {
   body.kind = spec.kind;
   body.max_volume_change = spec.max_volume_change;
   body.shape = spec.shape;
+  body.max_stretch = spec.max_stretch;
   body.self_contact = spec.self_contact && spec.kind == BodyKind::deformable;
   for (int n : spec.fixed_nodes) body.fixed[n] = true;
   body.moving = std::find(body.fixed.begin(), body.fixed.end(), false) != body.fixed.end();
@@ -130,6 +133,9 @@ Body make_body(const BodySpec& spec) {
     const double density = body.density_from_tet_kg_m3[t];
     body.mass_kg += (density - body.material.density_kg_m3) * v;
     for (int i = 0; i < 4; ++i) body.node_mass_kg[q[i]] += density * v / 4;
+    Eigen::Matrix3d edges;
+    for (int i = 0; i < 3; ++i) edges.col(i) = x.row(q[i + 1]) - x.row(q[0]);
+    body.inverse_rest_edges.push_back(edges.inverse());
   }
   return body;
 }

@@ -48,6 +48,8 @@ struct BodySpec {
   std::vector<double> youngs_modulus_from_tet_pa = {}, density_from_tet_kg_m3 = {};
   bool self_contact = false;  // parts of the body that are not neighbours push one another apart
   double max_volume_change = std::numeric_limits<double>::infinity();  // |V − V0|/V0 of a sound state, > 0
+  // s > 1: in a sound state the singular values of all tets' deformation gradients lie within 1/s and s.
+  double max_stretch = std::numeric_limits<double>::infinity();
   // Of the fine surface that the cage moves: contact is where that is. All bodies of a world have one, or
   // none has: then contact is between the cages. Shared, for it is large and never changes.
   std::shared_ptr<const ContactShape> shape = nullptr;
@@ -85,8 +87,9 @@ struct Body {
   std::vector<double> youngs_modulus_from_tet_pa,
       density_from_tet_kg_m3;  // (T) the material's, or a part's own
   double mass_kg, rest_volume_m3;
-  std::shared_ptr<const ContactShape> shape;  // as given
-  double max_volume_change;                   // as asked for
+  std::shared_ptr<const ContactShape> shape;        // as given
+  double max_volume_change, max_stretch;            // as asked for
+  std::vector<Eigen::Matrix3d> inverse_rest_edges;  // (T) of the edges from a tet's node 0, as columns
   double stiffness_share;     // by which the elements' stiffness is multiplied; 1 unless mesh_independent
   double elastic_dt_limit_s;  // largest stable step of the damped elastic body; infinite unless deformable
   int node_count() const { return int(cage.positions.rows()); }

@@ -407,6 +407,7 @@ BodySpec read_body(const Node& table, const Box& bounds) {
   if (table.find("self_contact")) body.self_contact = flag(table, "self_contact");
   body.deformation = text(table, "deformation") == "phong" ? Deformation::phong : Deformation::linear;
   body.max_volume_change = number(table, "max_volume_change");
+  body.max_stretch = maybe_number(table, "max_stretch");
   body.model = read_model(child(table, "model"), what);
   body.color_srgb = read_body_color(table, body.role);
   body.opacity = number(table, "opacity");

@@ -109,6 +109,8 @@ struct BodySpec {
       self_contact;  // parts of it push one another apart; nothing: wherever it can reach itself
   Deformation deformation = usual_deformation;
   double max_volume_change = 0.1;  // |V − V0|/V0 in all states of a plan, in (0, 1]
+  std::optional<double>
+      max_stretch;  // > 1: all tets' singular values in all states of a plan are within 1/s and s
   Model model;
   CageSpec cage;
   MaterialSpec

@@ -124,6 +124,16 @@ constexpr Key all_keys[] = {
      "\\|V − V₀\\|/V₀: no plan passes through a state in which a body that moves has changed more",
      "",
      ""},
+    {"bodies[].max_stretch",
+     Type::number,
+     {1, 1000, true, false},
+     0,
+     may_lack,
+     "s: no plan passes through a state in which a tet of the body is stretched to more than s times its "
+     "length, or pressed "
+     "to less than 1/s of it, in any direction; else any stretch will do",
+     "",
+     ""},
     {"bodies[].color",
      Type::color,
      {},

@@ -629,7 +629,7 @@ std::string all_of(const Scene& s) {
                      v(body.pose.axis), body.pose.angle_deg, body.pose.anchor, v(body.color_srgb));
     t += fmt::format(" {} {} {} {}", body.opacity, body.roughness, body.metallic, body.max_volume_change);
     t += fmt::format(" {}", int(body.deformation));
-    t += fmt::format(" {}", body.fixed.walls);
+    t += fmt::format(" {} {}", body.fixed.walls, body.max_stretch.value_or(-1));
     for (const Box& box : body.fixed.boxes_m) t += b(box);
     for (const PartSpec& part : body.parts)
       t += fmt::format(" {} {} {} {}", part.shell.value_or(-1), b(part.box_m),
