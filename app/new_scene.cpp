@@ -61,7 +61,7 @@ constexpr double least_thickness = 0.02;
 // share of all organs' diagonal.
 constexpr double scale_step = 0.05, least_scale = 0.3;
 constexpr double reach = 0.03;
-constexpr double room = 0.004;  // between two surfaces, as a share of the robot's size: so near they push
+constexpr double room = 0.005;  // between two surfaces, as a share of the robot's size: so near they push
 // Good enough to part organs by; a plan takes the usual ones.
 constexpr meshing::ContactShapeSettings rough{.cells = 48, .most_cells = 64, .most_nodes = 300'000};
 constexpr int most_triangles_seen_through = 30'000;

@@ -20,7 +20,7 @@ namespace {
 
 // Surfaces that near push each other, as a share of the robot's size; a field is off by less than that nearly
 // everywhere.
-constexpr double usual_contact_offset = 0.004;
+constexpr double usual_contact_offset = 0.005;
 
 // The lines of the scene that shape a body's meshes, as the user's text has them once more: a change of any
 // makes them anew.

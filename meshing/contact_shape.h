@@ -19,12 +19,12 @@ struct ContactShapeSettings {
   double field_error = 0.0025;          // distance that the field may have on 99 % of the surface
   double missed_depth = 0.005;          // of a flat body, between samples of a face that bends
   double least_spacing = 0.012;         // of samples, over size
-  double most_spacing = 0.06;           // where the surface bends
+  double most_spacing = 0.04;           // where the surface bends
   double most_flat_spacing = 0.08;      // in flat faces
   // Samples at most: so many for each square of the characteristic size that the surface has, within these
   // ends.
-  double samples_a_square = 100;
-  int fewest_most_samples = 1000, most_samples = 5000;
+  double samples_a_square = 200;
+  int fewest_most_samples = 1500, most_samples = 6000;
 };
 
 struct ContactShapeReport {

@@ -7,8 +7,9 @@ namespace limber::fem::detail {
 
 // Penalty stiffness β m_eff/h², damping 2 ζ √(k m_eff), and the share of a slip that friction may stop in one
 // step.
-inline constexpr double contact_beta = 0.4;       // vertices, samples
+inline constexpr double contact_beta = 0.4;       // vertices
 inline constexpr double contact_edge_beta = 0.2;  // points of edges: a vertex has six of them
+inline constexpr double surface_beta = 0.8;       // samples of surfaces, which share what a node can bear
 inline constexpr double contact_damping_ratio = 0.3;
 inline constexpr double contact_slip_stop = 0.5;
 

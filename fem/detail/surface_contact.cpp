@@ -590,7 +590,7 @@ void SurfaceContacts<Real>::respond(const LaneView<Real>& view, const SurfaceTou
   };
   Real force[3];
   const int other = touch.against < 0 ? touch.body : touch.against;
-  if (!penalty_force(Real(contact_beta), touch.depth, touch.normal, relative, mass_along, step_,
+  if (!penalty_force(Real(surface_beta), touch.depth, touch.normal, relative, mass_along, step_,
                      tables_.pair_friction[touch.body * bodies_ + other], force))
     return;
   for (int i = 0; i < touch.nodes; ++i)

@@ -39,7 +39,7 @@ constexpr Key all_keys[] = {
      {0, 1},
      0,
      may_lack,
-     "m; fine surfaces that near push each other; else 0.4 % of the longest edge of the robot's box, or the "
+     "m; fine surfaces that near push each other; else 0.5 % of the longest edge of the robot's box, or the "
      "gap of two "
      "bodies at the start where that is less",
      "",

@@ -126,7 +126,7 @@ TEST(SurfaceContact, TheNumberOfSamplesDoesNotChangeTheStiffness) {
     EXPECT_LT(mean_speed_m_s(world, end, 0), 1e-3);
     // The nodes below bear all of the mass.
     const double expected =
-        10 * world.contact_dt_s * world.contact_dt_s / detail::contact_beta * world.bodies[0].mass_kg / mass;
+        10 * world.contact_dt_s * world.contact_dt_s / detail::surface_beta * world.bodies[0].mass_kg / mass;
     EXPECT_GT(sunk[spacing], 0.3 * expected);
     EXPECT_LT(sunk[spacing], 3 * expected);
   }

@@ -514,6 +514,7 @@ TEST(Keys, EveryKeyChangesTheScene) {
     if (key.path == "bodies[].cage.tets" || key.path == "bodies[].cage.mode" ||
         key.path == "bodies[].cage.shells")
       sets = {tets_robot};
+    if (key.path == "bodies[].max_stretch") sets = {"bodies.robot.max_stretch=3"};
     if (key.path == "bodies[].contact") sets = {"planner.preset=fast"};
     if (key.path == "planner.guidance") sets = {"planner.lag=3"};
     if (key.path == "planner.stop_in_goal" || key.path == "planner.end_hopeless")
