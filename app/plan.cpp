@@ -225,6 +225,7 @@ Outcome plan(const PlanOptions& options, const scenes::Scene& scene) {
   Json earlier_summary;
   if (options.resume) {
     PlanFolder folder = read_plan_folder(options.out);
+    if (folder.plan.system_hash == system.hash()) require_of_world(folder.plan, world, options.out);
     earlier = std::move(folder.plan);
     earlier_summary = std::move(folder.summary);
     if (earlier->system_hash != system.hash())

@@ -42,6 +42,23 @@ PlanFolder read_plan_folder(const fs::path& folder) {
   return result;
 }
 
+void require_of_world(const plan::Plan& plan, const fem::World& world, const fs::path& folder) {
+  const std::string file = (folder / "plan.npz").string();
+  const std::size_t numbers = fem::rest_state(world).positions.size();
+  if (plan.tree.states.numbers() != numbers)
+    throw InputError(
+        fmt::format("{}: its states hold {} numbers, and the bodies of its scene have {}; plan anew with limber plan",
+                    file, plan.tree.states.numbers(), numbers));
+  const int nodes = world.bodies[std::size_t(world.robot)].node_count();
+  for (const auto& [name, controls] : {std::pair("path", &plan.trajectory.controls), {"tree", &plan.tree.controls}})
+    for (std::size_t i = 0; i < controls->size(); ++i)
+      if (const int node = (*controls)[i].node; node >= nodes)
+        throw InputError(fmt::format(
+            "{}: {}_node[{}] is {}, and the robot has the nodes 0 … {}; plan anew with limber plan", file, name, i,
+            node, nodes - 1));
+  plan::require_frame_times(plan.trajectory, world.dt_s, file);
+}
+
 std::vector<PreparedBody> read_bodies_of(const PlanFolder& planned, const fs::path& folder) {
   std::vector<PreparedBody> bodies = read_bodies(planned.scene, folder);
   for (std::size_t b = 0; b < bodies.size(); ++b) {
@@ -51,6 +68,7 @@ std::vector<PreparedBody> read_bodies_of(const PlanFolder& planned, const fs::pa
           fmt::format("{}: the cage has changed since the plan was made; plan anew with limber plan",
                       body_folder(folder, planned.scene.bodies[b]).string()));
   }
+  require_of_world(planned.plan, build_world(planned.scene, bodies), folder);
   return bodies;
 }
 

@@ -119,6 +119,9 @@ void edit(Node& root, const std::string& set) {
     throw InputError(
         fmt::format("{}: there is no key=value; write for example --set planner.seed=7", source));
   std::vector<std::string> parts = split_path(std::string_view(set).substr(0, equals));
+  if (constexpr std::size_t most_parts = 16; parts.size() > most_parts)
+    throw InputError(fmt::format(
+        "{}: its key has {} parts, and none of a scene has more than five; see docs/scene.md", source, parts.size()));
   Node* node = &root;
   std::string path;  // of the schema
   for (std::size_t i = 0; i < parts.size(); ++i) {
@@ -731,7 +734,7 @@ Scene read_scene(const std::string& toml, const std::string& name_for_messages,
 }
 
 Scene read_scene_file(const fs::path& file, const std::vector<std::string>& sets) {
-  Scene scene = read_scene(read_file(file), file.string(), sets);
+  Scene scene = read_scene(read_file(file, most_scene_bytes), file.string(), sets);
   scene.folder = fs::absolute(file).parent_path();
   return scene;
 }
