@@ -54,8 +54,9 @@ fs::path destination(const fs::path& path) {
 
 std::string read_file(const fs::path& path, std::uintmax_t most_bytes) {
   const auto refuse_size = [&](const std::string& size) {
-    throw InputError(fmt::format("{}: holds {} bytes, and at most {} are read of such a file; is it the right one?",
-                                 path.string(), size, most_bytes));
+    throw InputError(
+        fmt::format("{}: holds {} bytes, and at most {} are read of such a file; is it the right one?",
+                    path.string(), size, most_bytes));
   };
   // Opening a pipe without O_NONBLOCK would wait for somebody to write to it.
   const Descriptor fd(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY));
@@ -63,11 +64,10 @@ std::string read_file(const fs::path& path, std::uintmax_t most_bytes) {
   struct stat status;
   if (::fstat(fd, &status) != 0)
     throw InputError(fmt::format("{}: cannot be read: {}", path.string(), std::strerror(errno)));
-  if (S_ISDIR(status.st_mode))
-    throw InputError(fmt::format("{}: is a folder, not a file", path.string()));
+  if (S_ISDIR(status.st_mode)) throw InputError(fmt::format("{}: is a folder, not a file", path.string()));
   if (!S_ISREG(status.st_mode))
-    throw InputError(fmt::format("{}: is a pipe or a device, not a file; save what it gives to a file and name that",
-                                 path.string()));
+    throw InputError(fmt::format(
+        "{}: is a pipe or a device, not a file; save what it gives to a file and name that", path.string()));
   if (std::uintmax_t(status.st_size) > most_bytes) refuse_size(std::to_string(status.st_size));
   std::string content;
   content.reserve(std::size_t(status.st_size) + 1);

@@ -19,9 +19,10 @@ void require_shallow(const std::string& text, const std::string& what) {
       in_string = !in_string;
     } else if (!in_string && (c == '[' || c == '{')) {
       if (++depth > most_json_depth)
-        throw InputError(fmt::format(
-            "{}:{}: has lists within lists more than {} deep, which nothing of limber's has; is it the right file?",
-            what, line, most_json_depth));
+        throw InputError(
+            fmt::format("{}:{}: has lists within lists more than {} deep, which nothing of limber's has; is "
+                        "it the right file?",
+                        what, line, most_json_depth));
     } else if (!in_string && (c == ']' || c == '}')) {
       --depth;
     }

@@ -60,7 +60,8 @@ class Words {
   // afar) is not to learn what it holds.
   void expect_start(std::string_view wanted, const char* kind) const {
     if (!text_.starts_with(wanted))
-      throw InputError(fmt::format("{}: is not {}, which begins with \"{}\"; name another file", file_, kind, wanted));
+      throw InputError(
+          fmt::format("{}: is not {}, which begins with \"{}\"; name another file", file_, kind, wanted));
   }
 
   [[noreturn]] void fail(std::string_view why) const {
@@ -132,9 +133,9 @@ SurfaceMesh read_ply(const fs::path& path) {
     std::int64_t n = -1;
     if (line.starts_with(prefix)) std::from_chars(line.data() + prefix.size(), line.data() + line.size(), n);
     if (n < 0 || std::uint64_t(n) > text.size() / bytes_each)
-      words.fail(fmt::format(
-          "\"{}\" where \"{}N\" belongs, N being what the file can hold; it may be cut short",
-          shortened(line), prefix));
+      words.fail(
+          fmt::format("\"{}\" where \"{}N\" belongs, N being what the file can hold; it may be cut short",
+                      shortened(line), prefix));
     return Eigen::Index(n);
   };
   words.expect_start("ply\n", "a PLY file of limber's");
@@ -219,7 +220,8 @@ std::vector<ConvexShell> read_obj_shells(const fs::path& path) {
       continue;
     }
     if (groups.empty() || parts.size() != 4 || (parts[0] != "v" && parts[0] != "f"))
-      words.fail(fmt::format("\"{}\" is not a group, a vertex or a triangle of limber's shells", shortened(line)));
+      words.fail(
+          fmt::format("\"{}\" is not a group, a vertex or a triangle of limber's shells", shortened(line)));
     const auto number = [&]<class T>(std::string_view part, T value) {
       const auto [end, error] = std::from_chars(part.data(), part.data() + part.size(), value);
       if (error != std::errc() || end != part.data() + part.size())

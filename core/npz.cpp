@@ -28,7 +28,7 @@ std::size_t item_size(std::string_view dtype) {
 }
 
 struct NpyHeader {
-  NpyArray array;              // without its elements
+  NpyArray array;               // without its elements
   std::uint64_t element_bytes;  // so many
 };
 
@@ -37,7 +37,8 @@ NpyHeader npy_header(std::string_view start, std::uint64_t entry_size, const std
   const auto refuse = [&](std::string_view why) -> void {
     throw InputError(fmt::format("{}: {}", what, why));
   };
-  if (start.size() < npy_preamble || start.substr(0, 8) != npy_magic) refuse("is not a version 1.0 .npy array");
+  if (start.size() < npy_preamble || start.substr(0, 8) != npy_magic)
+    refuse("is not a version 1.0 .npy array");
   const std::size_t header_size = npy_header_size(start);
   if (start.size() < npy_preamble + header_size) refuse("ends inside its header");
   const std::string_view header = start.substr(npy_preamble, header_size);
@@ -273,8 +274,7 @@ class Archive {
   void fill(zip_file_t* file, const Entry& entry, void* to, std::size_t size) const {
     for (auto* at = static_cast<char*>(to); size > 0;) {
       const zip_int64_t n = zip_fread(file, at, size);
-      if (n <= 0)
-        throw InputError(fmt::format("{}: is damaged ({})", what(entry), zip_file_strerror(file)));
+      if (n <= 0) throw InputError(fmt::format("{}: is damaged ({})", what(entry), zip_file_strerror(file)));
       at += n, size -= std::size_t(n);
     }
   }

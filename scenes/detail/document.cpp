@@ -54,14 +54,15 @@ void require_short_keys(std::string_view text, const std::string& source) {
 Node converted(const toml::node& node, const std::string& source, int depth = 0) {
   Node made{where_of(node.source().begin, source), {}};
   if (depth > most_depth)
-    throw InputError(fmt::format("{}: tables and lists are more than {} deep here, and none of a scene is; see "
-                                 "docs/scene.md",
-                                 made.where.text(), most_depth));
+    throw InputError(
+        fmt::format("{}: tables and lists are more than {} deep here, and none of a scene is; see "
+                    "docs/scene.md",
+                    made.where.text(), most_depth));
   if (const auto* table = node.as_table()) {
     Table entries;
     for (const auto& [key, value] : *table)
-      entries.push_back(
-          {std::string(key.str()), where_of(key.source().begin, source), converted(value, source, depth + 1)});
+      entries.push_back({std::string(key.str()), where_of(key.source().begin, source),
+                         converted(value, source, depth + 1)});
     std::stable_sort(entries.begin(), entries.end(),
                      [](const Entry& a, const Entry& b) { return stands_before(a.where, b.where); });
     made.value = std::move(entries);

@@ -1,7 +1,6 @@
 // Files from strangers: no reader waits for ever, eats the memory or falls over, and each says what is wrong.
 #include <gtest/gtest.h>
 #include <sys/stat.h>
-#include <zlib.h>
 
 #include <fstream>
 
@@ -9,6 +8,7 @@
 #include "core/json.h"
 #include "core/mesh_files.h"
 #include "core/npz.h"
+#include "tests/core/deflated_zip.h"
 #include "tests/core/temporary_folder.h"
 
 namespace limber {
@@ -23,32 +23,6 @@ std::string complaint(const std::function<void()>& read) {
   return "";
 }
 
-void append(std::string& bytes, std::uint32_t value, int size) {
-  for (int i = 0; i < size; ++i) bytes += char(value >> 8 * i & 255);
-}
-
-// A .zip with one deflated entry (APPNOTE 6.3, sections 4.3.7, 4.3.12 and 4.3.16).
-std::string zip_of(const std::string& name, const std::string& content) {
-  uLongf size = compressBound(uLong(content.size()));
-  std::string packed(size, '\0');
-  compress2(reinterpret_cast<Bytef*>(packed.data()), &size, reinterpret_cast<const Bytef*>(content.data()),
-            uLong(content.size()), 9);
-  packed = packed.substr(2, size - 6);  // without zlib's own head and tail
-  const auto crc = std::uint32_t(crc32(0, reinterpret_cast<const Bytef*>(content.data()), uInt(content.size())));
-  std::string common;  // version, flags, method, time, date, crc, sizes, lengths of name and extra field
-  for (const auto& [value, bytes] :
-       {std::pair(20u, 2), {0u, 2}, {8u, 2}, {0u, 2}, {0x21u, 2}, {crc, 4}, {std::uint32_t(packed.size()), 4},
-        {std::uint32_t(content.size()), 4}, {std::uint32_t(name.size()), 2}, {0u, 2}})
-    append(common, value, bytes);
-  std::string local = "PK\3\4", central("PK\1\2\24\0", 6);
-  local += common + name + packed;
-  central += common;
-  central.append(14, '\0').append(name);  // comment, disk, attributes, offset: all none
-  std::string end("PK\5\6\0\0\0\0\1\0\1\0", 12);
-  append(end, std::uint32_t(central.size()), 4), append(end, std::uint32_t(local.size()), 4), append(end, 0, 2);
-  return local + central + end;
-}
-
 TEST(Strangers, PipesAndDevicesAreNotRead) {
   const TemporaryFolder folder;
   ASSERT_EQ(mkfifo((folder / "pipe").c_str(), 0600), 0);
@@ -61,7 +35,8 @@ TEST(Strangers, ASizeBeyondTheLimitIsRefusedBeforeItIsRead) {
   const TemporaryFolder folder;
   std::ofstream(folder / "large.npz") << "";
   fs::resize_file(folder / "large.npz", std::uintmax_t(1) << 42);
-  EXPECT_NE(complaint([&] { read_npz(folder / "large.npz"); }).find("4398046511104 bytes"), std::string::npos);
+  EXPECT_NE(complaint([&] { read_npz(folder / "large.npz"); }).find("4398046511104 bytes"),
+            std::string::npos);
   fs::resize_file(folder / "large.npz", most_json_bytes + 1);
   EXPECT_NE(complaint([&] { read_json(folder / "large.npz"); }).find("at most 67108864"), std::string::npos);
 }
@@ -86,7 +61,7 @@ TEST(Strangers, AZipThatUnpacksToFarMoreThanItHasIsRefused) {
   const auto write = [&](std::int64_t numbers) {
     const std::vector<float> zeros(std::size_t(numbers), 0.f);
     std::ofstream(folder / "a.npz", std::ios::binary)
-        << zip_of("zeros.npy", npy_file(NpyArray::of<float>(zeros, {numbers})));
+        << deflated_zip("zeros.npy", npy_file(NpyArray::of<float>(zeros, {numbers})));
   };
   write(1'000'000);  // as numpy.savez_compressed may do to what sleeps
   EXPECT_EQ(read_npz(folder / "a.npz").array("zeros").size(), 1'000'000);
@@ -99,7 +74,7 @@ TEST(Strangers, AShapeThatTheEntryDoesNotHoldIsRefused) {
   const TemporaryFolder folder;
   std::string npy = npy_file(NpyArray::of<float>(std::vector<float>(4), {4}));
   npy.replace(npy.find("(4,)"), 4, "(9,)");
-  std::ofstream(folder / "a.npz", std::ios::binary) << zip_of("a.npy", npy);
+  std::ofstream(folder / "a.npz", std::ios::binary) << deflated_zip("a.npy", npy);
   EXPECT_NE(complaint([&] { read_npz(folder / "a.npz"); }).find("which its shape does not explain"),
             std::string::npos);
 }
@@ -108,9 +83,9 @@ TEST(Strangers, AShapeThatTheEntryDoesNotHoldIsRefused) {
 TEST(Strangers, OfAFileThatIsSomethingElseNothingIsTold) {
   const TemporaryFolder folder;
   std::ofstream(folder / "secret") << "root:x:0:0:root\nmore\n";
-  for (const std::string& told : {complaint([&] { read_msh(folder / "secret"); }),
-                                  complaint([&] { read_ply(folder / "secret"); }),
-                                  complaint([&] { read_obj_shells(folder / "secret"); })}) {
+  for (const std::string& told :
+       {complaint([&] { read_msh(folder / "secret"); }), complaint([&] { read_ply(folder / "secret"); }),
+        complaint([&] { read_obj_shells(folder / "secret"); })}) {
     EXPECT_NE(told.find("secret: is not"), std::string::npos) << told;
     EXPECT_EQ(told.find("root"), std::string::npos) << told;
   }
