@@ -10,6 +10,7 @@
 #include "app/tree_plot.h"
 #include "core/error.h"
 #include "core/hash.h"
+#include "core/lock.h"
 #include "core/log.h"
 #include "core/progress.h"
 #include "core/temporary_files.h"
@@ -210,7 +211,12 @@ scenes::Scene read_scene(const PlanOptions& options) {
   return scenes::read_scene_file(scenes::find_scene(options.scene.scene), sets);
 }
 
-Outcome plan(const PlanOptions& options) { return plan(options, read_scene(options)); }
+Outcome plan(const PlanOptions& options) {
+  const scenes::Scene scene = read_scene(options);
+  make_folder(options.out);
+  const FolderLock lock(options.out, FolderLock::alone);
+  return plan(options, scene);
+}
 
 Outcome plan(const PlanOptions& options, const scenes::Scene& scene) {
   make_folder(options.out);

@@ -145,7 +145,8 @@ class Reader {
               fmt::format("{}_manipulation[{}] is {}, which is none", name, i, manipulation[i]));
       require(steps[i] >= 0, fmt::format("{}_steps[{}] is {}", name, i, steps[i]));
       const bool at_a_node = Manipulation(manipulation[i]) == Manipulation::control_point;
-      require(node[i] >= (at_a_node ? 0 : -1), fmt::format("{}_node[{}] is {}, which is none", name, i, node[i]));
+      require(node[i] >= (at_a_node ? 0 : -1),
+              fmt::format("{}_node[{}] is {}, which is none", name, i, node[i]));
       controls[i] = {Manipulation(manipulation[i]),
                      Vec3f(force.data() + 3 * i),
                      node[i],
@@ -248,8 +249,8 @@ class Reader {
     return legs;
   }
 
-  // The frames are of the path: from the tree's start to the path's end, one a frame time. What they must be to
-  // the step is known to who knows the length of a step (require_frame_times).
+  // The frames are of the path: from the tree's start to the path's end, one a frame time. What they must be
+  // to the step is known to who knows the length of a step (require_frame_times).
   void require_one_path(const Plan& plan) const {
     const Trajectory& t = plan.trajectory;
     require(!t.frames.empty(), "its path has no frame");
@@ -291,8 +292,9 @@ Statistics statistics_from_json(const Reader& reader, const Json& json) {
   };
   Statistics s;
   s.iterations = count("iterations");
-  reader.require(s.iterations <= most_iterations,
-                 fmt::format("statistics.iterations is {}; it must be at most {}", s.iterations, most_iterations));
+  reader.require(
+      s.iterations <= most_iterations,
+      fmt::format("statistics.iterations is {}; it must be at most {}", s.iterations, most_iterations));
   s.diverged = count("diverged"), s.rejected = count("rejected");
   s.rollout_steps = count("rollout_steps"), s.rollouts = count("rollouts");
   s.rollouts_wrong = count("rollouts_wrong");

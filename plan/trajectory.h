@@ -24,6 +24,7 @@ std::uint64_t hash_of(const Trajectory&);  // of its controls, frames and end
 void require_frame_times(const Trajectory&, double dt_s, const std::string& what);
 
 // Applies the controls to the system's start. Where the dynamics diverge it stops, and the frames end there.
+// Throws Interrupted after a stop signal.
 Trajectory simulate(const System&, const std::vector<Control>&, double frames_per_second);
 
 // Whether the settle brings the robot to rest within its time, with its centre of mass in the goal and as the

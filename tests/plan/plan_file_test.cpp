@@ -215,7 +215,8 @@ TEST_F(PlanFileTest, APlanOfAnOlderPlannerIsToBeMadeAnew) {
 TEST_F(PlanFileTest, NumbersThatNoPlanHasAreInputErrors) {
   const Plan good = plan(Toy(5, true, true, 1.6f), toy_settings());
   ASSERT_TRUE(good.solved());
-  constexpr double nan = std::numeric_limits<double>::quiet_NaN(), inf = std::numeric_limits<double>::infinity();
+  constexpr double nan = std::numeric_limits<double>::quiet_NaN(),
+                   inf = std::numeric_limits<double>::infinity();
   const auto fps = [](double value) {
     return [value](Plan& p) { p.settings.frames_per_second = p.trajectory.frames_per_second = value; };
   };
@@ -225,8 +226,10 @@ TEST_F(PlanFileTest, NumbersThatNoPlanHasAreInputErrors) {
       {"frames_per_second", fps(1e9)},
       {"frames_per_second", fps(1e-300)},
       {"frames_per_second", [](Plan& p) { p.trajectory.frames_per_second *= 2; }},
-      {"do not last as long", [](Plan& p) { p.trajectory.end.step = std::numeric_limits<std::int32_t>::max(); }},
-      {"last longer", [](Plan& p) { p.trajectory.controls[0].steps = std::numeric_limits<std::int32_t>::max(); }},
+      {"do not last as long",
+       [](Plan& p) { p.trajectory.end.step = std::numeric_limits<std::int32_t>::max(); }},
+      {"last longer",
+       [](Plan& p) { p.trajectory.controls[0].steps = std::numeric_limits<std::int32_t>::max(); }},
       {"path_node[0]",
        [](Plan& p) {
          p.trajectory.controls[0].manipulation = Manipulation::control_point;
