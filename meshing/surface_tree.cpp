@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <utility>
 
 #include "core/progress.h"
 
@@ -170,6 +171,18 @@ struct TetRejects {
   }
 };
 
+// Which triangles a question was put to; now and then it forgets one, and that is asked again.
+class Asked {
+ public:
+  Asked() { last_.fill(-1); }
+  bool first_time(int triangle) {
+    return std::exchange(last_[std::size_t(triangle) % last_.size()], triangle) != triangle;
+  }
+
+ private:
+  std::array<int, 4096> last_;
+};
+
 }  // namespace
 
 int orientation(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& d) {
@@ -219,21 +232,11 @@ bool SurfaceTree::meets_tet(const Vec3& a, const Vec3& b, const Vec3& c, const V
   const auto meets = [&](int f) { return !proved_disjoint(query, corners(positions_, triangles_, f)); };
   if (pieces_.size() == std::size_t(triangles_.rows()))
     return tree_.any(rejects, [&](int f) { return !rejects(pieces_[f].box) && meets(f); });
-  const std::vector<int> near = triangles_near(rejects);
-  return std::any_of(near.begin(), near.end(), meets);
-}
-
-// Ascending, each once, whichever of its pieces are near.
-template <class Rejects>
-std::vector<int> SurfaceTree::triangles_near(const Rejects& rejects) const {
-  std::vector<int> near;
-  tree_.any(rejects, [&](int p) {
-    if (!rejects(pieces_[p].box)) near.push_back(pieces_[p].triangle);
-    return false;
+  Asked asked;
+  return tree_.any(rejects, [&](int p) {
+    const int f = pieces_[p].triangle;
+    return !rejects(pieces_[p].box) && asked.first_time(f) && meets(f);
   });
-  std::sort(near.begin(), near.end());
-  near.erase(std::unique(near.begin(), near.end()), near.end());
-  return near;
 }
 
 std::vector<int> SurfaceTree::triangles_meeting_tet(const Vec3& a, const Vec3& b, const Vec3& c,
@@ -241,8 +244,17 @@ std::vector<int> SurfaceTree::triangles_meeting_tet(const Vec3& a, const Vec3& b
   throw_if_stopped();
   const Tet query{a, b, c, d};
   const TetRejects rejects(query);
-  std::vector<int> found = triangles_near(rejects);
-  std::erase_if(found, [&](int f) { return proved_disjoint(query, corners(positions_, triangles_, f)); });
+  Asked asked;
+  std::vector<int> found;
+  tree_.any(rejects, [&](int p) {
+    const int f = pieces_[p].triangle;
+    if (!rejects(pieces_[p].box) && asked.first_time(f) &&
+        !proved_disjoint(query, corners(positions_, triangles_, f)))
+      found.push_back(f);
+    return false;
+  });
+  std::sort(found.begin(), found.end());
+  found.erase(std::unique(found.begin(), found.end()), found.end());
   return found;
 }
 

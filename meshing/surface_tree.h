@@ -38,9 +38,6 @@ class SurfaceTree {
   const std::vector<detail::TrianglePiece>& pieces() const { return pieces_; }
 
  private:
-  template <class Rejects>
-  std::vector<int> triangles_near(const Rejects&) const;
-
   Points positions_;
   Triangles triangles_;
   std::vector<detail::TrianglePiece> pieces_;
