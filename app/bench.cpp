@@ -15,6 +15,7 @@
 #include "app/scene_world.h"
 #include "core/error.h"
 #include "core/hash.h"
+#include "core/json_shape.h"
 #include "core/log.h"
 #include "core/progress.h"
 #include "core/temporary_files.h"
@@ -134,6 +135,8 @@ bool is_done(const fs::path& file, const Json& identity) {
   if (!record.is_object() || !record.contains("identity"))
     throw InputError(fmt::format("{}: is not a record of limber bench; remove it", file.string()));
   const Json& there = record.at("identity");
+  require_like(there, {{"program", ""}, {"scene_hash", ""}}, Keys::those_there, file.string() + ": identity",
+               "remove the file");
   if (there == identity) return true;
   std::string what = "other settings";
   if (there.value("program", "") != identity.at("program")) what = "another build of limber";

@@ -6,6 +6,8 @@
 #include "core/error.h"
 #include "core/events.h"
 #include "core/hash.h"
+#include "core/json_shape.h"
+#include "core/lock.h"
 #include "core/log.h"
 #include "core/mesh_files.h"
 #include "core/progress.h"
@@ -53,9 +55,54 @@ meshing::CageMode mode_of(const std::string& name) {
 
 std::string hash_of_file(const fs::path& path) { return hex(hash_of(std::string_view(read_file(path)))); }
 
+// Of what others ask of a report; the rest is for people.
+const Json& example_of_report() {
+  static const Json example{{"version", ""},
+                            {"model", ""},
+                            {"input", Json::object()},
+                            {"mended", {""}},
+                            {"warnings", {""}},
+                            {"surface", {{"vertices", -1}, {"triangles", -1}}},
+                            {"shells",
+                             {{"count", -1},
+                              {"stopped_by", ""},
+                              {"mean_overshoot", 0.5},
+                              {"max_overshoot", 0.5},
+                              {"triangles_uncovered", -1}}},
+                            {"cage",
+                             {{"mode", ""},
+                              {"tets", -1},
+                              {"nodes", -1},
+                              {"volume_ratio", 0.5},
+                              {"glued_share", 0.5},
+                              {"min_dihedral_deg", 0.5},
+                              {"max_dihedral_deg", 0.5},
+                              {"median_min_dihedral_deg", 0.5}}},
+                            {"certificate",
+                             {{"holds", true},
+                              {"vertices_outside", -1},
+                              {"triangles_crossing", -1},
+                              {"nonmanifold_edges", -1},
+                              {"nonmanifold_vertices", -1},
+                              {"surface_hash", ""},
+                              {"cage_hash", ""}}},
+                            {"cpu_seconds", Json::object()},
+                            {"peak_memory_mb", 0.5},
+                            {"files", Json::object()}};
+  return example;
+}
+
+void require_report(const Json& report, const fs::path& file) {
+  constexpr const char* remedy = "limber did not write that";
+  require_like(report, example_of_report(), Keys::all, file.string(), remedy);
+  for (const auto& [stage, any] : report.at("cpu_seconds").items())
+    require_like(report, {{"cpu_seconds", {{stage, 0.5}}}}, Keys::all, file.string(), remedy);
+}
+
 bool up_to_date(const fs::path& folder, const Json& input) {
   try {
     const Json report = read_json(folder / "report.json");
+    require_report(report, folder / "report.json");
     if (report.at("version") != version || report.at("input") != input) return false;
     for (const char* name : body_files)
       if (report.at("files").at(name) != hash_of_file(folder / name)) return false;
@@ -94,10 +141,15 @@ Json prepare_body(const BodySource& source, const PrepareSettings& settings, con
   }
   log::info("{}: preparing {}", folder.string(), source.model);
   events::tell({{"event", "body"}, {"folder", folder.string()}, {"up_to_date", false}});
+  std::optional<FolderLock> lock;
+  if (fs::is_directory(folder)) lock.emplace(folder, FolderLock::alone);
   Costs costs;
+  Progress progress("prepare", 7);
+  progress.update(0, "import");
   const meshing::ImportedModel model = source.load();
   validate(model.surface, source.model);
   costs.end_stage("import");
+  progress.update(1, "decompose");
   throw_if_stopped();
 
   const meshing::Decomposition decomposition =
@@ -106,6 +158,7 @@ Json prepare_body(const BodySource& source, const PrepareSettings& settings, con
                                          .inflation = settings.inflate,
                                          .exact = settings.exact});
   costs.end_stage("decompose");
+  progress.update(2, "cage");
   throw_if_stopped();
 
   std::optional<TetMesh> made_cage = source.made_cage();
@@ -119,22 +172,27 @@ Json prepare_body(const BodySource& source, const PrepareSettings& settings, con
   }
   validate(cage.mesh, source.model + ": cage");
   costs.end_stage("cage");
+  progress.update(3, "certify");
   throw_if_stopped();
 
   const meshing::TetQuality quality = meshing::measure_quality(cage.mesh);
   const meshing::Certificate certificate = meshing::certify(model.surface, cage.mesh);
   costs.end_stage("certify");
+  progress.update(4, "bind");
   throw_if_stopped();
 
   const ffd::Binding binding = ffd::bind(model.surface, cage.mesh);
   costs.end_stage("bind");
   throw_if_stopped();
 
+  progress.update(5, "contact");
   meshing::ContactShapeReport contact_report;
   const ContactShape contact = meshing::make_contact_shape(model.surface, cage.mesh, {}, &contact_report);
   costs.end_stage("contact");
+  progress.update(6, "write");
 
   make_folder(folder);  // not before: a model that is refused leaves all as it was
+  if (!lock) lock.emplace(folder, FolderLock::alone);
   remove_abandoned(folder);
   std::error_code ignored;
   fs::remove(folder / "report.json",
@@ -213,6 +271,7 @@ PreparedBody read_body(const fs::path& folder) {
   PreparedBody body;
   try {
     body.report = read_json(folder / "report.json");
+    require_report(body.report, folder / "report.json");
     for (const char* name : body_files)
       if (body.report.at("files").at(name) != hash_of_file(folder / name))
         throw InputError(

@@ -13,6 +13,7 @@
 #include "core/progress.h"
 #include "core/threads.h"
 #include "core/version.h"
+#include "core/words.h"
 
 namespace limber::app {
 
@@ -208,6 +209,40 @@ void print(const Outcome& outcome, bool json) {
   const std::string text = json ? outcome.json.dump(2) + "\n" : outcome.text;
   if (std::fwrite(text.data(), 1, text.size(), stdout) != text.size() || std::fflush(stdout) != 0)
     throw DiskError("stdout: writing the result failed");
+}
+
+// The first word that is no command or option, and what was meant; else empty.
+std::string misspelt(const CLI::App& program, int argc, const char* const* argv) {
+  const auto told = [](const std::string& word, const std::string& what,
+                       const std::vector<std::string>& known, const char* help) {
+    const std::string meant = nearest(word, known);
+    return fmt::format(
+        "{} is no {}; {}", word, what,
+        meant.empty() ? fmt::format("see {} --help", help) : fmt::format("did you mean {}?", meant));
+  };
+  const CLI::App* command = &program;
+  std::string name = "limber";
+  for (int i = 1; i < argc; ++i) {
+    const std::string word = argv[i];
+    if (word == "--") break;
+    std::vector<std::string> known;
+    if (word.starts_with("--")) {
+      for (const CLI::Option* option : command->get_options())
+        for (const std::string& long_name : option->get_lnames()) known.push_back("--" + long_name);
+      const std::string option = word.substr(0, word.find('='));
+      if (std::find(known.begin(), known.end(), option) == known.end())
+        return told(option, "option of " + name, known, name.c_str());
+      continue;
+    }
+    const std::vector<const CLI::App*> commands = command->get_subcommands({});
+    if (word.starts_with("-") || commands.empty()) continue;
+    for (const CLI::App* one : commands) known.push_back(one->get_name());
+    const auto found = std::find(known.begin(), known.end(), word);
+    if (found == known.end()) return told(word, "command of " + name, known, name.c_str());
+    command = commands[std::size_t(found - known.begin())];
+    name += " " + word;
+  }
+  return "";
 }
 
 int report_failure(int code, const std::string& what, bool json) {
@@ -496,9 +531,18 @@ int run_command_line(int argc, const char* const* argv) {
   try {
     program.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
-    if (program.exit(error) == 0) return exit_done;
+    const bool wrong = error.get_exit_code() != int(CLI::ExitCodes::Success);
+    const std::string meant = wrong ? misspelt(program, argc, argv) : "";
+    if (meant.empty())
+      program.exit(error);
+    else
+      fmt::print(stderr, "limber: {}\n", meant);
+    if (!wrong) return exit_done;
     const bool json = std::any_of(argv, argv + argc, [](std::string_view word) { return word == "--json"; });
-    if (json) fmt::print("{}\n", Json{{"error", error.what()}, {"exit_code", exit_bad_input}}.dump(2));
+    if (json)
+      fmt::print(
+          "{}\n",
+          Json{{"error", meant.empty() ? error.what() : meant}, {"exit_code", exit_bad_input}}.dump(2));
     return exit_bad_input;
   }
 

@@ -9,6 +9,7 @@
 #include "app/plan_folder.h"
 #include "app/scene_world.h"
 #include "core/hash.h"
+#include "core/lock.h"
 #include "core/log.h"
 #include "core/temporary_files.h"
 #include "fem/observe.h"
@@ -83,7 +84,12 @@ Outcome export_motion(const ExportOptions& options) {
     log::warn("--frames {}: {} frames beyond the last, {}, are left out", options.frames, left_out,
               count - 1);
   const fs::path out = options.out.value_or(options.folder / "export");
+  const bool recorded = can_update_manifest(options.folder);
+  if (!recorded)
+    log::warn("{}: cannot be written into, so its manifest.json will not tell of this export",
+              options.folder.string());
   make_folder(out);
+  const FolderLock lock(out, FolderLock::alone);
   remove_abandoned(out);
 
   Json formats;
@@ -105,7 +111,7 @@ Outcome export_motion(const ExportOptions& options) {
                     {"folder", out.string()},
                     {"deformation", deformations},
                     {"formats", formats}};
-  update_manifest(options.folder, "export", result);
+  if (recorded) update_manifest(options.folder, "export", result);
   return {exit_done, result,
           fmt::format("{} of {} frames, {} bodies\n{}", motion.wanted.size(), count, bodies.size(), text)};
 }

@@ -161,7 +161,10 @@ class FemSystem::Propagator final : public plan::Propagator {
 };
 
 FemSystem::FemSystem(const fem::World& world, const GoalRules& goal)
-    : world_(world), goal_(goal), goal_body_start_m_(Vec3::Zero()), hash_(hash_of(world)) {
+    : FemSystem(world, goal, hash_of(world)) {}
+
+FemSystem::FemSystem(const fem::World& world, const GoalRules& goal, std::uint64_t hash_of_world)
+    : world_(world), goal_(goal), goal_body_start_m_(Vec3::Zero()), hash_(hash_of_world) {
   if (goal.body >= 0) goal_body_start_m_ = fem::center_of_mass_m(world, start(), goal.body);
   Hasher hasher;
   hasher.value(hash_);
@@ -169,7 +172,7 @@ FemSystem::FemSystem(const fem::World& world, const GoalRules& goal)
   for (const auto& rule : {goal.lost_below_m, goal.turn_tolerance_deg, goal.shape_tolerance_m})
     hasher.value(int(rule.has_value())).value(rule.value_or(0));
   for (const GoalRules& rules : goal.via) {
-    via_.push_back(std::make_unique<FemSystem>(world, rules));
+    via_.push_back(std::unique_ptr<FemSystem>(new FemSystem(world, rules, hash_of_world)));
     via_.back()->last_ = this;
     hasher.value(via_.back()->hash());
   }

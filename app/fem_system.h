@@ -49,6 +49,7 @@ class FemSystem final : public plan::System {
 
  private:
   class Propagator;
+  FemSystem(const fem::World&, const GoalRules&, std::uint64_t hash_of_world);
   const fem::World& world_;
   GoalRules goal_;
   std::vector<std::unique_ptr<FemSystem>> via_;

@@ -10,6 +10,7 @@
 #include "app/tree_plot.h"
 #include "core/error.h"
 #include "core/hash.h"
+#include "core/lock.h"
 #include "core/log.h"
 #include "core/progress.h"
 #include "core/temporary_files.h"
@@ -217,7 +218,12 @@ scenes::Scene read_scene(const PlanOptions& options) {
   return scenes::read_scene_file(scenes::find_scene(options.scene.scene), sets);
 }
 
-Outcome plan(const PlanOptions& options) { return plan(options, read_scene(options)); }
+Outcome plan(const PlanOptions& options) {
+  const scenes::Scene scene = read_scene(options);
+  make_folder(options.out);
+  const FolderLock lock(options.out, FolderLock::alone);
+  return plan(options, scene);
+}
 
 Outcome plan(const PlanOptions& options, const scenes::Scene& scene) {
   make_folder(options.out);
@@ -232,6 +238,7 @@ Outcome plan(const PlanOptions& options, const scenes::Scene& scene) {
   Json earlier_summary;
   if (options.resume) {
     PlanFolder folder = read_plan_folder(options.out);
+    if (folder.plan.system_hash == system.hash()) require_of_world(folder.plan, world, options.out);
     earlier = std::move(folder.plan);
     earlier_summary = std::move(folder.summary);
     if (earlier->system_hash != system.hash())

@@ -3,6 +3,7 @@
 #include "app/scene_world.h"
 #include "core/error.h"
 #include "core/hash.h"
+#include "core/json_shape.h"
 #include "core/version.h"
 #include "plan/plan_file.h"
 
@@ -20,6 +21,35 @@ void write_plan_folder(const fs::path& folder, const plan::Plan& plan, const sce
                     {"summary", summary}});
 }
 
+namespace {
+
+void require_summary(const PlanFolder& planned, const fs::path& file) {
+  constexpr const char* remedy = "plan anew with limber plan";
+  const auto kinds_of = [&](const Json& value, const Json& example, const char* name) {
+    require_like(value, example, Keys::those_there, fmt::format("{}: given.{}", file.string(), name), remedy);
+  };
+  const Json costs{
+      {"duration_s", 0.5}, {"effort_n_s", 0.5}, {"strain_energy_j", 0.5}, {"volume_change", 0.5}};
+  kinds_of(planned.summary,
+           {{"explanation", ""},
+            {"dynamics",
+             {{"elastic_cpu_s", 0.5},
+              {"contact_cpu_s", 0.5},
+              {"controls_cpu_s", 0.5},
+              {"integration_cpu_s", 0.5}}},
+            {"improve", Json::object()}},
+           "summary");
+  if (planned.summary.contains("shortcut"))
+    require_like(
+        planned.summary.at("shortcut"),
+        {{"cost", ""}, {"rounds", -1}, {"accepted", -1}, {"cpu_s", 0.5}, {"before", costs}, {"after", costs}},
+        Keys::all, file.string() + ": given.summary.shortcut", remedy);
+  kinds_of(planned.cage_hashes, Json::object(), "cage_hashes");
+  for (const auto& [body, hash] : planned.cage_hashes.items()) kinds_of(hash, "", "cage_hashes");
+}
+
+}  // namespace
+
 PlanFolder read_plan_folder(const fs::path& folder) {
   const fs::path file = folder / "plan.npz";
   if (!fs::exists(file))
@@ -34,12 +64,31 @@ PlanFolder read_plan_folder(const fs::path& folder) {
                                       extra.at("sets").get<std::vector<std::string>>());
     result.summary = extra.at("summary");
     result.cage_hashes = extra.at("cage_hashes");
+    require_summary(result, file);
   } catch (const Json::exception& error) {
     throw InputError(fmt::format("{}: its meta.json is not limber's ({}); plan anew with limber plan",
                                  file.string(), error.what()));
   }
   result.file_hash = hash_of(std::string_view(read_file(file)));
   return result;
+}
+
+void require_of_world(const plan::Plan& plan, const fem::World& world, const fs::path& folder) {
+  const std::string file = (folder / "plan.npz").string();
+  const std::size_t numbers = fem::rest_state(world).positions.size();
+  if (plan.tree.states.numbers() != numbers)
+    throw InputError(fmt::format(
+        "{}: its states hold {} numbers, and the bodies of its scene have {}; plan anew with limber plan",
+        file, plan.tree.states.numbers(), numbers));
+  const int nodes = world.bodies[std::size_t(world.robot)].node_count();
+  for (const auto& [name, controls] :
+       {std::pair("path", &plan.trajectory.controls), {"tree", &plan.tree.controls}})
+    for (std::size_t i = 0; i < controls->size(); ++i)
+      if (const int node = (*controls)[i].node; node >= nodes)
+        throw InputError(fmt::format(
+            "{}: {}_node[{}] is {}, and the robot has the nodes 0 … {}; plan anew with limber plan", file,
+            name, i, node, nodes - 1));
+  plan::require_frame_times(plan.trajectory, world.dt_s, file);
 }
 
 std::vector<PreparedBody> read_bodies_of(const PlanFolder& planned, const fs::path& folder) {
@@ -51,6 +100,7 @@ std::vector<PreparedBody> read_bodies_of(const PlanFolder& planned, const fs::pa
           fmt::format("{}: the cage has changed since the plan was made; plan anew with limber plan",
                       body_folder(folder, planned.scene.bodies[b]).string()));
   }
+  require_of_world(planned.plan, build_world(planned.scene, bodies), folder);
   return bodies;
 }
 

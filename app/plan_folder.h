@@ -32,7 +32,12 @@ Outcome keep_plan(const fs::path& folder, const scenes::Scene&, const std::vecto
 // Throws InputError when plan.npz is missing, damaged, or not limber's.
 PlanFolder read_plan_folder(const fs::path& folder);
 
-// The bodies that the plan was made with. Throws InputError when one has changed since.
+// Throws InputError where the plan's states, controls or frame times are none of this world: what follows
+// would reach beyond its nodes, or replay without end.
+void require_of_world(const plan::Plan&, const fem::World&, const fs::path& folder);
+
+// The bodies that the plan was made with. Throws InputError when one has changed since, or the plan is not of
+// their world.
 std::vector<PreparedBody> read_bodies_of(const PlanFolder&, const fs::path& folder);
 
 scenes::Scene read_scene(const PlanOptions&);

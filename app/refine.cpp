@@ -7,6 +7,7 @@
 #include "app/plan_folder.h"
 #include "app/scene_world.h"
 #include "core/error.h"
+#include "core/lock.h"
 #include "core/progress.h"
 
 namespace limber::app {
@@ -65,6 +66,7 @@ Outcome refine(const RefineOptions& options) {
   const scenes::Scene scene = scenes::read_scene(
       planned.scene.text, fmt::format("{} (scene)", (options.folder / "plan.npz").string()), sets);
   make_folder(options.out);
+  const FolderLock lock(options.out, FolderLock::alone);
   const std::vector<PreparedBody> bodies = prepare_bodies(scene, options.data, options.out);
 
   const fem::World coarse_world = build_world(planned.scene, coarse_bodies),

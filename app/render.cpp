@@ -12,6 +12,7 @@
 #include "core/error.h"
 #include "core/events.h"
 #include "core/hash.h"
+#include "core/lock.h"
 #include "core/log.h"
 #include "core/progress.h"
 #include "core/temporary_files.h"
@@ -149,6 +150,7 @@ Outcome render(const RenderOptions& options) {
               frame_count - 1);
   const fs::path folder = options.folder / ("frames" + suffix);
   make_folder(folder);
+  const FolderLock lock(options.folder, FolderLock::shared);
   remove_abandoned(folder), remove_abandoned(options.folder);
   const FrameFiles files{folder};
   const auto is_good = [&](int frame) {
@@ -162,6 +164,13 @@ Outcome render(const RenderOptions& options) {
 
   std::vector<int> missing = wanted;
   if (options.resume) std::erase_if(missing, is_good);
+  const fs::path video = options.video.value_or(options.folder / ("film" + suffix + ".mp4"));
+  const auto comes_or_is_there = [&](int frame) {
+    return std::binary_search(wanted.begin(), wanted.end(), frame) || is_good(frame);
+  };
+  bool will_be_complete = true;
+  for (int f = 0; f < frame_count && will_be_complete; ++f) will_be_complete = comes_or_is_there(f);
+  if (will_be_complete) render::require_film_possible(film.frames_per_second, video);
   events::tell({{"event", "frames"}, {"wanted", wanted.size()}, {"kept", wanted.size() - missing.size()}});
   const double cpu_before = cpu_seconds();
   const std::vector<Failure> failures = paint_all(shot, missing, files);
@@ -188,8 +197,7 @@ Outcome render(const RenderOptions& options) {
   bool complete = true;
   for (int f = 0; f < frame_count && complete; ++f) complete = is_good(f);
   if (complete) {
-    const fs::path video = options.video.value_or(options.folder / ("film" + suffix + ".mp4")),
-                   sheet = options.folder / ("sheet" + suffix + ".png");
+    const fs::path sheet = options.folder / ("sheet" + suffix + ".png");
     std::vector<fs::path> shown;
     std::vector<std::string> captions;
     for (const int f : render::spread_over(frame_count, film.sheet_columns * film.sheet_rows)) {
@@ -213,6 +221,10 @@ Outcome render(const RenderOptions& options) {
 
 Outcome run(const PlanOptions& plan_options, const RenderOptions& render_options) {
   const scenes::Scene scene = read_scene(plan_options);
+  if (render_options.frames.empty() && render_options.chunk.empty())
+    render::require_film_possible(scene.film.frames_per_second, render_options.video.value_or("film.mp4"));
+  make_folder(plan_options.out);
+  FolderLock lock(plan_options.out, FolderLock::alone);
   Outcome planned;
   if (plan_is_up_to_date(plan_options, scene)) {
     log::info("{}: up to date", (plan_options.out / "plan.npz").string());
@@ -224,6 +236,7 @@ Outcome run(const PlanOptions& plan_options, const RenderOptions& render_options
   } else {
     planned = plan(plan_options, scene);
   }
+  lock.share();
   RenderOptions options = render_options;
   options.folder = plan_options.out;
   options.resume = true;

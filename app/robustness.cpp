@@ -65,14 +65,15 @@ std::vector<Control> with_other_forces(std::vector<Control> controls, const Robu
   return controls;
 }
 
-const char* name_of(plan::Course::Result result) {
+// Without a settle nobody looks whether the robot rests.
+const char* name_of(plan::Course::Result result, bool settles) {
   switch (result) {
     case plan::Course::rests_in_goal:
-      return "at rest in the goal";
+      return settles ? "at rest in the goal" : "in the goal";
     case plan::Course::diverged:
       return "the dynamics diverged";
     default:
-      return "not at rest in the goal";
+      return settles ? "not at rest in the goal" : "not in the goal";
   }
 }
 
@@ -103,7 +104,10 @@ std::vector<Fate> replay(const plan::Plan& plan, const plan::Reference& referenc
     course.controls = with_other_forces(controls, options, Rng(options.seed, std::uint64_t(i)));
   }
   plan::run(system, plan.settings, courses,
-            {.settle = plan::CourseOptions::anywhere, .keep_frames = true, .ask_acceptable = false});
+            {.settle = plan::CourseOptions::anywhere,
+             .keep_frames = true,
+             .ask_acceptable = false,
+             .stoppable = true});
   const std::vector<int> before_legs = plan::controls_before_legs(plan);
   std::vector<Fate> fates;
   for (plan::Course& course : courses) {
@@ -113,7 +117,7 @@ std::vector<Fate> replay(const plan::Plan& plan, const plan::Reference& referenc
     Fate& fate = fates.emplace_back();
     fate.world = world_number;
     fate.reaches = course.result == plan::Course::rests_in_goal && goes_by;
-    fate.end = goes_by ? name_of(course.result) : "a via is missed";
+    fate.end = goes_by ? name_of(course.result, plan.settings.settle.max_duration_s > 0) : "a via is missed";
     fate.end_center_m = system.robot_center(course.end);
     fate.distance_m =
         (fate.end_center_m - system.goal_shift(course.end) - plan.settings.goal.center_of_mass_m).norm();
@@ -181,14 +185,15 @@ Outcome robust(const RobustOptions& options) {
   }
   spread = std::sqrt(spread);
   text += fmt::format(
-      "{} of {} come to rest in the goal (materials ± {:g} %, forces ± {:g} %, turned by up to {:g} degrees, "
+      "{} of {} {} in the goal (materials ± {:g} %, forces ± {:g} %, turned by up to {:g} degrees, "
       "seed "
       "{})\n"
       "  end          {:.3f} m from the plan's (root mean square), at most {:.3f} m\n"
       "  volume       changes by at most {:.2f} %\n"
       "  penetration  at most {:.4f} m\n",
-      reached, n, 100 * options.material_share, 100 * options.force_share, options.force_deg, options.seed,
-      spread, farthest, 100 * volume, penetration);
+      reached, n, planned.plan.settings.settle.max_duration_s > 0 ? "come to rest" : "end",
+      100 * options.material_share, 100 * options.force_share, options.force_deg, options.seed, spread,
+      farthest, 100 * volume, penetration);
   const Json json{{"perturbations", n},
                   {"seed", options.seed},
                   {"material_share", options.material_share},

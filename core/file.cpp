@@ -52,15 +52,25 @@ fs::path destination(const fs::path& path) {
 
 }  // namespace
 
-std::string read_file(const fs::path& path) {
-  std::error_code error;
-  if (fs::is_directory(path, error))
-    throw InputError(fmt::format("{}: is a folder, not a file", path.string()));
-  const Descriptor fd(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
+std::string read_file(const fs::path& path, std::uintmax_t most_bytes) {
+  const auto refuse_size = [&](const std::string& size) {
+    throw InputError(
+        fmt::format("{}: holds {} bytes, and at most {} are read of such a file; is it the right one?",
+                    path.string(), size, most_bytes));
+  };
+  // Opening a pipe without O_NONBLOCK would wait for somebody to write to it.
+  const Descriptor fd(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY));
   if (fd < 0) throw InputError(fmt::format("{}: cannot be read: {}", path.string(), std::strerror(errno)));
   struct stat status;
+  if (::fstat(fd, &status) != 0)
+    throw InputError(fmt::format("{}: cannot be read: {}", path.string(), std::strerror(errno)));
+  if (S_ISDIR(status.st_mode)) throw InputError(fmt::format("{}: is a folder, not a file", path.string()));
+  if (!S_ISREG(status.st_mode))
+    throw InputError(fmt::format(
+        "{}: is a pipe or a device, not a file; save what it gives to a file and name that", path.string()));
+  if (std::uintmax_t(status.st_size) > most_bytes) refuse_size(std::to_string(status.st_size));
   std::string content;
-  if (::fstat(fd, &status) == 0 && S_ISREG(status.st_mode)) content.reserve(std::size_t(status.st_size) + 1);
+  content.reserve(std::size_t(status.st_size) + 1);
   std::size_t size = 0;
   while (true) {
     content.resize(size + std::max<std::size_t>(1 << 16, content.capacity() - size));
@@ -69,6 +79,7 @@ std::string read_file(const fs::path& path) {
     if (got < 0) throw InputError(fmt::format("{}: reading failed: {}", path.string(), std::strerror(errno)));
     size += std::size_t(got);
     if (got == 0) break;
+    if (size > most_bytes) refuse_size("more and more");  // it grows, or does not tell its size
   }
   content.resize(size);
   return content;

@@ -4,7 +4,35 @@
 
 namespace limber {
 
+namespace {
+
+// Before it is parsed, for what is parsed must be destroyed again. Of what is not JSON any answer will do.
+void require_shallow(const std::string& text, const std::string& what) {
+  int depth = 0, line = 1;
+  bool in_string = false;
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    const char c = text[i];
+    line += c == '\n';
+    if (in_string && c == '\\') {
+      ++i;
+    } else if (c == '"') {
+      in_string = !in_string;
+    } else if (!in_string && (c == '[' || c == '{')) {
+      if (++depth > most_json_depth)
+        throw InputError(
+            fmt::format("{}:{}: has lists within lists more than {} deep, which nothing of limber's has; is "
+                        "it the right file?",
+                        what, line, most_json_depth));
+    } else if (!in_string && (c == ']' || c == '}')) {
+      --depth;
+    }
+  }
+}
+
+}  // namespace
+
 Json parse_json(const std::string& text, const std::string& what) {
+  require_shallow(text, what);
   try {
     return Json::parse(text);
   } catch (const Json::parse_error& error) {
@@ -16,7 +44,7 @@ Json parse_json(const std::string& text, const std::string& what) {
   }
 }
 
-Json read_json(const fs::path& path) { return parse_json(read_file(path), path.string()); }
+Json read_json(const fs::path& path) { return parse_json(read_file(path, most_json_bytes), path.string()); }
 void write_json(const fs::path& path, const Json& json) { write_file(path, json.dump(2) + "\n"); }
 
 }  // namespace limber

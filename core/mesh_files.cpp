@@ -13,6 +13,8 @@ namespace {
 
 static_assert(std::endian::native == std::endian::little, "files are little-endian");
 
+std::string_view shortened(std::string_view word) { return word.substr(0, 40); }
+
 // Walks through a text by white-space-separated words and remembers the line for complaints.
 class Words {
  public:
@@ -43,7 +45,7 @@ class Words {
     T value{};
     const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
     if (error != std::errc() || end != text.data() + text.size())
-      fail(fmt::format("\"{}\" is not a number of the kind wanted here", text));
+      fail(fmt::format("\"{}\" is not a number of the kind wanted here", shortened(text)));
     // A number at the very end of the file may have lost digits: our writers end each file with a line end.
     if (at_ >= text_.size()) fail("the file ends in the middle of a line");
     return value;
@@ -51,7 +53,15 @@ class Words {
 
   void expect(std::string_view wanted) {
     if (const auto got = word(); got != wanted)
-      fail(fmt::format("found \"{}\" where {} belongs", got, wanted));
+      fail(fmt::format("found \"{}\" where {} belongs", shortened(got), wanted));
+  }
+
+  // Of a file that is something else altogether nothing is quoted: whoever named it (a scene may come from
+  // afar) is not to learn what it holds.
+  void expect_start(std::string_view wanted, const char* kind) const {
+    if (!text_.starts_with(wanted))
+      throw InputError(
+          fmt::format("{}: is not {}, which begins with \"{}\"; name another file", file_, kind, wanted));
   }
 
   [[noreturn]] void fail(std::string_view why) const {
@@ -116,17 +126,19 @@ SurfaceMesh read_ply(const fs::path& path) {
   const auto header = [&](std::string_view wanted) {
     if (const auto got = words.line(); got != wanted)
       words.fail(fmt::format("found \"{}\" where \"{}\" belongs; only limber's own PLY files are read here",
-                             got, wanted));
+                             shortened(got), wanted));
   };
   const auto count = [&](std::string_view prefix, std::size_t bytes_each) {
     const auto line = words.line();
     std::int64_t n = -1;
     if (line.starts_with(prefix)) std::from_chars(line.data() + prefix.size(), line.data() + line.size(), n);
     if (n < 0 || std::uint64_t(n) > text.size() / bytes_each)
-      words.fail(fmt::format(
-          "\"{}\" where \"{}N\" belongs, N being what the file can hold; it may be cut short", line, prefix));
+      words.fail(
+          fmt::format("\"{}\" where \"{}N\" belongs, N being what the file can hold; it may be cut short",
+                      shortened(line), prefix));
     return Eigen::Index(n);
   };
+  words.expect_start("ply\n", "a PLY file of limber's");
   header("ply"), header("format binary_little_endian 1.0");
   SurfaceMesh mesh;
   mesh.positions.resize(count("element vertex ", 24), 3);
@@ -189,6 +201,7 @@ void write_obj(const fs::path& path, const SurfaceMesh& mesh) {
 std::vector<ConvexShell> read_obj_shells(const fs::path& path) {
   const std::string text = read_file(path);
   Words words(text, path.string());
+  words.expect_start("# ", "limber's convex shells");
   struct Group {
     std::vector<Vec3> vertices;
     std::vector<std::array<std::int64_t, 3>> triangles;
@@ -207,11 +220,12 @@ std::vector<ConvexShell> read_obj_shells(const fs::path& path) {
       continue;
     }
     if (groups.empty() || parts.size() != 4 || (parts[0] != "v" && parts[0] != "f"))
-      words.fail(fmt::format("\"{}\" is not a group, a vertex or a triangle of limber's shells", line));
+      words.fail(
+          fmt::format("\"{}\" is not a group, a vertex or a triangle of limber's shells", shortened(line)));
     const auto number = [&]<class T>(std::string_view part, T value) {
       const auto [end, error] = std::from_chars(part.data(), part.data() + part.size(), value);
       if (error != std::errc() || end != part.data() + part.size())
-        words.fail(fmt::format("\"{}\" is not a number", part));
+        words.fail(fmt::format("\"{}\" is not a number", shortened(part)));
       return value;
     };
     if (parts[0] == "v")
@@ -244,7 +258,8 @@ std::vector<ConvexShell> read_obj_shells(const fs::path& path) {
     throw InputError(
         fmt::format("{}: holds \"{}\" by count, but its first line says \"{}\"; it was changed or "
                     "is not limber's, write it again",
-                    path.string(), header.substr(0, header.size() - 1), text.substr(0, text.find('\n'))));
+                    path.string(), header.substr(0, header.size() - 1),
+                    shortened(std::string_view(text).substr(0, text.find('\n')))));
   return shells;
 }
 
@@ -266,6 +281,7 @@ void write_msh(const fs::path& path, const TetMesh& mesh, const std::vector<int>
 TetMesh read_msh(const fs::path& path, std::vector<int>* label) {
   const std::string text = read_file(path);
   Words words(text, path.string());
+  words.expect_start("$MeshFormat", "a Gmsh 2.2 mesh");
   words.expect("$MeshFormat"), words.expect("2.2"), words.expect("0"), words.expect("8"),
       words.expect("$EndMeshFormat");
   words.expect("$Nodes");

@@ -6,12 +6,19 @@
 #include <memory>
 
 #include "core/error.h"
+#include "core/json.h"
 
 namespace limber {
 
 namespace {
 
 constexpr std::string_view npy_magic("\x93NUMPY\x01\x00", 8);
+
+constexpr std::size_t npy_preamble = 10;  // magic, version, two bytes of header length
+
+std::size_t npy_header_size(std::string_view preamble) {
+  return std::size_t((unsigned char)preamble[8]) + 256 * std::size_t((unsigned char)preamble[9]);
+}
 
 std::size_t item_size(std::string_view dtype) {
   for (const auto& [name, size] :
@@ -20,21 +27,28 @@ std::size_t item_size(std::string_view dtype) {
   return 0;
 }
 
-NpyArray npy_array(std::string_view text, const std::string& what) {
+struct NpyHeader {
+  NpyArray array;               // without its elements
+  std::uint64_t element_bytes;  // so many
+};
+
+// `start`: the entry up to the end of its header, or as much of that as there is.
+NpyHeader npy_header(std::string_view start, std::uint64_t entry_size, const std::string& what) {
   const auto refuse = [&](std::string_view why) -> void {
     throw InputError(fmt::format("{}: {}", what, why));
   };
-  if (text.size() < 10 || text.substr(0, 8) != npy_magic) refuse("is not a version 1.0 .npy array");
-  const std::size_t header_size =
-      std::size_t((unsigned char)text[8]) + 256 * std::size_t((unsigned char)text[9]);
-  if (text.size() < 10 + header_size) refuse("ends inside its header");
-  const std::string_view header = text.substr(10, header_size), data = text.substr(10 + header_size);
+  if (start.size() < npy_preamble || start.substr(0, 8) != npy_magic)
+    refuse("is not a version 1.0 .npy array");
+  const std::size_t header_size = npy_header_size(start);
+  if (start.size() < npy_preamble + header_size) refuse("ends inside its header");
+  const std::string_view header = start.substr(npy_preamble, header_size);
   const auto field = [&](std::string_view key) {
     const auto at = header.find(key);
     if (at == header.npos) refuse(fmt::format("its header has no {}", key));
     return header.substr(at + key.size());
   };
-  NpyArray array;
+  NpyHeader found{{}, entry_size - npy_preamble - header_size};
+  NpyArray& array = found.array;
   const std::string_view dtype = field("'descr': '");
   array.dtype = dtype.substr(0, dtype.find('\''));
   if (item_size(array.dtype) == 0)
@@ -54,11 +68,9 @@ NpyArray npy_array(std::string_view text, const std::string& what) {
     total *= n;
     array.shape.push_back(std::int64_t(n));
   }
-  if (total * item_size(array.dtype) != data.size())
-    refuse(fmt::format("holds {} bytes, which its shape does not explain", data.size()));
-  array.bytes.assign(reinterpret_cast<const std::byte*>(data.data()),
-                     reinterpret_cast<const std::byte*>(data.data() + data.size()));
-  return array;
+  if (total * item_size(array.dtype) != found.element_bytes)
+    refuse(fmt::format("holds {} bytes, which its shape does not explain", found.element_bytes));
+  return found;
 }
 
 template <class Close, class T>
@@ -173,49 +185,126 @@ void write_npz(const fs::path& path, const Npz& npz) {
   write_file(path, bytes);
 }
 
-Npz read_npz(const fs::path& path) {
-  const std::string bytes = read_file(path);
-  if (bytes.empty())
-    throw InputError(fmt::format("{}: is empty", path.string()));  // libzip takes it for an archive
-  zip_error_t error;
-  zip_error_init(&error);
-  zip_source_t* memory = zip_source_buffer_create(bytes.data(), bytes.size(), 0, &error);
-  LIMBER_CHECK(memory != nullptr, zip_error_strerror(&error));
-  zip_t* opened = zip_open_from_source(memory, ZIP_RDONLY | ZIP_CHECKCONS, &error);
-  if (!opened) {
+namespace {
+
+// An archive that is being read.
+class Archive {
+ public:
+  struct Entry {
+    zip_uint64_t index;
+    std::string name;
+    std::uint64_t size;  // unpacked
+  };
+
+  explicit Archive(const fs::path& path) : path_(path), bytes_(read_file(path)) {
+    if (bytes_.empty()) refuse("is empty");  // libzip takes it for an archive
+    zip_error_t error;
+    zip_error_init(&error);
+    zip_source_t* memory = zip_source_buffer_create(bytes_.data(), bytes_.size(), 0, &error);
+    LIMBER_CHECK(memory != nullptr, zip_error_strerror(&error));
+    archive_ = zip_open_from_source(memory, ZIP_RDONLY | ZIP_CHECKCONS, &error);
+    if (archive_) return;
     zip_source_free(memory);
-    throw InputError(fmt::format("{}: is not a whole .npz archive ({}); it may be cut short", path.string(),
-                                 zip_error_strerror(&error)));
+    refuse(fmt::format("is not a whole .npz archive ({}); it may be cut short", zip_error_strerror(&error)));
   }
-  const auto archive = guarded(opened, zip_discard);
+  ~Archive() { zip_discard(archive_); }
+  Archive(const Archive&) = delete;
+  Archive& operator=(const Archive&) = delete;
+
+  // What they unpack to is bounded before any is unpacked.
+  std::vector<Entry> entries() const {
+    constexpr zip_int64_t most_entries = 1000;
+    constexpr std::uint64_t always_allowed = 64 << 20, most_growth = 64;  // plans that sleep much: tenfold
+    const zip_int64_t count = zip_get_num_entries(archive_, 0);
+    if (count > most_entries) refuse(fmt::format("has {} entries; at most {} are read", count, most_entries));
+    const std::uint64_t allowed = always_allowed + most_growth * bytes_.size();
+    std::uint64_t sum = 0;
+    std::vector<Entry> entries;
+    for (zip_int64_t i = 0; i < count; ++i) {
+      zip_stat_t status;
+      if (zip_stat_index(archive_, zip_uint64_t(i), 0, &status) != 0 || !(status.valid & ZIP_STAT_NAME) ||
+          !(status.valid & ZIP_STAT_SIZE))
+        refuse(fmt::format("entry {} has no name or size", i));
+      entries.push_back({zip_uint64_t(i), status.name, status.size});
+      if (status.size > allowed - sum)
+        refuse(fmt::format("unpacks to more than {} bytes, though it has {}; no plan or binding does that",
+                           allowed, bytes_.size()));
+      sum += status.size;
+    }
+    return entries;
+  }
+
+  std::string what(const Entry& entry) const {
+    return fmt::format("{}: entry {}", path_.string(), entry.name);
+  }
+
+  NpyArray array(const Entry& entry) const {
+    const auto file = opened(entry);
+    std::string start(std::min<std::uint64_t>(npy_preamble, entry.size), '\0');
+    fill(file.get(), entry, start.data(), start.size());
+    if (start.size() == npy_preamble) {
+      start.resize(std::min<std::uint64_t>(npy_preamble + npy_header_size(start), entry.size));
+      fill(file.get(), entry, start.data() + npy_preamble, start.size() - npy_preamble);
+    }
+    auto [array, element_bytes] = npy_header(start, entry.size, what(entry));
+    array.bytes.resize(element_bytes);
+    fill(file.get(), entry, array.bytes.data(), array.bytes.size());
+    expect_end(file.get(), entry);
+    return std::move(array);
+  }
+
+  std::string text(const Entry& entry) const {
+    if (entry.size > most_json_bytes)
+      refuse(fmt::format("entry {} is a text of {} bytes; at most {} are read", entry.name, entry.size,
+                         most_json_bytes));
+    const auto file = opened(entry);
+    std::string content(entry.size, '\0');
+    fill(file.get(), entry, content.data(), content.size());
+    expect_end(file.get(), entry);
+    return content;
+  }
+
+ private:
+  [[noreturn]] void refuse(const std::string& why) const {
+    throw InputError(fmt::format("{}: {}", path_.string(), why));
+  }
+
+  std::unique_ptr<zip_file_t, decltype(&zip_fclose)> opened(const Entry& entry) const {
+    auto file = guarded(zip_fopen_index(archive_, entry.index, 0), zip_fclose);
+    if (!file) throw InputError(fmt::format("{}: cannot be read: {}", what(entry), zip_strerror(archive_)));
+    return file;
+  }
+
+  void fill(zip_file_t* file, const Entry& entry, void* to, std::size_t size) const {
+    for (auto* at = static_cast<char*>(to); size > 0;) {
+      const zip_int64_t n = zip_fread(file, at, size);
+      if (n <= 0) throw InputError(fmt::format("{}: is damaged ({})", what(entry), zip_file_strerror(file)));
+      at += n, size -= std::size_t(n);
+    }
+  }
+
+  // Checks the CRC, too.
+  void expect_end(zip_file_t* file, const Entry& entry) const {
+    if (char extra; zip_fread(file, &extra, 1) != 0)
+      throw InputError(fmt::format("{}: is damaged", what(entry)));
+  }
+
+  const fs::path& path_;
+  std::string bytes_;
+  zip_t* archive_;
+};
+
+}  // namespace
+
+Npz read_npz(const fs::path& path) {
+  const Archive archive(path);
   Npz npz;
   npz.source = path;
-  for (zip_int64_t i = 0; i < zip_get_num_entries(archive.get(), 0); ++i) {
-    zip_stat_t status;
-    if (zip_stat_index(archive.get(), zip_uint64_t(i), 0, &status) != 0 || !(status.valid & ZIP_STAT_NAME) ||
-        !(status.valid & ZIP_STAT_SIZE))
-      throw InputError(fmt::format("{}: entry {} has no name or size", path.string(), i));
-    const std::string name = status.name, what = fmt::format("{}: entry {}", path.string(), name);
-    const auto file = guarded(zip_fopen_index(archive.get(), zip_uint64_t(i), 0), zip_fclose);
-    if (!file) throw InputError(fmt::format("{}: cannot be read: {}", what, zip_strerror(archive.get())));
-    // A stored or deflated entry is at most about a thousand times its packed size; anything else is no file
-    // of ours.
-    if (status.size / 1100 > bytes.size())
-      throw InputError(fmt::format("{}: claims to hold {} bytes", what, status.size));
-    std::string content(status.size, '\0');
-    std::size_t got = 0;
-    while (got < content.size()) {
-      const zip_int64_t n = zip_fread(file.get(), content.data() + got, content.size() - got);
-      if (n <= 0) throw InputError(fmt::format("{}: is damaged ({})", what, zip_file_strerror(file.get())));
-      got += std::size_t(n);
-    }
-    if (char extra; zip_fread(file.get(), &extra, 1) != 0)
-      throw InputError(fmt::format("{}: is damaged", what));  // checks the CRC
-    if (name.ends_with(".npy"))
-      npz.arrays[name.substr(0, name.size() - 4)] = npy_array(content, what);
+  for (const Archive::Entry& entry : archive.entries())
+    if (entry.name.ends_with(".npy"))
+      npz.arrays[entry.name.substr(0, entry.name.size() - 4)] = archive.array(entry);
     else
-      npz.texts[name] = std::move(content);
-  }
+      npz.texts[entry.name] = archive.text(entry);
   return npz;
 }
 

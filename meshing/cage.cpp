@@ -64,7 +64,7 @@ Selection fit_budget(const CageModel& model, int budget, const std::optional<Dih
   const auto miss = [&](const Selection& s) { return std::abs(double(s.tets.size()) / budget - 1); };
   double spacing = model.box.diagonal() / std::cbrt(double(budget));
   for (const Vec3& phase : phases) {
-    double too_fine = 0, too_coarse = 0;
+    double too_fine = 0, too_coarse = 0, spacing_before = 0, ratio_before = 0;
     bool too_large = false;  // a spacing was refused; then no other place of the lattice will help
     for (int i = 0; i < tries_a_phase; ++i) {
       Selection s = detail::select_tets(model, spacing, phase, warp_within);
@@ -73,7 +73,15 @@ Selection fit_budget(const CageModel& model, int budget, const std::optional<Dih
       (ratio > 1 ? too_fine : too_coarse) = spacing;
       if (!s.tets.empty() && (best.tets.empty() || miss(s) < miss(best))) best = std::move(s);
       if (!best.tets.empty() && miss(best) < near_enough) return best;
-      spacing *= std::pow(ratio, 0.42);
+      // The count of a solid goes with the third power of what divides the spacing, that of a surface with
+      // the second, and that of a rod with the first: there the usual exponent would take many tries.
+      constexpr double usual = 0.42, of_a_rod = 0.7;
+      double exponent = usual;
+      if (const double way = std::log(ratio / ratio_before); i > 0 && way != 0)
+        if (const double seen = std::log(spacing_before / spacing) / way; seen > of_a_rod)
+          exponent = std::min(seen, 1.0);
+      spacing_before = spacing, ratio_before = ratio;
+      spacing *= std::pow(ratio, exponent);
       if (too_fine > 0 && too_coarse > 0) {
         if (too_coarse / too_fine < (too_large ? 1.1 : 1.0005)) break;
         const double low = too_fine * std::pow(too_coarse / too_fine, 0.1),

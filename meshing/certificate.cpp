@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "core/hash.h"
+#include "core/progress.h"
 #include "meshing/detail/box_tree.h"
 #include "meshing/detail/manifold.h"
 #include "meshing/quality.h"
@@ -19,6 +20,7 @@ std::int64_t count_outside(const Points& points, const TetMesh& cage) {
   const detail::BoxTree tree(boxes);
   std::int64_t outside = 0;
   for (Eigen::Index v = 0; v < points.rows(); ++v) {
+    throw_if_stopped();
     const Vec3 p = points.row(v);
     const auto rejects = [&](const Box& b) {
       return (p.array() < b.lower.array()).any() || (p.array() > b.upper.array()).any();

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <span>
 
+#include "core/progress.h"
 #include "meshing/detail/triangle_pair.h"
 
 namespace limber::meshing {
@@ -132,6 +133,7 @@ class Search {
   void try_pair(int s, int t) {
     if (++candidates_ > most_candidates_) found_.complete = false;
     if (!found_.complete) return;
+    throw_if_stopped();
     const auto corners = [&](int f) {
       return std::array{surface_.triangles(f, 0), surface_.triangles(f, 1), surface_.triangles(f, 2)};
     };

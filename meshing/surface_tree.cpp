@@ -5,6 +5,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <utility>
+
+#include "core/progress.h"
 
 #include "meshing/detail/closest_point.h"
 
@@ -110,10 +113,9 @@ bool triangles_meet(const Tri& a, const Tri& b) {
   return CGAL::do_intersect(triangle, Kernel::Segment_3(exact(sorted[0]), exact(sorted[2])));
 }
 
-std::vector<Box> boxes_of(const Points& positions, const Triangles& triangles) {
-  std::vector<Box> boxes(triangles.rows());
-  for (int f = 0; f < triangles.rows(); ++f)
-    for (int k = 0; k < 3; ++k) boxes[f].include(Vec3(positions.row(triangles(f, k))));
+std::vector<Box> boxes_of(const std::vector<detail::TrianglePiece>& pieces) {
+  std::vector<Box> boxes;
+  for (const detail::TrianglePiece& piece : pieces) boxes.push_back(piece.box);
   return boxes;
 }
 
@@ -152,6 +154,18 @@ struct TetRejects {
   }
 };
 
+// Which triangles a question was put to; now and then it forgets one, and that is asked again.
+class Asked {
+ public:
+  Asked() { last_.fill(-1); }
+  bool first_time(int triangle) {
+    return std::exchange(last_[std::size_t(triangle) % last_.size()], triangle) != triangle;
+  }
+
+ private:
+  std::array<int, 4096> last_;
+};
+
 }  // namespace
 
 int orientation(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& d) {
@@ -178,51 +192,67 @@ bool tet_holds(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& d, const
 }
 
 SurfaceTree::SurfaceTree(const Points& positions, const Triangles& triangles)
-    : positions_(positions), triangles_(triangles), boxes_(boxes_of(positions, triangles)), tree_(boxes_) {}
+    : positions_(positions),
+      triangles_(triangles),
+      pieces_(detail::pieces_of(positions, triangles)),
+      tree_(boxes_of(pieces_)) {}
 
 bool SurfaceTree::meets_triangle(const Vec3& a, const Vec3& b, const Vec3& c) const {
+  throw_if_stopped();
   const Tri query{a, b, c};
   const Box box = box_of(query);
   return tree_.any([&](const Box& other) { return disjoint(box, other); },
-                   [&](int f) {
-                     return !disjoint(box, boxes_[f]) &&
-                            triangles_meet(query, corners(positions_, triangles_, f));
+                   [&](int p) {
+                     return !disjoint(box, pieces_[p].box) &&
+                            triangles_meet(query, corners(positions_, triangles_, pieces_[p].triangle));
                    });
 }
 
 bool SurfaceTree::meets_tet(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& d) const {
+  throw_if_stopped();
   const Tet query{a, b, c, d};
   const TetRejects rejects(query);
-  return tree_.any(rejects, [&](int f) {
-    return !rejects(boxes_[f]) && !proved_disjoint(query, corners(positions_, triangles_, f));
+  const auto meets = [&](int f) { return !proved_disjoint(query, corners(positions_, triangles_, f)); };
+  if (pieces_.size() == std::size_t(triangles_.rows()))
+    return tree_.any(rejects, [&](int f) { return !rejects(pieces_[f].box) && meets(f); });
+  Asked asked;
+  return tree_.any(rejects, [&](int p) {
+    const int f = pieces_[p].triangle;
+    return !rejects(pieces_[p].box) && asked.first_time(f) && meets(f);
   });
 }
 
 std::vector<int> SurfaceTree::triangles_meeting_tet(const Vec3& a, const Vec3& b, const Vec3& c,
                                                     const Vec3& d) const {
+  throw_if_stopped();
   const Tet query{a, b, c, d};
   const TetRejects rejects(query);
+  Asked asked;
   std::vector<int> found;
-  tree_.any(rejects, [&](int f) {
-    if (!rejects(boxes_[f]) && !proved_disjoint(query, corners(positions_, triangles_, f)))
+  tree_.any(rejects, [&](int p) {
+    const int f = pieces_[p].triangle;
+    if (!rejects(pieces_[p].box) && asked.first_time(f) &&
+        !proved_disjoint(query, corners(positions_, triangles_, f)))
       found.push_back(f);
     return false;
   });
   std::sort(found.begin(), found.end());
+  found.erase(std::unique(found.begin(), found.end()), found.end());
   return found;
 }
 
 Vec3 SurfaceTree::closest_point(const Vec3& p) const { return *closest_point_within(p, 1e150); }
 
 std::optional<Vec3> SurfaceTree::closest_point_within(const Vec3& p, double distance) const {
+  throw_if_stopped();
   std::optional<Vec3> best;
   double best_squared = distance * distance;
   const auto wins = [&](const Vec3& q, double squared) {
     if (squared != best_squared) return squared < best_squared;
     return !best || std::lexicographical_compare(q.begin(), q.end(), best->begin(), best->end());
   };
-  tree_.nearest(p, best_squared, [&](int f) {
-    const Vec3 q = closest_on_triangle(corners(positions_, triangles_, f), p);
+  tree_.nearest(p, best_squared, [&](int piece) {
+    const Vec3 q = closest_on_triangle(corners(positions_, triangles_, pieces_[piece].triangle), p);
     const double squared = (q - p).squaredNorm();
     if (wins(q, squared)) best_squared = squared, best = q;
     return best_squared * (1 + 1e-9);  // the slack visits every tie, whatever the rounding of a box
@@ -237,9 +267,9 @@ double SurfaceTree::free_share(const Vec3& p, const Vec3& q) const {
     const Eigen::Array3d a = (box.lower - p).cwiseProduct(inverse), b = (box.upper - p).cwiseProduct(inverse);
     return !(a.min(b).maxCoeff() <= std::min(a.max(b).minCoeff(), free)) || a.max(b).minCoeff() < 0;
   };
-  tree_.any(rejects, [&](int f) {
+  tree_.any(rejects, [&](int piece) {
     // Moeller and Trumbore 1997.
-    const auto [a, b, c] = corners(positions_, triangles_, f);
+    const auto [a, b, c] = corners(positions_, triangles_, pieces_[piece].triangle);
     const Vec3 ab = b - a, ac = c - a, n = way.cross(ac), from_a = p - a, m = from_a.cross(ab);
     const double det = ab.dot(n), u = from_a.dot(n) / det, v = way.dot(m) / det, t = ac.dot(m) / det;
     if (u >= 0 && v >= 0 && u + v <= 1 && t >= 0) free = std::min(free, t);

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "meshing/detail/box_tree.h"
+#include "meshing/detail/triangle_pieces.h"
 
 namespace limber::meshing {
 
@@ -15,6 +16,7 @@ int orientation(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& d);
 // Whether p lies in the closed tet (a b c d), whose volume is positive; exact.
 bool tet_holds(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& d, const Vec3& p);
 
+// All but free_share throw Interrupted once a stop signal has come: whoever asks, asks often.
 class SurfaceTree {
  public:
   SurfaceTree(const Points& positions, const Triangles& triangles);  // keeps copies
@@ -33,12 +35,13 @@ class SurfaceTree {
   // Share of the way from p to q at which the soup is first met, 1 where it is not; to rounding, unlike the
   // others.
   double free_share(const Vec3& p, const Vec3& q) const;
+  const std::vector<detail::TrianglePiece>& pieces() const { return pieces_; }
 
  private:
   Points positions_;
   Triangles triangles_;
-  std::vector<Box> boxes_;
-  detail::BoxTree tree_;
+  std::vector<detail::TrianglePiece> pieces_;
+  detail::BoxTree tree_;  // of the pieces
 };
 
 }  // namespace limber::meshing

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "core/progress.h"
+
 namespace limber::meshing {
 
 namespace {
@@ -56,6 +58,7 @@ WindingNumber::WindingNumber(const Points& positions, const Triangles& triangles
 }
 
 double WindingNumber::at(const Vec3& point) const {
+  throw_if_stopped();
   if (bvh_.nodes.empty()) return 0;
   std::array<int, 64> stack;  // median splits: the depth is below 32
   std::size_t depth = 0;

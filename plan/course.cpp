@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "core/error.h"
+#include "core/progress.h"
 #include "core/threads.h"
 #include "plan/expansion.h"
 #include "plan/frame_times.h"
@@ -13,6 +14,8 @@ namespace limber::plan {
 namespace {
 
 constexpr double settle_check_s = 0.05;  // rest is looked for this often
+
+constexpr int most_steps_between_signals = 1000;
 
 constexpr std::pair<const char*, CostKind> cost_kinds[] = {{"duration", CostKind::duration},
                                                            {"effort", CostKind::effort},
@@ -46,6 +49,8 @@ class Runner {
     rollout.from = &state_;
     rollout.control = control_;
     rollout.control.steps = int(std::min<std::int64_t>(steps_left_, step_of_next_frame() - state_.step));
+    if (options_.stoppable)
+      rollout.control.steps = std::min(rollout.control.steps, most_steps_between_signals);
   }
 
   void take(Rollout& rollout) {
@@ -162,6 +167,7 @@ void run_batch(const System& system, const Settings& settings, std::span<Course>
   std::vector<Rollout> rollouts;
   double cheapest = std::numeric_limits<double>::infinity();  // in the race so far
   while (true) {
+    if (options.stoppable) throw_if_stopped();
     for (const Runner& runner : runners)
       if (options.race && runner.rests_in_goal()) cheapest = std::min(cheapest, runner.cost());
     going.clear();

@@ -51,6 +51,8 @@ struct CourseOptions {
   CostKind cost = CostKind::duration;
   double most = std::numeric_limits<double>::infinity();
   bool race = false;
+  bool stoppable =
+      false;  // throws Interrupted soon after a stop signal; else whoever calls has something to keep
 };
 
 // Fills what is out. A course depends on itself and the options alone, save that `race` ends losers sooner or

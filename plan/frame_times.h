@@ -13,7 +13,9 @@ struct FrameTimes {
   double steps_per_frame = 1;   // below 1, some steps are shown several times
 
   FrameTimes(const System& system, double frames_per_second)
-      : first_step(system.start().step), steps_per_frame(1 / (frames_per_second * system.dt_s())) {}
+      : FrameTimes(system.start().step, system.dt_s(), frames_per_second) {}
+  FrameTimes(std::int64_t first, double dt_s, double frames_per_second)
+      : first_step(first), steps_per_frame(1 / (frames_per_second * dt_s)) {}
 
   // The whole step nearest to frame / frames_per_second.
   std::int64_t step_of(std::int64_t frame) const {

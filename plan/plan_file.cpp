@@ -1,6 +1,8 @@
 #include "plan/plan_file.h"
 
 #include <algorithm>
+#include <cmath>
+#include <limits>
 
 #include "core/error.h"
 #include "core/hash.h"
@@ -11,6 +13,7 @@ namespace limber::plan {
 namespace {
 
 constexpr const char* format_name = "limber plan 2";
+constexpr std::int64_t most_counted = std::int64_t(1) << 53;  // steps of all rollouts, …
 constexpr const char* earlier_format_name = "limber plan 1";  // the tree as a list of states like any other
 
 // A list of states is three arrays: NAME_step (n), NAME_positions and NAME_velocities (n × 3N).
@@ -100,6 +103,15 @@ class Reader {
     return a.as<T>(path_.string() + ": " + name);
   }
 
+  // Of floats: each is a number, no nan and no infinity.
+  std::span<const float> numbers(const std::string& name, std::int64_t rows, std::int64_t columns) const {
+    const auto all = array<float>(name, rows, columns);
+    const auto odd = std::find_if(all.begin(), all.end(), [](float x) { return !std::isfinite(x); });
+    if (odd != all.end())
+      refuse(fmt::format("{}[{}] holds {}, which is no number", name, (odd - all.begin()) / columns, *odd));
+    return all;
+  }
+
   std::int64_t width_of(const std::string& name) const {
     const NpyArray& a = file_.array(name);
     require(a.shape.size() == 2 && a.shape[1] % 3 == 0, name + " is not a list of states");
@@ -109,8 +121,8 @@ class Reader {
   std::vector<State> states(const std::string& name, std::int64_t width) const {
     const auto steps = array<std::int64_t>(name + "_step", -1, 1);
     const std::int64_t n = std::int64_t(steps.size());
-    const auto positions = array<float>(name + "_positions", n, width);
-    const auto velocities = array<float>(name + "_velocities", n, width);
+    const auto positions = numbers(name + "_positions", n, width);
+    const auto velocities = numbers(name + "_velocities", n, width);
     std::vector<State> states;
     for (std::int64_t i = 0; i < n; ++i) {
       const auto x = positions.subspan(std::size_t(i * width), std::size_t(width));
@@ -123,16 +135,18 @@ class Reader {
   std::vector<Control> controls(const std::string& name, std::int64_t rows) const {
     const auto manipulation = array<std::int32_t>(name + "_manipulation", rows, 1);
     const std::int64_t n = std::int64_t(manipulation.size());
-    const auto force = array<float>(name + "_force_n", n, 3), target = array<float>(name + "_target_m", n, 3);
+    const auto force = numbers(name + "_force_n", n, 3), target = numbers(name + "_target_m", n, 3);
     const auto node = array<std::int32_t>(name + "_node", n, 1),
                steps = array<std::int32_t>(name + "_steps", n, 1);
-    const auto radius = array<float>(name + "_radius_m", n, 1),
-               max_force = array<float>(name + "_max_force_n", n, 1);
+    const auto radius = numbers(name + "_radius_m", n, 1), max_force = numbers(name + "_max_force_n", n, 1);
     std::vector<Control> controls(manipulation.size());
     for (std::size_t i = 0; i < controls.size(); ++i) {
       require(manipulation[i] >= 0 && manipulation[i] <= std::int32_t(Manipulation::hold),
               fmt::format("{}_manipulation[{}] is {}, which is none", name, i, manipulation[i]));
       require(steps[i] >= 0, fmt::format("{}_steps[{}] is {}", name, i, steps[i]));
+      const bool at_a_node = Manipulation(manipulation[i]) == Manipulation::control_point;
+      require(node[i] >= (at_a_node ? 0 : -1),
+              fmt::format("{}_node[{}] is {}, which is none", name, i, node[i]));
       controls[i] = {Manipulation(manipulation[i]),
                      Vec3f(force.data() + 3 * i),
                      node[i],
@@ -152,7 +166,7 @@ class Reader {
     require(index.shape == std::vector<std::int64_t>{std::int64_t(steps.size()), 2, a_half},
             "tree_piece has another shape than the rest of the file");
     const auto piece_of = index.as<std::int32_t>(path_.string() + ": tree_piece");
-    const auto pieces = array<float>("tree_pieces", -1, length);
+    const auto pieces = numbers("tree_pieces", -1, length);
     const std::int64_t count = std::int64_t(pieces.size()) / length, used = width - (a_half - 1) * length;
     for (std::size_t i = 0; i < piece_of.size(); ++i) {
       const std::int64_t piece = piece_of[i];
@@ -178,7 +192,7 @@ class Reader {
     require(n > 0, "the tree is empty");
     const auto parents = array<std::int32_t>("tree_parent", n, 1);
     const auto iterations = array<std::int64_t>("tree_iteration", n, 1);
-    const auto centers = array<float>("tree_center_m", n, 3);
+    const auto centers = numbers("tree_center_m", n, 3);
     t.parents.assign(parents.begin(), parents.end());
     t.iterations.assign(iterations.begin(), iterations.end());
     t.controls = controls("tree", n);
@@ -189,7 +203,26 @@ class Reader {
               fmt::format("node {} has parent {}", i, parent));
     }
     t.states = shared ? shared_states() : unshared_states(parents);
+    require_steps(t);
     return t;
+  }
+
+  void require_steps(const Tree& t) const {
+    const std::span<const std::int64_t> steps = t.states.steps();
+    for (std::size_t i = 0; i < steps.size(); ++i) {
+      const std::int64_t due = i == 0 ? steps[0] : steps[std::size_t(t.parents[i])] + t.controls[i].steps;
+      require(steps[i] >= 0 && steps[i] <= most_counted && steps[i] == due,
+              fmt::format("node {} is at step {}, its control ends at step {}", i, steps[i], due));
+      require(t.iterations[i] >= -1 && t.iterations[i] <= most_iterations,
+              fmt::format("node {} is of iteration {}", i, t.iterations[i]));
+    }
+  }
+
+  int whole(const Json& json, const char* name) const {
+    const auto n = json.at(name).get<double>();
+    require(n == std::floor(n) && std::abs(n) <= std::numeric_limits<std::int32_t>::max(),
+            fmt::format("{} is {}", name, n));
+    return int(n);
   }
 
   Ending ending(const Json& name) const {
@@ -203,7 +236,7 @@ class Reader {
     const std::vector<int> path = path_to(plan.tree, plan.best_node);
     std::vector<Leg> legs;
     for (const Json& leg : list) {
-      legs.push_back({leg.at("root").get<int>(), leg.at("first_iteration").get<std::int64_t>()});
+      legs.push_back({whole(leg, "root"), leg.at("first_iteration").get<std::int64_t>()});
       const Leg before = legs.size() == 1 ? Leg{} : legs[legs.size() - 2], now = legs.back();
       require(std::count(path.begin(), path.end(), now.root) == 1 && now.root >= before.root &&
                   now.first_iteration >= before.first_iteration &&
@@ -216,6 +249,28 @@ class Reader {
     return legs;
   }
 
+  // The frames are of the path: from the tree's start to the path's end, one a frame time. What they must be
+  // to the step is known to who knows the length of a step (require_frame_times).
+  void require_one_path(const Plan& plan) const {
+    const Trajectory& t = plan.trajectory;
+    require(!t.frames.empty(), "its path has no frame");
+    std::int64_t step = plan.tree.states.steps()[0];
+    require(t.frames.front().step == step, "frame 0 is not at the start");
+    for (std::size_t f = 1; f < t.frames.size(); ++f)
+      require(t.frames[f].step >= t.frames[f - 1].step, fmt::format("frame {} is before frame {}", f, f - 1));
+    require(t.frames.back().step <= t.end.step, "its last frame is after the end");
+    for (const Control& control : t.controls) {
+      step += control.steps;
+      require(step <= t.end.step, "its controls last longer than the path");
+    }
+    require(step == t.end.step, "its controls do not last as long as the path");
+    require(t.settle_steps >= 0 && t.settle_steps <= (t.controls.empty() ? 0 : t.controls.back().steps),
+            fmt::format("settle_steps is {}", t.settle_steps));
+    require(t.frames_per_second == plan.settings.frames_per_second,
+            fmt::format("frames_per_second is {}, and {} in its settings", t.frames_per_second,
+                        plan.settings.frames_per_second));
+  }
+
   Json meta() const { return parse_json(file_.text("meta.json"), path_.string() + ": meta.json"); }
 
  private:
@@ -223,16 +278,27 @@ class Reader {
   Npz file_;
 };
 
-Statistics statistics_from_json(const Json& json) {
+Statistics statistics_from_json(const Reader& reader, const Json& json) {
+  const auto count = [&](const char* name) {
+    const auto n = json.at(name).get<double>();  // of a whole number beyond 64 bits this, too, is a number
+    reader.require(n >= 0 && n <= double(most_counted),
+                   fmt::format("statistics.{} is {}; it must be in [0, {}]", name, n, most_counted));
+    return json.at(name).get<std::int64_t>();
+  };
+  const auto seconds = [&](const char* name) {
+    const auto s = json.at(name).get<double>();
+    reader.require(std::isfinite(s) && s >= 0, fmt::format("statistics.{} is {}", name, s));
+    return s;
+  };
   Statistics s;
-  json.at("iterations").get_to(s.iterations);
-  json.at("diverged").get_to(s.diverged);
-  json.at("rejected").get_to(s.rejected);
-  json.at("rollout_steps").get_to(s.rollout_steps);
-  json.at("rollouts").get_to(s.rollouts);
-  json.at("rollouts_wrong").get_to(s.rollouts_wrong);
-  json.at("cpu_s").get_to(s.cpu_s);
-  json.at("wall_s").get_to(s.wall_s);
+  s.iterations = count("iterations");
+  reader.require(
+      s.iterations <= most_iterations,
+      fmt::format("statistics.iterations is {}; it must be at most {}", s.iterations, most_iterations));
+  s.diverged = count("diverged"), s.rejected = count("rejected");
+  s.rollout_steps = count("rollout_steps"), s.rollouts = count("rollouts");
+  s.rollouts_wrong = count("rollouts_wrong");
+  s.cpu_s = seconds("cpu_s"), s.wall_s = seconds("wall_s");
   return s;
 }
 
@@ -297,10 +363,16 @@ PlanFile read_plan(const fs::path& path) {
     Plan& plan = file.plan;
     plan.tree = reader.tree(shared);
     plan.settings = settings_from_json(meta.at("settings"), path.string());
-    plan.statistics = statistics_from_json(meta.at("statistics"));
-    meta.at("goal_node").get_to(plan.goal_node);
-    meta.at("best_node").get_to(plan.best_node);
+    plan.statistics = statistics_from_json(reader, meta.at("statistics"));
+    plan.goal_node = reader.whole(meta, "goal_node"), plan.best_node = reader.whole(meta, "best_node");
     meta.at("best_distance_m").get_to(plan.best_distance_m);
+    reader.require(plan.best_distance_m >= 0 && std::isfinite(plan.best_distance_m),
+                   fmt::format("best_distance_m is {}", plan.best_distance_m));
+    try {
+      validate(plan.settings);
+    } catch (const InputError& error) {
+      reader.refuse(error.what());
+    }
     plan.ending = reader.ending(meta.at("ending"));
     const int nodes = plan.tree.size();
     reader.require(plan.best_node >= 0 && plan.best_node < nodes, "best_node is not a node of the tree");
@@ -314,8 +386,9 @@ PlanFile read_plan(const fs::path& path) {
     const auto end = reader.states("end", width);
     reader.require(end.size() == 1, "end is not one state");
     t.end = end.front();
-    meta.at("settle_steps").get_to(t.settle_steps);
+    t.settle_steps = reader.whole(meta, "settle_steps");
     meta.at("frames_per_second").get_to(t.frames_per_second);
+    reader.require_one_path(plan);
 
     plan.system_hash = hash_from_hex(meta.at("system_hash").get<std::string>());
     reader.require(meta.at("tree_hash") == hex(hash_of(plan.tree)),

@@ -370,6 +370,7 @@ Plan begin(const System& system, const Settings& settings) {
 
 // Where the next leg begins: the goal's node, or a node behind it in which the robot has come to rest.
 int reached(const System& system, const Settings& settings, Plan& plan) {
+  if (settings.settle.max_duration_s == 0) return plan.goal_node;
   Course settle;
   settle.from = plan.tree.states[std::size_t(plan.goal_node)];
   run(system, settings, {&settle, 1}, {.ask_acceptable = false});
@@ -401,7 +402,9 @@ Plan plan(const System& system, const Settings& settings, std::optional<Plan> ea
     const int leg = plan.leg();
     const System& on_leg = system.on_leg(leg);
     const Settings of_leg = settings_of_leg(settings, leg);
-    Search(on_leg, of_leg, plan, watch, started).run();
+    // A goal on the way may be reached already where its leg begins; then there is nothing to prepare a
+    // search for.
+    if (!plan.solved() || leg == int(settings.via.size())) Search(on_leg, of_leg, plan, watch, started).run();
     if (plan.solved() && leg < int(settings.via.size())) {
       plan.legs.push_back({reached(on_leg, of_leg, plan), plan.statistics.iterations});
       begin_leg(system.on_leg(leg + 1), settings_of_leg(settings, leg + 1), plan);

@@ -94,8 +94,8 @@ Settings settings_of_leg(const Settings& settings, int leg) {
   return s;
 }
 
-void validate(const Settings& s, const System& system) {
-  require(s.max_iterations >= 0, "max_iterations", double(s.max_iterations), "at least 0");
+void validate(const Settings& s) {
+  require_within(double(s.max_iterations), 0, double(most_iterations), "max_iterations");
   validate_goal(s.goal, "the goal");
   for (std::size_t i = 0; i < s.via.size(); ++i) validate_goal(s.via[i].goal, fmt::format("via {}", i + 1));
   require_within(s.goal_bias, 0, 1, "goal_bias");
@@ -103,17 +103,26 @@ void validate(const Settings& s, const System& system) {
   require(std::isfinite(s.max_force_n) && s.max_force_n >= 0, "max_force_n", s.max_force_n, "at least 0");
   require_within(s.max_force_share, 0, 1, "max_force_share");
   require_within(s.min_force_share, 0, s.max_force_share, "min_force_share");
-  require_within(s.max_duration_s, 0, 1e8 * system.dt_s(), "max_duration_s");
+  require(std::isfinite(s.max_duration_s) && s.max_duration_s >= 0, "max_duration_s", s.max_duration_s,
+          "at least 0");
   require_within(s.min_duration_s, 0, s.max_duration_s, "min_duration_s");
-  require(s.control_point_radius_m > 0, "control_point_radius_m", s.control_point_radius_m, "above 0");
-  require_within(s.settle.max_duration_s, 0, 1e8 * system.dt_s(), "settle max_duration_s");
-  require(s.settle.mean_speed_m_s > 0, "settle mean_speed_m_s", s.settle.mean_speed_m_s, "above 0");
+  require(std::isfinite(s.control_point_radius_m) && s.control_point_radius_m > 0, "control_point_radius_m",
+          s.control_point_radius_m, "above 0");
+  require(std::isfinite(s.settle.max_duration_s) && s.settle.max_duration_s >= 0, "settle max_duration_s",
+          s.settle.max_duration_s, "at least 0");
+  require(std::isfinite(s.settle.mean_speed_m_s) && s.settle.mean_speed_m_s > 0, "settle mean_speed_m_s",
+          s.settle.mean_speed_m_s, "above 0");
   require_within(s.settle.max_force_share, 0, 1, "settle max_force_share");
   validate_laws(s.laws);
-  require(s.frames_per_second > 0 && s.frames_per_second <= 10000, "frames_per_second", s.frames_per_second,
-          "in (0, 10000]");
+  require_within(s.frames_per_second, least_frames_per_second, most_frames_per_second, "frames_per_second");
   require_within(s.in_flight, 0, 65536, "in_flight");
   require(s.time_limit_s >= 0, "time_limit_s", s.time_limit_s, "at least 0");
+}
+
+void validate(const Settings& s, const System& system) {
+  validate(s);
+  require_within(s.max_duration_s, 0, 1e8 * system.dt_s(), "max_duration_s");
+  require_within(s.settle.max_duration_s, 0, 1e8 * system.dt_s(), "settle max_duration_s");
 }
 
 Json json_of(const Settings& s) {

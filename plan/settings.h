@@ -61,9 +61,12 @@ struct Laws {
   bool end_hopeless = false;  // a rollout that gets nowhere, or leads away, ends there
 };
 
+inline constexpr std::int64_t most_iterations = 1'000'000'000;
+inline constexpr double least_frames_per_second = 1e-3, most_frames_per_second = 10000;
+
 struct Settings {
   std::uint64_t seed = 1;
-  std::int64_t max_iterations = 1000;  // in total, those of an earlier plan included
+  std::int64_t max_iterations = 1000;  // in total, those of an earlier plan included; at most most_iterations
   std::vector<Via> via;  // reached before `goal`, in this order; each begins a leg of the search
   Goal goal;
   double goal_bias = 0.1;  // share of expansions drawn towards the goal, in [0, 1]
@@ -76,7 +79,7 @@ struct Settings {
   double control_point_radius_m = 0.25;  // > 0, in the rest shape
   Settle settle;
   Laws laws;
-  double frames_per_second = 30;  // of the trajectory's stored states, in (0, 10000]
+  double frames_per_second = 30;  // of the trajectory's stored states, in the range below
   // None of these changes the tree, save for how far it gets.
   int in_flight = 0;  // expansions computed ahead; 0: chosen from the threads and the lanes
   double time_limit_s = std::numeric_limits<double>::infinity();  // wall
@@ -85,7 +88,9 @@ struct Settings {
 // Those of the search to the goal with this number: `goal` is via[leg]'s, or the last one.
 Settings settings_of_leg(const Settings&, int leg);
 
-// Throws InputError naming the setting, its value and its range.
+// Throws InputError naming the setting, its value and its range; without a system all but what its time step
+// bounds.
+void validate(const Settings&);
 void validate(const Settings&, const System&);
 
 // Every number exactly; no time limit is null. Throws InputError, beginning with `what`, when a key is

@@ -3,6 +3,7 @@
 #include "core/error.h"
 #include "plan/course.h"
 #include "plan/detail/hash_control.h"
+#include "plan/frame_times.h"
 
 namespace limber::plan {
 
@@ -25,6 +26,25 @@ std::uint64_t hash_of(const Trajectory& t) {
   return hasher.value(limber::hash_of(t.end)).digest();
 }
 
+void require_frame_times(const Trajectory& t, double dt_s, const std::string& what) {
+  LIMBER_CHECK(!t.frames.empty(), t.frames.size());
+  const FrameTimes times(t.frames.front().step, dt_s, t.frames_per_second);
+  const auto count = std::int64_t(t.frames.size());
+  const auto refuse = [&](const std::string& why) {
+    throw InputError(
+        fmt::format("{}: {}, at {} frames a second and steps of {:.4g} s; the file was changed, or another "
+                    "limber made it: plan "
+                    "anew with limber plan",
+                    what, why, t.frames_per_second, dt_s));
+  };
+  for (std::int64_t f = 0; f < count; ++f)
+    if (const std::int64_t step = t.frames[std::size_t(f)].step; step != times.step_of(f))
+      refuse(fmt::format("frame {} is at step {}, and belongs at step {}", f, step, times.step_of(f)));
+  if (times.step_of(count) <= t.end.step)
+    refuse(fmt::format("its path ends at step {}, and lacks the frame at step {}", t.end.step,
+                       times.step_of(count)));
+}
+
 Trajectory simulate(const System& system, const std::vector<Control>& controls, double frames_per_second) {
   Settings settings;
   settings.frames_per_second = frames_per_second;
@@ -32,7 +52,7 @@ Trajectory simulate(const System& system, const std::vector<Control>& controls, 
   course.from = system.start();
   course.controls = controls;
   run(system, settings, {&course, 1},
-      {.settle = CourseOptions::never, .keep_frames = true, .ask_acceptable = false});
+      {.settle = CourseOptions::never, .keep_frames = true, .ask_acceptable = false, .stoppable = true});
   return trajectory_of(std::move(course), frames_per_second);
 }
 

@@ -1,6 +1,7 @@
 // A way through the tree as it is simulated: controls from the start, and the states they lead to.
 #pragma once
 
+#include <string>
 #include <vector>
 
 #include "plan/expansion.h"
@@ -18,7 +19,12 @@ struct Trajectory {
 };
 std::uint64_t hash_of(const Trajectory&);  // of its controls, frames and end
 
+// Throws InputError where steps of this length would give other frames, or more of them: so a replay has as
+// many frames as the file that it is read from. `what` begins the text.
+void require_frame_times(const Trajectory&, double dt_s, const std::string& what);
+
 // Applies the controls to the system's start. Where the dynamics diverge it stops, and the frames end there.
+// Throws Interrupted after a stop signal.
 Trajectory simulate(const System&, const std::vector<Control>&, double frames_per_second);
 
 // Whether the settle brings the robot to rest within its time, with its centre of mass in the goal and as the

@@ -142,13 +142,22 @@ const Format& format_of(const fs::path& film) {
 
 }  // namespace
 
-void make_film(const std::vector<fs::path>& frames, double frames_per_second, const fs::path& film) {
+void require_film_possible(double frames_per_second, const fs::path& film) {
   if (!(frames_per_second >= 0.1 && frames_per_second <= 240))
     throw InputError(fmt::format("{} frames a second: must lie between 0.1 and 240", frames_per_second));
-  const Format& format = format_of(film);
+  format_of(film);
   if (film.extension() == ".gif" && frames_per_second > 50)
     throw InputError(fmt::format("{}: a GIF shows at most 50 frames a second, not {}; choose .mp4 or .webm",
                                  film.string(), frames_per_second));
+  if (!detail::is_in_path("ffmpeg"))
+    throw InputError(
+        fmt::format("{}: films are made by ffmpeg, and there is none in PATH; install it, or add it to PATH",
+                    film.string()));
+}
+
+void make_film(const std::vector<fs::path>& frames, double frames_per_second, const fs::path& film) {
+  require_film_possible(frames_per_second, film);
+  const Format& format = format_of(film);
   require_all_good(frames);
   Image8 image = with_even_sides(read_png(frames[0]));
   const int width = image.width, height = image.height;

@@ -9,6 +9,10 @@
 
 namespace limber::render {
 
+// What make_film would say of these before it looks at any frame: another ending, frames_per_second, no
+// ffmpeg.
+void require_film_possible(double frames_per_second, const fs::path& film);
+
 // By the ffmpeg in PATH, as the file's name ends: .mp4, H.264 (yuv420p, BT.709, crf 18); .webm, VP9 (the
 // same, crf 30); .gif, 256 colours chosen for the whole, at most 50 frames a second. Every frame is looked at
 // first; nothing is written when one is missing or damaged. An odd width or height gets its last column or

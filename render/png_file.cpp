@@ -122,7 +122,8 @@ std::optional<PngInfo> inspect(std::string_view file) {
     const std::string_view type = file.substr(at + 4, 4), data = file.substr(at + 8, length);
     const auto checksum = crc32(0, reinterpret_cast<const Bytef*>(type.data()), uInt(length + 4));
     if (checksum != big_endian(&file[at + 8 + length])) return std::nullopt;
-    if (type == "IHDR" && length == 13) {
+    if (type == "IHDR") {
+      if (length != 13 || at != signature.size()) return std::nullopt;  // one, and it comes first
       info.width = int(big_endian(data.data())), info.height = int(big_endian(data.data() + 4));
     } else if (type == "tEXt") {
       if (const std::size_t end = data.find('\0'); end != data.npos)
@@ -147,7 +148,12 @@ WholeFile read_whole(const fs::path& path) {
   auto info = inspect(file);
   if (!info)
     throw InputError(fmt::format("{}: is not a PNG, is cut short or damaged; make it again", path.string()));
-  if (std::int64_t(info->width) * info->height > (1 << 28))
+  // Deflate makes at most a thousandth of a row of nothing.
+  const std::int64_t pixels = std::int64_t(info->width) * info->height;
+  if (pixels / 8 > 1100 * std::int64_t(file.size()))
+    throw InputError(fmt::format("{}: {} bytes cannot hold {} × {} pixels; make it again", path.string(),
+                                 file.size(), info->width, info->height));
+  if (pixels > (1 << 27))
     throw InputError(
         fmt::format("{}: {} × {} pixels are too many", path.string(), info->width, info->height));
   return {std::move(file), std::move(*info)};

@@ -119,6 +119,10 @@ void edit(Node& root, const std::string& set) {
     throw InputError(
         fmt::format("{}: there is no key=value; write for example --set planner.seed=7", source));
   std::vector<std::string> parts = split_path(std::string_view(set).substr(0, equals));
+  if (constexpr std::size_t most_parts = 16; parts.size() > most_parts)
+    throw InputError(
+        fmt::format("{}: its key has {} parts, and none of a scene has more than five; see docs/scene.md",
+                    source, parts.size()));
   Node* node = &root;
   std::string path;  // of the schema
   for (std::size_t i = 0; i < parts.size(); ++i) {
@@ -452,9 +456,14 @@ void read_bodies(const Node& root, Scene& scene) {
     BodySpec body = read_body(table, scene.bounds_m);
     for (const auto* bodies : {&scene.bodies, &scene.scenery})
       for (const BodySpec& other : *bodies)
-        if (other.name == body.name)
+        if (same_but_for_case(other.name, body.name))
           complain(child(table, "name"),
-                   fmt::format("two bodies are called \"{}\"; give each its own name", body.name));
+                   other.name == body.name
+                       ? fmt::format("two bodies are called \"{}\"; give each its own name", body.name)
+                       : fmt::format(
+                             "bodies are called \"{}\" and \"{}\", which is one folder on some disks; give "
+                             "them names that differ in more than capitals",
+                             other.name, body.name));
     if (body.role == Role::scenery) {
       scene.scenery.push_back(std::move(body));
       continue;
@@ -647,11 +656,11 @@ std::vector<CameraSpec> read_cameras(const Node& root, const Scene& scene) {
   for (const Node& table : list(root, "cameras")) {
     const std::string& name = text(table, "name");
     for (const CameraSpec& other : cameras)
-      if (other.name == name)
+      if (same_but_for_case(other.name, name))
         complain(child(table, "name"),
                  fmt::format(
-                     "two cameras are called \"{}\" (\"main\" is the table camera); give each its own name",
-                     name));
+                     "two cameras are called \"{}\" (\"main\" is the table camera){}; give each its own name",
+                     name, other.name == name ? "" : ", but for capitals"));
     cameras.push_back(read_camera(table, scene, name));
   }
   return cameras;
@@ -744,7 +753,7 @@ Scene read_scene(const std::string& toml, const std::string& name_for_messages,
 }
 
 Scene read_scene_file(const fs::path& file, const std::vector<std::string>& sets) {
-  Scene scene = read_scene(read_file(file), file.string(), sets);
+  Scene scene = read_scene(read_file(file, most_scene_bytes), file.string(), sets);
   scene.folder = fs::absolute(file).parent_path();
   return scene;
 }

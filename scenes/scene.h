@@ -229,6 +229,7 @@ struct Scene {
 // `sets` are edits "a.b.c=value" made before the text is checked; bodies.robot.x addresses a body by its
 // name, and bodies.robot.friction is short for bodies.robot.material.friction. A value that is not TOML is
 // taken as a text. Throws InputError "NAME:line:column: what; what to try" with the first complaint.
+inline constexpr std::uintmax_t most_scene_bytes = 16 << 20;
 Scene read_scene(const std::string& text, const std::string& name_for_messages,
                  const std::vector<std::string>& sets = {});
 Scene read_scene_file(const fs::path&, const std::vector<std::string>& sets = {});

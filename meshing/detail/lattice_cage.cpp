@@ -60,10 +60,12 @@ std::vector<int> cells_near(const CageModel& model, const Lattice& lattice) {
   // less than a half: so they lie within [−1, 1.5] cells of the lower corner.
   const double to_middle = 0.25, half_width = 1.25;
   std::vector<bool> near(std::size_t(lattice.cell_count()));
-  for (const Tri& triangle : model.triangles) {
+  for (const TrianglePiece& piece : model.tree.pieces()) {
     std::array<Vec3, 3> p;
-    Box box;
-    for (int k = 0; k < 3; ++k) box.include(p[k] = (triangle[k] - lattice.origin) / lattice.spacing);
+    for (int k = 0; k < 3; ++k)
+      p[k] = (model.triangles[piece.triangle][k] - lattice.origin) / lattice.spacing;
+    const Box box{(piece.box.lower - lattice.origin) / lattice.spacing,
+                  (piece.box.upper - lattice.origin) / lattice.spacing};
     const Vec3 n = (p[1] - p[0]).cross(p[2] - p[0]);
     const double reach = (half_width + 1e-6) * n.cwiseAbs().sum();  // of a cell's box along n
     const Cell first = (box.lower.array() - 1.5).floor().cast<int>(),

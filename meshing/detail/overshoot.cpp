@@ -5,6 +5,7 @@
 #include <cmath>
 #include <utility>
 
+#include "core/progress.h"
 #include "core/random.h"
 
 namespace limber::meshing::detail {
@@ -46,6 +47,7 @@ SurfaceDistance::SurfaceDistance(const Points& positions, const Triangles& trian
 }
 
 double SurfaceDistance::at(const Vec3& point) const {
+  throw_if_stopped();
   double best = 1e300;
   std::array<std::pair<double, int>, 64> stack;
   std::size_t depth = 0;

@@ -2,6 +2,7 @@
 
 #include <fcntl.h>
 #include <sys/mman.h>
+#include <sys/prctl.h>
 #include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -63,6 +64,7 @@ void limit_memory() {
 [[noreturn]] void be_the_child(const std::function<std::string()>& work, int cpu_seconds, int fd) {
   std::signal(SIGINT, SIG_DFL);
   std::signal(SIGTERM, SIG_DFL);
+  prctl(PR_SET_PDEATHSIG, SIGKILL);           // or it would hold the parent's locks when that is killed
   alarm(unsigned(clock_limit(cpu_seconds)));  // it may wait for ever for a file that the model names
   if (const int nowhere = open("/dev/null", O_WRONLY | O_CLOEXEC); nowhere >= 0)
     dup2(nowhere, STDOUT_FILENO), dup2(nowhere, STDERR_FILENO);  // stdout is for data, and a crash is chatty
@@ -94,9 +96,13 @@ OwnProcessResult run_in_own_process(const std::function<std::string()>& work, in
   if (child == 0) be_the_child(work, cpu_seconds, answer.fd);
 
   int status = 0;
-  while (waitpid(child, &status, 0) < 0) {
-    LIMBER_CHECK(errno == EINTR, errno);
-    if (stop_signal()) kill(child, SIGKILL);
+  // Asked again and again: a signal that comes just before a wait would not end it.
+  for (pid_t ended = 0; ended != child; ended = waitpid(child, &status, stop_signal() ? 0 : WNOHANG)) {
+    LIMBER_CHECK(ended == 0 || errno == EINTR, errno);
+    if (stop_signal())
+      kill(child, SIGKILL);
+    else
+      usleep(2000);
   }
   throw_if_stopped();
   if (WIFSIGNALED(status)) {

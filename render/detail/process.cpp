@@ -9,13 +9,23 @@
 #include <unistd.h>
 
 #include <cerrno>
+#include <cstdlib>
 #include <cstring>
+#include <sstream>
 
 #include "core/error.h"
 
 extern char** environ;
 
 namespace limber::render::detail {
+
+bool is_in_path(const std::string& program) {
+  const char* path = std::getenv("PATH");
+  std::istringstream folders(path ? path : "/bin:/usr/bin");  // as posix_spawnp
+  for (std::string folder; std::getline(folders, folder, ':');)
+    if (::access(((folder.empty() ? "." : folder) + "/" + program).c_str(), X_OK) == 0) return true;
+  return false;
+}
 
 Process::Process(const std::vector<std::string>& argv) {
   // A socket, because send() can be told not to raise SIGPIPE when the other side is gone; a memory file,

@@ -621,7 +621,7 @@ constexpr Key all_keys[] = {
     {"cameras[].fill", Type::number, {0.01, 1}, 0, "0.88", "as of `camera`", "", ""},
 
     {"film", Type::table, {}, 0, "{}", "what is rendered", "", ""},
-    {"film.size_px", Type::integers, from_to(16, 16384), 2, "[1920, 1080]", "pixels; width and height", "",
+    {"film.size_px", Type::integers, from_to(16, 8192), 2, "[1920, 1080]", "pixels; width and height", "",
      ""},
     {"film.frames_per_second", Type::integer, from_to(1, 1000), 0, "30",
      "of the film, and, but for `speed`, of the states that a plan stores", "", ""},
@@ -930,21 +930,6 @@ void check_table(Node& node, const std::string& path, const std::string& shown) 
 }
 
 // Edits that turn a into b: insert, delete, replace, swap two neighbours.
-std::size_t edit_distance(std::string_view a, std::string_view b) {
-  std::vector<std::vector<std::size_t>> d(a.size() + 1, std::vector<std::size_t>(b.size() + 1));
-  for (std::size_t i = 0; i <= a.size(); ++i)
-    for (std::size_t j = 0; j <= b.size(); ++j) {
-      if (i == 0 || j == 0) {
-        d[i][j] = i + j;
-        continue;
-      }
-      d[i][j] = std::min({d[i - 1][j] + 1, d[i][j - 1] + 1, d[i - 1][j - 1] + (a[i - 1] != b[j - 1])});
-      if (i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1])
-        d[i][j] = std::min(d[i][j], d[i - 2][j - 2] + 1);
-    }
-  return d[a.size()][b.size()];
-}
-
 }  // namespace
 
 bool Interval::holds(double x) const {
@@ -1070,17 +1055,6 @@ std::vector<const Key*> keys_in(std::string_view path) {
   for (const Key& key : all_keys)
     if (key.parent() == path) made.push_back(&key);
   return made;
-}
-
-std::string nearest(std::string_view word, std::span<const std::string> known) {
-  std::string best;
-  std::size_t best_distance = std::max<std::size_t>(2, word.size() / 3) + 1;
-  for (const std::string& candidate : known) {
-    const bool is_start = word.size() >= 3 && candidate.starts_with(word);
-    const std::size_t distance = is_start ? 1 : edit_distance(word, candidate);
-    if (distance < std::min(best_distance, candidate.size())) best = candidate, best_distance = distance;
-  }
-  return best;
 }
 
 std::string suggestion(std::string_view parent_path, std::string_view unknown) {

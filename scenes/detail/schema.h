@@ -8,6 +8,7 @@
 #include <string_view>
 #include <vector>
 
+#include "core/words.h"
 #include "scenes/detail/document.h"
 
 namespace limber::scenes {
@@ -68,10 +69,6 @@ std::vector<const Key*> keys_in(std::string_view path);
 // What to try instead of an unknown key: the table it belongs into, the key meant, or a list of those that
 // may stand there.
 std::string suggestion(std::string_view parent_path, std::string_view unknown);
-
-// The one of `known` that is nearest to `word` by edit distance, when it is near enough to be meant; else
-// empty.
-std::string nearest(std::string_view word, std::span<const std::string> known);
 
 // Throws InputError at the first thing that is not as the table of keys says: unknown key, wrong type, out of
 // range, required key that lacks. Then puts in the defaults. After this every typed read by a path of the

@@ -17,6 +17,8 @@ void write_seeds(const limber::fs::path& folder) {
     limber::make_folder(folder / target.name);
     for (std::size_t i = 0; i < target.seeds.size(); ++i)
       limber::write_file(folder / target.name / fmt::format("seed_{}", i), target.seeds[i]);
+    for (std::size_t i = 0; i < target.hostile.size(); ++i)
+      limber::write_file(folder / target.name / fmt::format("hostile_{}", i), target.hostile[i]);
     std::puts(target.name.c_str());
   }
 }

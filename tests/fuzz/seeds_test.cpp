@@ -14,6 +14,12 @@ TEST(Seeds, EachIsTaken) {
     for (const std::string& seed : target.seeds) EXPECT_NO_THROW(target.read(seed)) << target.name;
 }
 
+TEST(Seeds, EachHostileOneIsRefused) {
+  for (const Target& target : targets())
+    for (std::size_t i = 0; i < target.hostile.size(); ++i)
+      EXPECT_THROW(target.read(target.hostile[i]), InputError) << target.name << " " << i;
+}
+
 TEST(Seeds, EveryPrefixIsAnAnswer) {
   for (const Target& target : targets())
     for (const std::string& seed : target.seeds)

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <fstream>
+#include <limits>
 
 #include "core/contact_shape_file.h"
 #include "core/error.h"
@@ -15,6 +16,7 @@
 #include "meshing/import.h"
 #include "plan/plan_file.h"
 #include "scenes/scene.h"
+#include "tests/core/deflated_zip.h"
 #include "tests/core/temporary_folder.h"
 
 namespace limber::fuzz {
@@ -59,6 +61,7 @@ plan::Plan small_plan() {
   made.trajectory.controls = {Control{}};
   made.trajectory.frames = {state, state};
   made.trajectory.end = state;
+  made.settings.goal.radius_m = 1;
   return made;
 }
 
@@ -232,6 +235,56 @@ keyframes = [{ at = 0, eye_m = [0, 0, 9], target_m = [1, 1, 1] }]
 )";
 }
 
+std::string nested(int depth, std::string_view opening, std::string_view closing) {
+  std::string text;
+  for (int i = 0; i < depth; ++i) text += opening;
+  text += '1';
+  for (int i = 0; i < depth; ++i) text += closing;
+  return text;
+}
+
+std::vector<std::string> hostile_scenes() {
+  std::string key = "a";
+  for (int i = 1; i < 20000; ++i) key += ".a";
+  return {key + " = 1\n", "[" + key + "]\n", "x = " + nested(20000, "[", "]"),
+          "x = " + nested(200, "{ a.b.c.d = ", " }")};
+}
+
+// Whoever changes a plan can write its hashes, too.
+std::vector<std::string> hostile_plans() {
+  constexpr float nan = std::numeric_limits<float>::quiet_NaN();
+  constexpr std::int32_t most = std::numeric_limits<std::int32_t>::max();
+  const auto fps = [](double value) {
+    return [value](plan::Plan& p) { p.settings.frames_per_second = p.trajectory.frames_per_second = value; };
+  };
+  std::vector<std::string> files;
+  for (const std::function<void(plan::Plan&)>& change : std::vector<std::function<void(plan::Plan&)>>{
+           fps(0), fps(-1), fps(1e9), fps(1e-300),
+           [](plan::Plan& p) { p.trajectory.controls[0].steps = most; },
+           [](plan::Plan& p) { p.trajectory.controls[0].node = -7; },
+           [](plan::Plan& p) { p.trajectory.controls[0].force_n.x() = nan; },
+           [](plan::Plan& p) { p.trajectory.frames[0].positions[0] = nan; },
+           [](plan::Plan& p) { p.tree.centers.x[0] = nan; },
+           [](plan::Plan& p) { p.trajectory.frames.clear(); },
+           [](plan::Plan& p) { p.statistics.iterations = std::int64_t(1) << 62; }}) {
+    plan::Plan bad = small_plan();
+    change(bad);
+    files.push_back(packed(written("bad.npz", [&](const fs::path& p) { plan::write_plan(p, bad, {}); })));
+  }
+  Npz deep = read_npz(folder() / "plan.npz");
+  deep.texts["meta.json"] = nested(10000, "[", "]");
+  files.push_back(packed(written("bad.npz", [&](const fs::path& p) { write_npz(p, deep); })));
+  return files;
+}
+
+std::vector<std::string> hostile_archives() {
+  const std::vector<float> zeros(20'000'000, 0.f);
+  std::string lies = npy_file(NpyArray::of<float>(std::span(zeros).first(4), {4}));
+  lies.replace(lies.find("(4,)"), 4, "(9,)");
+  return {deflated_zip("a.npy", npy_file(NpyArray::of<float>(zeros, {std::int64_t(zeros.size())}))),
+          deflated_zip("a.npy", lies)};
+}
+
 std::vector<Target> made_targets() {
   const std::string npz = written("binding.npz", [](const fs::path& p) {
     ffd::Binding binding{Eigen::VectorXi::Zero(5), Weights::Zero(5, 4)};
@@ -276,15 +329,22 @@ std::vector<Target> made_targets() {
        {written("cage.msh",
                 [](const fs::path& p) {
                   write_msh(p, cage(), {0, 7});
-                })}},
-      {"npz", [](auto bytes) { read_npz(file_of(bytes, "a.npz")); }, {npz, plan_npz}},
+                })},
+       {"root:x:0:0:root:/root:/bin/sh\n"}},
+      {"npz", [](auto bytes) { read_npz(file_of(bytes, "a.npz")); }, {npz, plan_npz}, hostile_archives()},
       {"binding", [](auto bytes) { ffd::read_binding(npz_of(bytes), surface(), cage()); }, {packed(npz)}},
       {"contact",
        [](auto bytes) { read_contact_shape(npz_of(bytes), surface(), cage()); },
        {packed(contact_npz)}},
-      {"plan", [](auto bytes) { plan::read_plan(npz_of(bytes)); }, {packed(plan_npz)}},
-      {"json", [](auto bytes) { read_json(file_of(bytes, "a.json")).dump(); }, {report}},
-      {"scene", [](auto bytes) { scenes::read_scene(std::string(bytes), "scene.toml"); }, {scene_seed()}}};
+      {"plan", [](auto bytes) { plan::read_plan(npz_of(bytes)); }, {packed(plan_npz)}, hostile_plans()},
+      {"json",
+       [](auto bytes) { read_json(file_of(bytes, "a.json")).dump(); },
+       {report},
+       {nested(200000, "[", "]"), nested(200000, "{\"a\":", "}")}},
+      {"scene",
+       [](auto bytes) { scenes::read_scene(std::string(bytes), "scene.toml"); },
+       {scene_seed()},
+       hostile_scenes()}};
 }
 
 }  // namespace

@@ -15,6 +15,8 @@ struct Target {
   // finding.
   std::function<void(std::string_view bytes)> read;
   std::vector<std::string> seeds;  // good files, all of which read() takes
+  // Files that once crashed, hung or ate the memory of whoever read them: each is an InputError.
+  std::vector<std::string> hostile = {};
 };
 
 const std::vector<Target>& targets();

@@ -3,8 +3,12 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
+#include <csignal>
 #include <vector>
 
+#include "core/error.h"
+#include "core/progress.h"
 #include "core/random.h"
 #include "tests/meshing/cage_models.h"
 
@@ -165,6 +169,98 @@ TEST(SurfaceTree, AnswersDoNotDependOnTheOrderOfTheTriangles) {
     ASSERT_EQ(tree.closest_point(p), other.closest_point(p));
   }
   ASSERT_EQ(tree.closest_point(Vec3::Zero()), other.closest_point(Vec3::Zero()));  // many are equally near
+}
+
+// A rod askew, of needles as long as itself: no question to the tree may have to ask all of them.
+SurfaceMesh rod_of_needles(int sides, double radius) {
+  SurfaceMesh rod{Points(2 * sides, 3), Triangles(4 * sides - 4, 3)};
+  const Vec3 along = Vec3(0.5, 1, 0.1), u = along.cross(Vec3::UnitX()).normalized(),
+             v = along.cross(u).normalized();
+  for (int i = 0; i < sides; ++i) {
+    const double turn = 2 * EIGEN_PI * i / sides;
+    const Vec3 out = radius * (std::cos(turn) * u + std::sin(turn) * v);
+    rod.positions.row(i) = (Vec3(-2.9, 1, 0.6) + out).transpose();
+    rod.positions.row(sides + i) = (Vec3(-2.9, 1, 0.6) + along + out).transpose();
+    const int next = (i + 1) % sides;
+    rod.triangles.row(2 * i) << i, next, sides + next;
+    rod.triangles.row(2 * i + 1) << i, sides + next, sides + i;
+  }
+  for (int i = 1; i + 1 < sides; ++i) {
+    rod.triangles.row(2 * sides + i - 1) << 0, i + 1, i;
+    rod.triangles.row(3 * sides + i - 3) << sides, sides + i, sides + i + 1;
+  }
+  return rod;
+}
+
+TEST(TrianglePieces, CoverTheirTrianglesAndAreCloseToThem) {
+  const SurfaceMesh rod = rod_of_needles(200, 1e-3);
+  const auto pieces = detail::pieces_of(rod.positions, rod.triangles);
+  EXPECT_GT(pieces.size(), 20u * std::size_t(rod.triangles.rows()));
+  EXPECT_TRUE(std::is_sorted(pieces.begin(), pieces.end(),
+                             [](const auto& a, const auto& b) { return a.triangle < b.triangle; }));
+  Rng rng(5, 0);
+  for (std::size_t first = 0; first < pieces.size();) {
+    std::size_t last = first;
+    const int f = pieces[first].triangle;
+    while (last < pieces.size() && pieces[last].triangle == f) ++last;
+    for (int trial = 0; trial < 20; ++trial) {
+      const double a = rng.uniform(0, 1), b = rng.uniform(0, 1 - a);
+      const Vec3 p = a * rod.positions.row(rod.triangles(f, 0)).transpose() +
+                     b * rod.positions.row(rod.triangles(f, 1)).transpose() +
+                     (1 - a - b) * rod.positions.row(rod.triangles(f, 2)).transpose();
+      EXPECT_TRUE(std::any_of(pieces.begin() + std::ptrdiff_t(first), pieces.begin() + std::ptrdiff_t(last),
+                              [&](const auto& piece) {
+                                return ((p - piece.box.lower).array() >= -1e-15).all() &&
+                                       ((piece.box.upper - p).array() >= -1e-15).all();
+                              }))
+          << f;
+    }
+    first = last;
+  }
+  for (const auto& piece : pieces) EXPECT_LT(piece.box.diagonal(), 1.2 / 64) << piece.triangle;
+  // What lies along the axes is close already, and fat triangles are not helped.
+  const SurfaceMesh sliver = one_triangle({0, 0, 0}, {1, 0, 0}, {0, 1e-6, 0}),
+                    fat = one_triangle({0, 0, 0}, {1, 1, 0}, {0, 1, 1});
+  EXPECT_EQ(detail::pieces_of(sliver.positions, sliver.triangles).size(), 1u);
+  EXPECT_EQ(detail::pieces_of(fat.positions, fat.triangles).size(), 1u);
+}
+
+// Meetings as clipping finds them, nearest points as of each triangle alone.
+TEST(SurfaceTree, OfNeedlesAnswersAsOfEachNeedleAlone) {
+  const SurfaceMesh rod = rod_of_needles(12, 1e-3);
+  const SurfaceTree tree(rod.positions, rod.triangles);
+  Rng rng(6, 0);
+  int met = 0;
+  for (int trial = 0; trial < 100; ++trial) {
+    const Vec3 on_rod = Vec3(-2.9, 1, 0.6) + rng.uniform(-0.1, 1.1) * Vec3(0.5, 1, 0.1);
+    std::array<Vec3, 4> t;
+    for (Vec3& corner : t) corner = on_rod + random_point(rng, 0.05);
+    std::vector<int> alone;
+    double nearest = 1e300;
+    for (int f = 0; f < rod.triangles.rows(); ++f) {
+      const auto corner = [&](int k) { return Vec3(rod.positions.row(rod.triangles(f, k)).transpose()); };
+      const SurfaceMesh one = one_triangle(corner(0), corner(1), corner(2));
+      const SurfaceTree judge(one.positions, one.triangles);
+      if (clipped_triangle_is_left(t, {corner(0), corner(1), corner(2)})) alone.push_back(f);
+      nearest = std::min(nearest, (judge.closest_point(t[0]) - t[0]).norm());
+    }
+    EXPECT_EQ(tree.triangles_meeting_tet(t[0], t[1], t[2], t[3]), alone);
+    EXPECT_EQ(tree.meets_tet(t[0], t[1], t[2], t[3]), !alone.empty());
+    EXPECT_EQ((tree.closest_point(t[0]) - t[0]).norm(), nearest);
+    met += !alone.empty();
+  }
+  EXPECT_GT(met, 20);
+  EXPECT_LT(met, 90);
+}
+
+// Whoever waits for an answer may be told to stop.
+TEST(SurfaceTree, StopsForASignal) {
+  const SurfaceMesh m = one_triangle({0, 0, 0}, {1, 0, 0}, {0, 1, 0});
+  const SurfaceTree tree(m.positions, m.triangles);
+  request_stop(SIGTERM);
+  EXPECT_THROW(tree.meets_tet({0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}), Interrupted);
+  EXPECT_THROW(tree.closest_point({0, 0, 0}), Interrupted);
+  request_stop(0);
 }
 
 }  // namespace

@@ -160,10 +160,10 @@ TEST_F(PlanFileTest, WhatSleepsIsWrittenOnce) {
   p.tree.add(state, -1, {}, -1, Vec3f::Zero());
   for (int n = 1; n < 1000; ++n) {
     state.step = n, state.positions[5] = float(n);
-    p.tree.add(state, n - 1, {}, n - 1, Vec3f::Zero());
+    p.tree.add(state, n - 1, {.steps = 1}, n - 1, Vec3f::Zero());
   }
   p.settings = toy_settings();
-  p.trajectory.end = state, p.trajectory.frames = {state};
+  p.trajectory.end = p.tree.states[0], p.trajectory.frames = {p.trajectory.end};
   write_plan(file(), p, {});
   EXPECT_EQ(read_npz(file()).array("tree_pieces").shape.at(0), 42 + 999);  // the start's, and one a node
   expect_same(read_plan(file()).plan, p);
@@ -209,6 +209,72 @@ TEST_F(PlanFileTest, APlanOfAnOlderPlannerIsToBeMadeAnew) {
     for (const char* part : {"older.npz", "made by an older limber", "'hold'", "plan anew"})
       EXPECT_NE(text.find(part), std::string::npos) << text;
   }
+}
+
+// Whoever changes a plan can write its hashes, too: so each number is looked at.
+TEST_F(PlanFileTest, NumbersThatNoPlanHasAreInputErrors) {
+  const Plan good = plan(Toy(5, true, true, 1.6f), toy_settings());
+  ASSERT_TRUE(good.solved());
+  constexpr double nan = std::numeric_limits<double>::quiet_NaN(),
+                   inf = std::numeric_limits<double>::infinity();
+  const auto fps = [](double value) {
+    return [value](Plan& p) { p.settings.frames_per_second = p.trajectory.frames_per_second = value; };
+  };
+  const std::vector<std::pair<const char*, std::function<void(Plan&)>>> changes{
+      {"frames_per_second", fps(0)},
+      {"frames_per_second", fps(-1)},
+      {"frames_per_second", fps(1e9)},
+      {"frames_per_second", fps(1e-300)},
+      {"frames_per_second", [](Plan& p) { p.trajectory.frames_per_second *= 2; }},
+      {"do not last as long",
+       [](Plan& p) { p.trajectory.end.step = std::numeric_limits<std::int32_t>::max(); }},
+      {"last longer",
+       [](Plan& p) { p.trajectory.controls[0].steps = std::numeric_limits<std::int32_t>::max(); }},
+      {"path_node[0]",
+       [](Plan& p) {
+         p.trajectory.controls[0].manipulation = Manipulation::control_point;
+         p.trajectory.controls[0].node = -7;
+       }},
+      {"path_node[0]", [](Plan& p) { p.trajectory.controls[0].node = -2; }},
+      {"path_force_n[1]", [=](Plan& p) { p.trajectory.controls[1].force_n.y() = float(nan); }},
+      {"tree_target_m[1]", [=](Plan& p) { p.tree.controls[1].target_m.z() = float(inf); }},
+      {"tree_center_m[1]", [=](Plan& p) { p.tree.centers.x[1] = float(nan); }},
+      {"frame_positions[2]", [=](Plan& p) { p.trajectory.frames[2].positions[4] = float(nan); }},
+      {"end_velocities[0]", [=](Plan& p) { p.trajectory.end.velocities[0] = float(inf); }},
+      {"frame_positions", [](Plan& p) { p.trajectory.frames.clear(); }},
+      {"frame 2 is before", [](Plan& p) { p.trajectory.frames[2].step = 0; }},
+      {"node 1 is at step", [](Plan& p) { ++p.tree.controls[1].steps; }},
+      {"node 1 is of iteration", [](Plan& p) { p.tree.iterations[1] = std::int64_t(1) << 62; }},
+      {"statistics.iterations", [](Plan& p) { p.statistics.iterations = std::int64_t(1) << 62; }},
+      {"statistics.iterations", [](Plan& p) { p.statistics.iterations = most_iterations + 1; }},
+      {"statistics.diverged", [](Plan& p) { p.statistics.diverged = -1; }},
+      {"best_distance_m", [](Plan& p) { p.best_distance_m = -1; }},
+      {"max_iterations", [](Plan& p) { p.settings.max_iterations = std::int64_t(1) << 62; }},
+      {"goal_bias", [](Plan& p) { p.settings.goal_bias = 2; }},
+      {"settle_steps", [](Plan& p) { p.trajectory.settle_steps = -1; }}};
+  for (const auto& [named, change] : changes) {
+    Plan bad = good;
+    change(bad);
+    write_plan(file(), bad, {});
+    try {
+      read_plan(file());
+      FAIL() << named;
+    } catch (const InputError& error) {
+      EXPECT_NE(std::string(error.what()).find(named), std::string::npos) << error.what();
+      EXPECT_NE(std::string(error.what()).find("again"), std::string::npos) << error.what();
+    }
+  }
+}
+
+// A replay has the frames of the file: how long it takes is told by how large that is.
+TEST_F(PlanFileTest, FramesStandAtTheirTimes) {
+  const Toy toy(5, true, true, 1.6f);
+  Plan p = plan(toy, toy_settings());
+  EXPECT_NO_THROW(require_frame_times(p.trajectory, toy.dt_s(), "a"));
+  EXPECT_THROW(require_frame_times(p.trajectory, toy.dt_s() / 2, "a"), InputError);
+  EXPECT_THROW(require_frame_times(p.trajectory, toy.dt_s() * 2, "a"), InputError);
+  p.trajectory.frames.pop_back();
+  EXPECT_THROW(require_frame_times(p.trajectory, toy.dt_s(), "a"), InputError);
 }
 
 TEST_F(PlanFileTest, AParentThatComesLaterIsAnInputError) {

@@ -1,6 +1,7 @@
 #include "render/png_file.h"
 
 #include <gtest/gtest.h>
+#include <zlib.h>
 
 #include <algorithm>
 #include <fstream>
@@ -79,6 +80,46 @@ TEST(PngFile, EveryPrefixAndEveryChangedByteIsRecognised) {
     bad[at] = char(bad[at] ^ 0x10);
     write_quickly(folder / "a.png", bad);
     EXPECT_EQ(frame_hash(folder / "a.png"), std::nullopt) << at;
+  }
+}
+
+// A chunk: length, kind, data, checksum of kind and data (PNG, section 5.3).
+std::string chunk(const std::string& kind, const std::string& data) {
+  const auto big_endian = [](std::uint32_t n) {
+    std::string bytes;
+    for (int shift = 24; shift >= 0; shift -= 8) bytes += char(n >> shift & 255);
+    return bytes;
+  };
+  const std::string body = kind + data;
+  std::string bytes = big_endian(std::uint32_t(data.size()));
+  bytes += body;
+  return bytes +
+         big_endian(std::uint32_t(crc32(0, reinterpret_cast<const Bytef*>(body.data()), uInt(body.size()))));
+}
+
+// One header for those who look and one for those who decode.
+TEST(PngFile, OneHeaderComesFirstAndSaysNoMoreThanTheFileCanHold) {
+  const Folder folder;
+  const auto header = [](char high) {  // high << 8 pixels, both ways, 8 bits of grey
+    return std::string("\0\0", 2) + high + std::string("\0\0\0", 3) + high + std::string("\0\10\0\0\0\0", 6);
+  };
+  const std::string signature = "\x89PNG\r\n\x1a\n", end = chunk("IEND", ""), pixels = chunk("IDAT", "x");
+  const auto refused = [&](const std::string& chunks) {
+    std::string bytes = signature;
+    bytes += chunks;
+    std::ofstream(folder.path / "a.png", std::ios::binary) << bytes;
+    EXPECT_THROW(read_png(folder.path / "a.png"), InputError);
+    EXPECT_THROW(read_png_16(folder.path / "a.png"), InputError);
+    return !inspect_png(folder.path / "a.png");
+  };
+  EXPECT_TRUE(refused(chunk("IHDR", header(64)) + chunk("IHDR", header(1)) + pixels + end));
+  EXPECT_TRUE(refused(chunk("tEXt", std::string("a\0b", 3)) + chunk("IHDR", header(1)) + pixels + end));
+  EXPECT_FALSE(refused(chunk("IHDR", header(40)) + pixels + end));  // of one piece, and yet it cannot be
+  try {
+    read_png(folder.path / "a.png");
+  } catch (const InputError& error) {
+    EXPECT_NE(std::string(error.what()).find("cannot hold 10240 × 10240 pixels"), std::string::npos)
+        << error.what();
   }
 }
 

@@ -333,6 +333,19 @@ TEST(ReadScene, EmptyTextsSayWhereToStart) {
     EXPECT_THAT(complaint(text), StartsWith("s.toml:1:1: the scene is empty; start from"));
 }
 
+// Names become folders, and on some disks capitals do not tell them apart.
+TEST(ReadScene, NamesThatDifferInCapitalsAloneAreRefused) {
+  EXPECT_THAT(complaint(replaced(good, "name = \"gate\"", "name = \"Robot\"")),
+              HasSubstr("bodies are called \"robot\" and \"Robot\", which is one folder on some disks"));
+  EXPECT_THAT(complaint(replaced(good, "name = \"side\"", "name = \"MAIN\"")),
+              HasSubstr("two cameras are called \"MAIN\""));
+}
+
+TEST(ReadScene, APictureLargerThanTheRendererDrawsIsRefused) {
+  EXPECT_THAT(complaint(good + "[film]\nsize_px = [8193, 100]\n"), HasSubstr("8192"));
+  EXPECT_EQ(complaint(good + "[film]\nsize_px = [8192, 100]\n"), "no complaint");
+}
+
 TEST(ReadScene, MissingFile) { EXPECT_THROW(read_scene_file("/no/such/scene.toml"), InputError); }
 
 TEST(Sets, EditBeforeReading) {
@@ -399,6 +412,29 @@ TEST(ReadScene, EveryDeletedOrChangedCharacterIsReadOrRefused) {
     text[n] = char(rng.below(256));
     ASSERT_TRUE(reads_or_complains(text)) << n << " " << int(text[n]);
   }
+}
+
+// toml++ builds a table for each part, and takes them down by calling itself.
+TEST(ReadScene, KeysOfManyPartsAreRefused) {
+  for (const int parts : {17, 20000}) {
+    std::string key = "a";
+    for (int i = 1; i < parts; ++i) key += i % 3 ? ".a" : " . \"b\"";
+    for (const std::string& line : {key + " = 1\n", "[" + key + "]\n", "x = { " + key + " = 1 }\n"})
+      EXPECT_THAT(complaint("# 1.2.3.4.5.6.7.8.9.0.1.2.3.4.5.6.7.8\n" + line),
+                  StartsWith("s.toml:2:1: a key has more"));
+    EXPECT_THAT(complaint(good, {key + "=1"}), HasSubstr("its key has"));
+    EXPECT_THAT(complaint(good, {"world={ " + key + " = 1 }"}), HasSubstr("a key has more than 16 parts"));
+  }
+  // Short keys in inline tables in inline tables.
+  std::string nested = "1";
+  for (int i = 0; i < 80; ++i) nested = "{ a.b = " + nested + " }";
+  EXPECT_THAT(complaint("x = " + nested), HasSubstr("more than 64 deep"));
+  // Dots that part no keys.
+  const std::string dots(100, '.');
+  const std::string texts = "description = \"" + dots + "\\\"\" # " + dots + "\n";
+  EXPECT_EQ(complaint(texts + good), "no complaint");
+  EXPECT_EQ(complaint("description = \"\"\"" + dots + "\n\"" + dots + "\"\"\"\n" + good), "no complaint");
+  EXPECT_EQ(complaint("description = '" + dots + "'\n" + good), "no complaint");
 }
 
 TEST(ReadScene, DeepNestingIsRefused) {
