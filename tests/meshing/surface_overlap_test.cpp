@@ -269,6 +269,12 @@ TEST(SelfOverlap, IsBeyondThatAtRest) {
   EXPECT_EQ(self_overlap(crossed, [](const Vec3& p) { return p; }).depth_m, 0);
   EXPECT_EQ(self_overlap(crossed, wound(1.05)).depth_m, 0);
   EXPECT_NEAR(self_overlap(crossed, wound(0.9)).depth_m, self_overlap(bar, wound(0.9)).depth_m, 1e-3);
+
+  // Through the end that comes to lie in the other: of what the bar holds at rest, only what the other end
+  // holds too is counted.
+  const SurfaceMesh at_end = both(bar, mapped(made_bar({0.3, 1.5, 0.25}, {4, 20, 4}),
+                                              [](const Vec3& p) { return Vec3(p + Vec3(0.2, -0.5, 0.7)); }));
+  EXPECT_NEAR(self_overlap(at_end, wound(0.9)).depth_m, self_overlap(bar, wound(0.9)).depth_m, 1e-3);
 }
 
 // Half a ball has no lid: what pierces it is found, and as deep as in a whole one.
