@@ -63,8 +63,7 @@ plan::Workspace workspace_of(const fem::World& world) {
   for (int b = 0; b < int(world.bodies.size()); ++b) {
     const fem::Body& body = world.bodies[std::size_t(b)];
     if (b == world.robot) continue;
-    const auto kind =
-        body.kind == fem::BodyKind::deformable ? plan::Workspace::soft : plan::Workspace::rigid;
+    const auto kind = body.kind == fem::BodyKind::deformable ? plan::Workspace::soft : plan::Workspace::rigid;
     if (body.shape) mark_surface(body.shape->field, kind, w);
     for (int t = 0; t < body.cage.tets.rows() && !body.shape; ++t) mark_tet(body.cage, t, kind, w);
   }
