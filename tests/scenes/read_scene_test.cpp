@@ -453,6 +453,7 @@ std::string another_value(const Key& key) {
       {"bodies[].pose.position_m", "[2, 1.5, 1.5]"},
       {"bodies[].pose.axis", "[1, 0, 0]"},
       {"bodies[].triangles", "777"},
+      {"bodies[].max_stretch", "1.5"},
       {"bodies[].model.box.size_m", "[0.9, 0.8, 0.7]"},
       {"bodies[].model.box.bevel_m", "0.2"},
       {"bodies[].model.box.triangle_m", "0.2"},
@@ -550,7 +551,6 @@ TEST(Keys, EveryKeyChangesTheScene) {
     if (key.path == "bodies[].cage.tets" || key.path == "bodies[].cage.mode" ||
         key.path == "bodies[].cage.shells")
       sets = {tets_robot};
-    if (key.path == "bodies[].max_stretch") sets = {"bodies.robot.max_stretch=3"};
     if (key.path == "bodies[].contact") sets = {"planner.preset=fast"};
     if (key.path == "planner.guidance") sets = {"planner.lag=3"};
     if (key.path == "planner.stop_in_goal" || key.path == "planner.end_hopeless")
