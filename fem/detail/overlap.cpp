@@ -57,14 +57,16 @@ struct Near {
   const Shape& shape;
   std::vector<int> tets, triangles;
   std::vector<Box> tet_boxes, triangle_boxes;
+  std::vector<Box> surface_boxes;  // of all triangles
 
   Near(const Shape& s, const Box& region) : shape(s) {
     for (int t = 0; t < s.tets.rows(); ++t)
       if (const Box box = box_of(s.positions, s.tets.row(t)); meet(box, region))
         tets.push_back(t), tet_boxes.push_back(box);
-    for (int f = 0; f < s.surface.rows(); ++f)
-      if (const Box box = box_of(s.positions, s.surface.row(f)); meet(box, region))
-        triangles.push_back(f), triangle_boxes.push_back(box);
+    for (int f = 0; f < s.surface.rows(); ++f) {
+      const Box& box = surface_boxes.emplace_back(box_of(s.positions, s.surface.row(f)));
+      if (meet(box, region)) triangles.push_back(f), triangle_boxes.push_back(box);
+    }
   }
   Vec3 corner(int node) const { return shape.positions.row(node); }
 
@@ -80,9 +82,12 @@ struct Near {
     return false;
   }
 
-  double depth(const Vec3& p) const {
+  // Any distance to a triangle that is not above `enough` will do.
+  double depth(const Vec3& p, double enough) const {
     double nearest = 1e300;
-    for (int f = 0; f < shape.surface.rows(); ++f) {
+    for (int f = 0; f < shape.surface.rows() && nearest > enough; ++f) {
+      const Box& box = surface_boxes[std::size_t(f)];
+      if ((box.lower - p).cwiseMax(p - box.upper).cwiseMax(0.0).squaredNorm() >= nearest * nearest) continue;
       const auto t = shape.surface.row(f);
       nearest = std::min(nearest, distance_to_triangle(p, corner(t[0]), corner(t[1]), corner(t[2])));
     }
@@ -148,17 +153,18 @@ void include_points_of(const Shape& a, const Shape& b, const Box& region, double
   };
   const auto is_inside = [&](const Vec3& p) { return meet(region, {p, p}) && near.contains(p); };
   for (int v : vertices_of(a.surface))
-    if (const Vec3 p = a.positions.row(v); is_inside(p)) include(p, near.depth(p));
+    if (const Vec3 p = a.positions.row(v); is_inside(p)) include(p, near.depth(p, deepest.depth_m));
   for_each_crossing_edge(a, near, region, [&](const Vec3& p, const Vec3& q, std::vector<double> at) {
     at.insert(at.begin(), 0.0), at.push_back(1.0);
     const double length = (q - p).norm();
     const auto place = [&](double share) -> Vec3 { return p + share * (q - p); };
-    const auto depth = [&](double share) { return near.depth(place(share)); };
+    Highest highest;
+    const auto depth = [&](double share) { return near.depth(place(share), highest.value); };
     for (std::size_t k = 0; k + 1 < at.size(); ++k) {
       if (!is_inside(place(0.5 * (at[k] + at[k + 1])))) continue;
+      highest = {deepest.depth_m, 0};
       // Where it crosses it is on the surface.
       const double from = k == 0 ? depth(0) : 0, to = k + 2 == at.size() ? depth(1) : 0;
-      Highest highest{deepest.depth_m, 0};
       raise_along(at[k], from, at[k + 1], to, length, halvings, depth, highest);
       include(place(highest.at), highest.value);
     }
