@@ -192,8 +192,11 @@ void Stepper<Real>::find_sleepers() {
     const auto at = [&](int body) { return std::size_t(body * lanes_ + lane); };
     for (int b = 0; b < bodies; ++b) asleep_[at(b)] = contact_[lane] ? unchanged_[at(b)] : 1;
     const auto meet = [&](int a, int b) {
+      const Real near =
+          contacts_ ? Real(0) : surface_contacts_->offset(a, b);  // surfaces push before they meet
       for (int c = 0; c < 3; ++c)
-        if (lower_[at(3 * a + c)] > upper_[at(3 * b + c)] || lower_[at(3 * b + c)] > upper_[at(3 * a + c)])
+        if (lower_[at(3 * a + c)] - near > upper_[at(3 * b + c)] ||
+            lower_[at(3 * b + c)] - near > upper_[at(3 * a + c)])
           return false;
       return true;
     };

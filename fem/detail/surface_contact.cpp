@@ -202,10 +202,10 @@ void SurfaceContacts<Real>::find_pair(int lane, const LaneView<Real>& view, std:
     }
     self_travel_[lane * bodies_ + a] += Real(world_.dt_s) * std::sqrt(fastest2);
   }
-  const Real offset = surface_.offset[a * bodies_ + b];
+  const Real apart = offset(a, b);
   for (int c = 0; c < 3; ++c) {
     const int ka = (3 * a + c) * view.stride, kb = (3 * b + c) * view.stride;
-    if (view.lower[ka] - offset > view.upper[kb] || view.lower[kb] - offset > view.upper[ka]) return;
+    if (view.lower[ka] - apart > view.upper[kb] || view.lower[kb] - apart > view.upper[ka]) return;
   }
   List& list = lists_[lane * pairs_.size() + pair];
   const Real travel = travel_of(lane, view, a, b);
@@ -305,8 +305,8 @@ void SurfaceContacts<Real>::build(const LaneView<Real>& view, int from, int into
   Real lower[3], upper[3];
   for (int c = 0; c < 3; ++c) {
     const int k = (3 * into + c) * view.stride;
-    lower[c] = view.lower[k] - surface_.offset[from * bodies_ + into];
-    upper[c] = view.upper[k] + surface_.offset[from * bodies_ + into];
+    lower[c] = view.lower[k] - offset(from, into);
+    upper[c] = view.upper[k] + offset(from, into);
   }
   collect_groups(view, from, lower, upper, reach);
   found_.clear(), found_distance_.clear(), near_tets_.clear();
@@ -444,13 +444,18 @@ bool SurfaceContacts<Real>::weights_in(const LaneView<Real>& view, int tet, cons
 template <class Real>
 bool SurfaceContacts<Real>::measure(const LaneView<Real>& view, int from, int into, int sample, int tet,
                                     const Real weight[4]) {
+  const Real near = offset(from, into);
+  for (int c = 0; c < 3; ++c) {  // what is farther off is not in every list
+    const int k = (3 * into + c) * view.stride;
+    const Real at = places_[row_of_sample(sample)].at[c];
+    if (at < view.lower[k] - near || at > view.upper[k] + near) return false;
+  }
   const int* node = topology_.tets[tet].node;
   const Real* rest = tables_.rest_positions.data();
   Real at_rest[3] = {0, 0, 0}, gradient[3];
   for (int i = 0; i < 4; ++i)
     for (int c = 0; c < 3; ++c) at_rest[c] += weight[i] * rest[3 * node[i] + c];
   const Real distance = surface_.bodies[into].field.at(at_rest, gradient);
-  const Real offset = surface_.offset[from * bodies_ + into];
   const Real* corner[4];
   for (int i = 0; i < 4; ++i) corner[i] = node_place(view, node[i]).at;
   Real edge[3][3], normal[3], now[3] = {0, 0, 0}, volume6 = 0;
@@ -466,7 +471,7 @@ bool SurfaceContacts<Real>::measure(const LaneView<Real>& view, int from, int in
   const Real steepness = std::sqrt(dot(now, now));
   if (!(steepness > Real(1e-3))) return false;
   SurfaceTouch<Real> touch;
-  touch.depth = offset - distance / steepness;
+  touch.depth = surface_.offset[from * bodies_ + into] - distance / steepness;
   if (!(touch.depth > 0)) return false;
   touch.body = from, touch.against = into, touch.sample = sample, touch.tet = tet, touch.nodes = 8;
   const typename Tables::Sample& own = surface_.samples[sample];

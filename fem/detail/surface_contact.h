@@ -2,6 +2,7 @@
 // distance to the other's surface, at rest, through its deformed cage. Method and figures: docs/contact.md.
 #pragma once
 
+#include <algorithm>
 #include <utility>
 #include <vector>
 
@@ -35,6 +36,8 @@ class SurfaceContacts {
   void add_forces(int lane, const LaneView<Real>& view);
   // From now on add_forces also appends to this list, unless null.
   void tell(std::vector<Exerted<Real>>* list) { told_ = list; }
+  // How near two bodies' boxes must be for contact.
+  Real offset(int a, int b) const { return std::max(surface_.offset[a * bodies_ + b], Real(0)); }
   // Of all bodies, as add_forces finds them; valid until the next call.
   const std::vector<SurfaceTouch<Real>>& find(int lane, const LaneView<Real>& view);
 
@@ -52,7 +55,7 @@ class SurfaceContacts {
     Near near[2];  // samples of a in b, of b in a
   };
   // x y z and nothing: added and scaled at once.
-  typedef Real Row __attribute__((vector_size(4 * sizeof(Real))));
+  typedef Real Row __attribute__((vector_size(4 * sizeof(Real)), may_alias));
   struct Place {
     union {
       Row row;
