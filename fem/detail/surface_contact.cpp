@@ -490,7 +490,7 @@ bool SurfaceContacts<Real>::measure(const LaneView<Real>& view, int from, int in
 template <class Real>
 void SurfaceContacts<Real>::find_walls(int lane, const LaneView<Real>& view, int body) {
   const Real slack = surface_.wall_slack;
-  Row least{}, most{};  // where no wall is beyond
+  Real least[3], most[3];  // where no wall is beyond
   bool any = false;
   for (int c = 0; c < 3; ++c) {
     least[c] = Real(world_.bounds_m.lower[c]) - slack, most[c] = Real(world_.bounds_m.upper[c]) + slack;
@@ -507,17 +507,16 @@ void SurfaceContacts<Real>::find_walls(int lane, const LaneView<Real>& view, int
   for (int t = 0; t < awake; ++t) {
     const int tet = tets[awake_[t]];
     const int* node = topology_.tets[tet].node;
-    Row lower = node_place(view, node[0]).row, upper = lower;
-    for (int i = 1; i < 4; ++i) {
-      const Row at = node_place(view, node[i]).row;
-      lower = at < lower ? at : lower, upper = at > upper ? at : upper;
-    }
-    const Row inside = lower - least, other_inside = most - upper;
     int sides = 0;
     Real nearest = std::numeric_limits<Real>::max();
+    const Real* corner[4];
+    for (int i = 0; i < 4; ++i) corner[i] = node_place(view, node[i]).at;
     for (int c = 0; c < 3; ++c) {
-      nearest = std::min(nearest, std::min(inside[c], other_inside[c]));
-      sides |= int(inside[c] < 0) << c | int(other_inside[c] < 0) << (3 + c);
+      const Real lower = std::min(std::min(corner[0][c], corner[1][c]), std::min(corner[2][c], corner[3][c])),
+                 upper = std::max(std::max(corner[0][c], corner[1][c]), std::max(corner[2][c], corner[3][c]));
+      nearest = std::min(nearest, std::min(lower - least[c], most[c] - upper));
+      if (lower < least[c]) sides |= 1 << c;
+      if (upper > most[c]) sides |= 8 << c;
     }
     if (sides == 0) {
       asleep_until[awake_[t]] = travel + kept * nearest - rounding_m;
