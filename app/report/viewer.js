@@ -1,5 +1,6 @@
 // Plays a motion in WebGL 2. Every vertex of a fine surface hangs on the four nodes of its tet (or, by Phong Deformation, on those
-// and the nodes round them: docs/binding.md); only the nodes move by frames, so a page holds the motion of the cages and each surface once. z is up, metres. Light as in limber's films: a key light with a shadow
+// and the nodes round them: docs/binding.md); only the nodes move by frames, so a page holds the motion of the cages and each
+// surface once. z is up, metres. Light as in limber's films: a key light with a shadow
 // over the photographer's left shoulder, sky, and a ground that fades out.
 "use strict";
 
@@ -317,7 +318,7 @@ function makeViewer(canvas, meta, bodies) {
   function move(body, frame) {
     deform(body, frame, meta.frames);
     turnNormals(body);
-    body.mesh.fill(0, body.points), body.mesh.fill(1, body.normals), body.lines.fill(0, nodes);
+    body.mesh.fill(0, body.points), body.mesh.fill(1, body.normals), body.lines.fill(0, body.nodes);
   }
 
   const start = () => {
