@@ -188,9 +188,10 @@ struct Kernels {
                      int count, Real reach, NearTet<Real>* found);
   int (*near_segments)(const TetPlanes<Real>&, int column, const Real* const p[3], const Real* const q[3],
                        int count, Real reach, NearTet<Real>* found);
-  // Which of the boxes meet the tet's, ascending. Reads and writes multiples of block_size. Returns how many.
+  // Which of the boxes meet the tet's and are not outside of one of its planes by more than `reach`,
+  // ascending. Reads and writes multiples of block_size. Returns how many.
   int (*meeting_boxes)(const TetPlanes<Real>&, int column, const Real* const lower[3],
-                       const Real* const upper[3], int count, int* index);
+                       const Real* const upper[3], int count, Real reach, int* index);
   // Which of the numbers are at most the bound, ascending. Reads and writes multiples of block_size. Returns
   // how many.
   int (*find_at_most)(const Real* numbers, int count, Real bound, int* index);

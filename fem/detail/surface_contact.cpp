@@ -98,7 +98,7 @@ SurfaceContacts<Real>::SurfaceContacts(const World& world, const Kernels<Real>& 
   places_.resize(std::size_t(first_sample_row_) + samples);
   stamps_.assign(std::size_t(world_nodes_) + tets + samples, 0);
   loads_.assign(std::size_t(world_nodes_), 0);
-  beside_.assign(tets, 0);
+  beside_.assign(tets, -1);
   walls_asleep_until_.resize(self_travel_.size());
   for (int k = 0; k < lanes * bodies_; ++k)
     walls_asleep_until_[k].assign(surface_.bodies[k % bodies_].wall_tets.size() + block_size,
@@ -234,8 +234,10 @@ void SurfaceContacts<Real>::find_pair(int lane, const LaneView<Real>& view, std:
 template <class Real>
 void SurfaceContacts<Real>::collect_groups(const LaneView<Real>& view, int from, const Real lower[3],
                                            const Real upper[3], Real reach) {
-  groups_.clear(), sample_of_column_.clear();
+  groups_.clear();
   for (auto& column : columns_) column.clear();
+  Real wide_lower[3], wide_upper[3];
+  for (int c = 0; c < 3; ++c) wide_lower[c] = lower[c] - reach, wide_upper[c] = upper[c] + reach;
   for (const int tet : surface_.bodies[from].sampled_tets) {
     Real least[3], most[3];
     for (int i = 0; i < 4; ++i) {
@@ -248,23 +250,26 @@ void SurfaceContacts<Real>::collect_groups(const LaneView<Real>& view, int from,
     // Samples that no tet holds lie a little outside of theirs.
     for (int c = 0; c < 3; ++c) least[c] -= reach, most[c] += reach;
     if (!boxes_meet(least, most, lower, upper)) continue;
-    Group group{tet, int(sample_of_column_.size()), 0, {}, {}};
-    for (int s = surface_.first_sample[tet]; s < surface_.first_sample[tet + 1]; ++s) {
-      const Real* at = sample_place(view, s).at;
-      bool near = true;
-      for (int c = 0; c < 3; ++c) near &= at[c] >= lower[c] - reach && at[c] <= upper[c] + reach;
-      if (!near) continue;
-      for (int c = 0; c < 3; ++c) {
-        group.lower[c] = group.count == 0 ? at[c] : std::min(group.lower[c], at[c]);
-        group.upper[c] = group.count == 0 ? at[c] : std::max(group.upper[c], at[c]);
-        columns_[c].push_back(at[c]);
-      }
-      sample_of_column_.push_back(s), ++group.count;
+    const int first = surface_.first_sample[tet], count = surface_.first_sample[tet + 1] - first;
+    Group group{tet, int(columns_[0].size()), first, count, {}, {}};
+    const std::size_t full =
+        columns_[0].size() + std::size_t((count + block_size - 1) / block_size * block_size);
+    const Real *w0 = &surface_.weights[0][first], *w1 = &surface_.weights[1][first],
+               *w2 = &surface_.weights[2][first], *w3 = &surface_.weights[3][first];
+    const int* node = topology_.tets[tet].node;
+    for (int c = 0; c < 3; ++c) {
+      columns_[c].resize(full, Real(nowhere));
+      Real* const at = &columns_[c][group.begin];
+      const Real x0 = places_[node[0]].at[c], x1 = places_[node[1]].at[c], x2 = places_[node[2]].at[c],
+                 x3 = places_[node[3]].at[c];
+      for (int k = 0; k < count; ++k) at[k] = w0[k] * x0 + w1[k] * x1 + w2[k] * x2 + w3[k] * x3;
+      const auto ends = std::minmax_element(at, at + count);
+      group.lower[c] = *ends.first, group.upper[c] = *ends.second;
     }
-    if (group.count == 0) continue;
-    const std::size_t full = (sample_of_column_.size() + block_size - 1) / block_size * block_size;
-    for (auto& column : columns_) column.resize(full, Real(nowhere));
-    sample_of_column_.resize(full, -1);
+    if (!boxes_meet(group.lower, group.upper, wide_lower, wide_upper)) {
+      for (auto& column : columns_) column.resize(std::size_t(group.begin));
+      continue;
+    }
     groups_.push_back(group);
   }
 }
@@ -335,36 +340,38 @@ void SurfaceContacts<Real>::build(const LaneView<Real>& view, int from, int into
   sort_groups(lower, upper);
   planes_.resize((near_tets_.size() + block_size - 1) / block_size);
   kernels_.find_planes(near_tets_.data(), int(near_tets_.size()), &places_[0].at[0], reach, planes_.data());
-  const auto mark_beside = [&](int tet, unsigned char mark) {
+  // beside_[tet] is k of the last near tet that it shares a node with.
+  const auto mark_beside = [&](int tet, int k) {
     for (const int node : topology_.tets[tet].node)
-      for (const int other : surface_.tets_round_node[node]) beside_[other] = mark;
+      for (const int other : surface_.tets_round_node[node]) beside_[other] = k;
   };
+  if (from == into) std::fill(beside_.begin(), beside_.end(), -1);
   for (std::size_t k = 0; k < near_tets_.size(); ++k) {
     const TetPlanes<Real>& planes = planes_[k / block_size];
     const int column = int(k % block_size);
     const Real tet_lower = planes.lower[slab_axis_][column], tet_upper = planes.upper[slab_axis_][column];
-    if (from == into) mark_beside(near_tets_[k].tet, 1);
     const int begin = slab_begin_[slab_of(tet_lower - slab_half_)],
               end = slab_begin_[slab_of(tet_upper + slab_half_) + 1];
     const Real *const lowers[3] = {&group_boxes_[0][begin], &group_boxes_[1][begin], &group_boxes_[2][begin]},
                       *const uppers[3] = {&group_boxes_[3][begin], &group_boxes_[4][begin],
                                           &group_boxes_[5][begin]};
-    const int meeting = kernels_.meeting_boxes(planes, column, lowers, uppers, end - begin, meeting_.data());
+    const int meeting =
+        kernels_.meeting_boxes(planes, column, lowers, uppers, end - begin, reach, meeting_.data());
+    if (from == into && meeting > 0) mark_beside(near_tets_[k].tet, int(k));
     for (int m = 0; m < meeting; ++m) {
       const Group& group = groups_[begin + meeting_[m]];
-      if (beside_[group.tet]) continue;
+      if (from == into && beside_[group.tet] == int(k)) continue;
       const Real* const at[3] = {&columns_[0][group.begin], &columns_[1][group.begin],
                                  &columns_[2][group.begin]};
       near_tet_.resize(std::size_t(group.count));
       const int count = kernels_.near_points(planes, column, at, at, group.count, reach, near_tet_.data());
       for (int i = 0; i < count; ++i) {
-        const int sample = sample_of_column_[group.begin + near_tet_[i].item];
+        const int sample = group.first_sample + near_tet_[i].item;
         TetAndEdge& found = found_.emplace_back(near_tets_[k]);
         found.from = found.to = row_of_sample(sample), found.point = sample;
         found_distance_.push_back(near_tet_[i].distance);
       }
     }
-    if (from == into) mark_beside(near_tets_[k].tet, 0);
   }
   // Counting sort by sample, which keeps the tets of each ascending.
   counts_.assign(std::size_t(last - first + 1), 0);

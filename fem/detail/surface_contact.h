@@ -64,7 +64,7 @@ class SurfaceContacts {
   };
   // The samples of one tet, in columns that begin with a block of their own.
   struct Group {
-    int tet, begin, count;
+    int tet, begin, first_sample, count;
     Real lower[3], upper[3];
   };
 
@@ -120,14 +120,14 @@ class SurfaceContacts {
   std::vector<int> meeting_;
   int slab_axis_ = 0, slab_begin_[slabs + 1];
   Real slab_lower_ = 0, slabs_a_metre_ = 0, slab_half_ = 0;
-  std::vector<int> sample_of_column_, counts_;
+  std::vector<int> counts_;
   std::vector<Real> columns_[3];
   std::vector<TetAndEdge> near_tets_, found_;
   std::vector<Real> found_distance_;
   std::vector<TetPlanes<Real>> planes_;
   std::vector<NearTet<Real>> near_tet_;
-  std::vector<unsigned char> beside_;  // a tet
-  std::vector<Real> beyond_;           // how far the samples of a tet are beyond a wall
+  std::vector<int> beside_;   // a tet
+  std::vector<Real> beyond_;  // how far the samples of a tet are beyond a wall
 };
 
 extern template class SurfaceContacts<float>;
