@@ -298,7 +298,7 @@ fem::World build_world(const scenes::Scene& scene, const std::vector<PreparedBod
     fem_body.fixed_nodes = scenes::fixed_nodes(body, scene.bounds_m, prepared[b].cage.positions);
     fem_body.kind = kind_of(body);
     fem_body.max_volume_change = body.max_volume_change;
-    if (body.max_stretch) fem_body.max_stretch = *body.max_stretch;
+    if (body.max_stretch && *body.max_stretch < scenes::any_stretch) fem_body.max_stretch = *body.max_stretch;
     set_parts(body, prepared[b], fem_body);
     spec.bodies.push_back(std::move(fem_body));
   }

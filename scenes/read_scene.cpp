@@ -715,6 +715,12 @@ void touch_cages(const Node& root, Scene& scene) {
       if (body.name == text(table, "name") && !table.find("contact")) body.contact = Contact::cage;
 }
 
+void fill_in_max_stretch(Scene& scene) {
+  for (BodySpec& body : scene.bodies)
+    if (!body.max_stretch && body.kind == Kind::deformable && body.contact == Contact::surface)
+      body.max_stretch = usual_max_stretch;
+}
+
 }  // namespace
 
 Vec3 axis_named(const std::string& name) { return (name[0] == '-' ? -1.0 : 1.0) * Vec3::Unit(name[1] - 'x'); }
@@ -745,6 +751,7 @@ Scene read_scene(const std::string& toml, const std::string& name_for_messages,
   scene.goal = read_goal(root, scene);
   scene.planner = read_planner(child(root, "planner"));
   if (scene.planner.preset == "paper") touch_cages(root, scene);
+  fill_in_max_stretch(scene);
   scene.cameras = read_cameras(root, scene);
   scene.film = read_film(child(root, "film"));
   scene.text = toml;

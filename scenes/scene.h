@@ -100,6 +100,9 @@ struct FixedSpec {
 enum class Deformation { linear, phong };
 constexpr Deformation usual_deformation = Deformation::linear;  // of a scene that does not say
 
+// Of soft bodies that are touched at their surface, where the scene does not say; and what is no limit.
+constexpr double usual_max_stretch = 2, any_stretch = 1000;
+
 struct BodySpec {
   std::string name;  // letters, digits, _ and -: it names a folder
   Role role = Role::obstacle;
@@ -109,8 +112,9 @@ struct BodySpec {
       self_contact;  // parts of it push one another apart; nothing: wherever it can reach itself
   Deformation deformation = usual_deformation;
   double max_volume_change = 0.1;  // |V − V0|/V0 in all states of a plan, in (0, 1]
-  std::optional<double>
-      max_stretch;  // > 1: all tets' singular values in all states of a plan are within 1/s and s
+  // > 1: the body stiffens towards tets whose singular values are outside of 1/s and s, and in all states of
+  // a plan they are within. Nothing, or any_stretch: no limit.
+  std::optional<double> max_stretch;
   Model model;
   CageSpec cage;
   MaterialSpec

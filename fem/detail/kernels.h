@@ -165,6 +165,15 @@ struct Wall {
   const Real* asleep;  // [lane] > 0: no force
 };
 
+// Tets whose singular values are to lie between two limits, here squared.
+template <class Real>
+struct StretchedTets {
+  const int* nodes;          // (4 a tet) of the world
+  const Real* inverse_rest;  // (9 a tet) of the edges at rest from node 0 as columns, row by row
+  int count;
+  Real least2, most2;
+};
+
 template <class Real>
 struct Kernels {
   int lanes;
@@ -179,6 +188,9 @@ struct Kernels {
   void (*move_rigid)(const RigidMotion<Real>&, Real* x, Real* v, Real* f);
   // Adds the forces of the wall on what is beyond it.
   void (*push_off)(const Wall<Real>&, const Real* x, const Real* v, Real* f);
+  // Which tets have a singular value beyond a limit, or are inverted, in some lane, ascending, and in which
+  // lanes, as bits. Returns how many.
+  int (*find_stretched)(const StretchedTets<Real>&, const Real* x, int* tets, unsigned* lanes);
   // The planes of tets[k].corner, and their boxes moved out by `reach`.
   void (*find_planes)(const TetAndEdge* tets, int count, const Real* places, Real reach, TetPlanes<Real>*);
   // The points p, or segments from p to q, whose boxes meet the tet's and that are not outside of one of its

@@ -31,6 +31,7 @@ Stepper<Real>::Stepper(const World& world, int lanes, Isa isa)
       tables_(tables_of<Real>(world)),
       kernels_(kernels<Real>(isa, lanes)),
       lanes_(lanes),
+      stretch_limits_(world, kernels_),
       state_layout_(state_layout(lanes)),
       force_layout_(force_layout(lanes)),
       first_velocity_(lanes == 1 ? 4 : world.nodes * state_layout_.node),
@@ -169,14 +170,15 @@ void Stepper<Real>::pull_towards_goal(int lane) {
 template <class Real>
 void Stepper<Real>::step() {
   if (cost_.steps++ % Cost::sampled != Cost::sampled / 2) {
-    find_sleepers(), add_contact_forces(), find_pushes(), add_elastic_forces(), integrate();
+    find_sleepers(), add_contact_forces(), find_pushes(), add_stretch_limits(), add_elastic_forces(),
+        integrate();
     return;
   }
   Stopwatch watch;
   const auto spent = [&] { return Cost::sampled * watch.lap_s(); };
   find_sleepers(), add_contact_forces(), cost_.contact_s += spent();
   find_pushes(), cost_.controls_s += spent();
-  add_elastic_forces(), cost_.elastic_s += spent();
+  add_stretch_limits(), add_elastic_forces(), cost_.elastic_s += spent();
   integrate(), cost_.integration_s += spent();
 }
 
@@ -227,6 +229,14 @@ void Stepper<Real>::add_contact_forces() {
       surface_contacts_ ? surface_contacts_->add_forces(lane, view(lane))
                         : contacts_->add_forces(lane, view(lane));
   if (contacts_) contacts_->add_forces_of_walls(view(0));
+}
+
+template <class Real>
+void Stepper<Real>::add_stretch_limits() {
+  if (stretch_limits_.empty()) return;
+  stretch_limits_.find(state_.data());
+  for (int lane = 0; lane < lanes_; ++lane)
+    if (contact_[lane]) stretch_limits_.add_forces(lane, view(lane));
 }
 
 template <class Real>

@@ -10,6 +10,7 @@
 #include "fem/cost.h"
 #include "fem/detail/contact.h"
 #include "fem/detail/kernels.h"
+#include "fem/detail/stretch_limits.h"
 #include "fem/detail/surface_contact.h"
 
 namespace limber::fem::detail {
@@ -52,6 +53,7 @@ class Stepper {
   bool may_stand(std::size_t body) const;
   void add_contact_forces();
   void find_pushes();
+  void add_stretch_limits();
   void add_elastic_forces();
   void integrate();
 
@@ -62,6 +64,7 @@ class Stepper {
   // One of the two is there.
   std::optional<Contacts<Real>> contacts_;
   std::optional<SurfaceContacts<Real>> surface_contacts_;
+  StretchLimits<Real> stretch_limits_;
   Layout state_layout_, force_layout_;
   int first_velocity_;
   using Numbers = std::vector<Real, LineAllocator<Real>>;

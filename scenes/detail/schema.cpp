@@ -129,9 +129,10 @@ constexpr Key all_keys[] = {
      {1, 1000, true, false},
      0,
      may_lack,
-     "s: no plan passes through a state in which a tet of the body is stretched to more than s times its "
-     "length, or pressed "
-     "to less than 1/s of it, in any direction; else any stretch will do",
+     "s: the body stiffens as its tets come near to being stretched to s times their length, or pressed to "
+     "1/s of it, in any direction, and no plan passes through a state in which one is beyond; else 2 for a "
+     "soft "
+     "body that is touched at its surface, and none for others; 1000: none",
      "",
      ""},
     {"bodies[].color",
