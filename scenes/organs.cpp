@@ -27,7 +27,7 @@ void add_tube(const std::vector<Vec3>& middles, double radius, SurfaceMesh& mesh
   for (int r = 0; r < rings; ++r) {
     const Vec3 along =
         middles[std::size_t(std::min(r + 1, rings - 1))] - middles[std::size_t(std::max(r - 1, 0))];
-    const Vec3 across = along.cross(Vec3::UnitZ()).normalized(), up = across.cross(along).normalized();
+    const Vec3 across = along.cross(Vec3::UnitZ()).normalized(), up = along.cross(across).normalized();
     const double thick = radius * (r == 0 || r == rings - 1 ? 0.6 : 1);
     for (int s = 0; s < sides; ++s) {
       const double turn = 2 * std::numbers::pi * s / sides;
