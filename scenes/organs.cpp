@@ -111,10 +111,11 @@ SurfaceMesh make_spine() {
 SurfaceMesh make_ribcage() {
   // Metres, as it stands in the body: ten ribs on either side, the lower ones without an end at the
   // breastbone.
-  constexpr std::array tops = {1.365, 1.342, 1.312, 1.280, 1.247, 1.213, 1.178, 1.143, 1.108, 1.073};
-  constexpr std::array widths = {0.072, 0.110, 0.128, 0.138, 0.142, 0.142, 0.142, 0.142, 0.140, 0.136};
-  constexpr std::array depths = {0.062, 0.080, 0.095, 0.106, 0.112, 0.114, 0.114, 0.114, 0.114, 0.112};
-  constexpr std::array middles_x = {0.085, 0.092, 0.100, 0.105, 0.107, 0.109, 0.109, 0.109, 0.109, 0.109};
+  constexpr std::array tops = {1.3728, 1.3450, 1.3130, 1.2800, 1.2460,
+                               1.2110, 1.1750, 1.1370, 1.0940, 1.0480};
+  constexpr std::array widths = {0.108, 0.122, 0.132, 0.140, 0.142, 0.142, 0.142, 0.142, 0.140, 0.136};
+  constexpr std::array depths = {0.082, 0.090, 0.098, 0.106, 0.113, 0.119, 0.121, 0.119, 0.114, 0.112};
+  constexpr std::array middles_x = {0.094, 0.098, 0.102, 0.105, 0.107, 0.107, 0.107, 0.108, 0.109, 0.109};
   constexpr std::array ends = {0.92, 0.93, 0.93, 0.93, 0.93, 0.92, 0.90, 0.82, 0.70, 0.58};
   constexpr double fall = 0.030, begin = 0.12, radius = 0.005;
   constexpr int rings = 40;
@@ -133,7 +134,7 @@ SurfaceMesh make_ribcage() {
   std::vector<Vec3> breastbone;
   for (int i = 0; i <= rings; ++i) {
     const double share = double(i) / rings;
-    breastbone.push_back({0.150 + 0.075 * std::sqrt(share), 0, 1.335 - 0.19 * share});
+    breastbone.push_back({0.150 + 0.067 * std::sqrt(share), 0, 1.335 - 0.19 * share});
   }
   add_tube(breastbone, 0.007, mesh);
   const Box box = bounding_box(mesh.positions);
