@@ -500,9 +500,9 @@ int run_command_line(int argc, const char* const* argv) {
       ->check(within(1e-9, 1e9))
       ->capture_default_str();
   new_command
-      .add_option(
-          "--shrink", new_options.shrink,
-          "largest share of its true size that an organ may have, 0.3 … 1; as much less as cages need")
+      .add_option("--shrink", new_options.shrink,
+                  "largest share of its true size that an organ may have, 0.3 … 1; as much less as it takes "
+                  "to part them")
       ->check(within(0.3, 1.0))
       ->capture_default_str();
   new_command

@@ -229,7 +229,7 @@ double come_apart(const NewSceneOptions& options, std::vector<Organ>& organs) {
     if (scale < least_scale)
       throw InputError(
           fmt::format("{}: at {:g} of their size the organs still do not come apart; take fewer with "
-                      "--only, or ask for more --tets",
+                      "--only",
                       options.from.string(), scale + scale_step));
     log::info("parting the organs at {:.2f} of their size", scale);
     const double room_m = room * scale * longest(organs, options.robot);

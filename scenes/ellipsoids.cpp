@@ -1,5 +1,5 @@
-// The union of ellipsoids: f < 0 inside, polygonised by marching tetrahedra (each cell of a grid in six tets,
-// Freudenthal), which always gives a closed manifold; then smoothed along the surface.
+// The union of ellipsoids, less some: f < 0 inside, polygonised by marching tetrahedra (each cell of a grid
+// in six tets, Freudenthal), which always gives a closed manifold; then smoothed along the surface.
 #include "scenes/detail/ellipsoids.h"
 
 #include <Eigen/Geometry>
@@ -17,6 +17,7 @@ struct Placed {
   Eigen::Matrix3d own_from_world;
   Vec3 center, radii;
   double blend_m;
+  bool hollow;
 };
 
 std::vector<Placed> placed(std::span<const Ellipsoid> parts, Sides sides) {
@@ -31,7 +32,8 @@ std::vector<Placed> placed(std::span<const Ellipsoid> parts, Sides sides) {
       placed.push_back({turn.transpose(),
                         {part.center.x(), side * part.center.y(), part.center.z()},
                         part.radii,
-                        part.blend_m});
+                        part.blend_m,
+                        part.hollow});
     }
   return placed;
 }
@@ -46,8 +48,11 @@ class Union {
       const Vec3 q = (part.own_from_world * (p - part.center)).cwiseQuotient(part.radii);
       const double k0 = q.norm(), k1 = q.cwiseQuotient(part.radii).norm();
       const double g = k1 > 0 ? k0 * (k0 - 1) / k1 : -part.radii.minCoeff();
-      const double near = std::max(part.blend_m - std::abs(f - g), 0.0) / part.blend_m;
-      f = std::min(f, g) - near * near * part.blend_m / 4;
+      const auto bend = [&](double apart) {
+        const double near = std::max(part.blend_m - std::abs(apart), 0.0) / part.blend_m;
+        return near * near * part.blend_m / 4;
+      };
+      f = part.hollow ? std::max(f, -g) + bend(f + g) : std::min(f, g) - bend(f - g);
     }
     return f;
   }

@@ -81,8 +81,9 @@ SurfaceMesh make_named(const std::string& made) {
   if (made == "lung_left") return make_lung(1);
   if (made == "lung_right") return make_lung(-1);
   if (made == "liver") return make_liver();
-  LIMBER_CHECK(made == "spine", made);
-  return make_spine();
+  if (made == "spine") return make_spine();
+  LIMBER_CHECK(made == "ribcage", made);
+  return make_ribcage();
 }
 
 }  // namespace

@@ -33,12 +33,13 @@ SurfaceMesh make_sphere(const SphereModel&);
 // high, about 1 m long and 0.7 m wide, about 35,000 triangles.
 SurfaceMesh make_bunny();
 
-// The others out of ellipsoids, 1 m high too: a serpent on four feet, and the organs of the scene body_parts.
+// The others out of ellipsoids, 1 m high too: a serpent on four feet, and the organs of body_parts and torso.
 SurfaceMesh make_dragon();
 SurfaceMesh make_heart();
 SurfaceMesh make_lung(double side);  // 1: the left one, −1: the right one
 SurfaceMesh make_liver();
 SurfaceMesh make_spine();
+SurfaceMesh make_ribcage();  // twenty ribs and the breastbone, each a tube of its own
 
 // nx × ny × nz cells of five tets each, cut in alternate ways so that neighbours share their faces: 3 × 3 × 3
 // cells are 64 nodes and 135 tets. Nodes in x-fastest order.

@@ -59,6 +59,7 @@ std::vector<Shape> shapes() {
       {"right lung", make_lung(-1), 2, 0, 0},
       {"liver", make_liver(), 2, 0, 0},
       {"spine", make_spine(), 0, 0, 0},  // two of its processes touch
+      {"ribcage", make_ribcage(), 2 * 21, 0, 0},
       {"one block", make_blocks({{{Vec3(1, 1, 1), Vec3(1, 1, 1) + size}}, {}, 0, 0.1}), 2, 1, 1e-4},
       {"rounded block", make_blocks({{{Vec3::Zero(), size}}, {}, 0.1, 0.1}), 2, rounded_box_volume(size, 0.1),
        2e-3},
