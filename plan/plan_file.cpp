@@ -15,8 +15,8 @@ namespace {
 constexpr const char* format_name = "limber plan 3";
 constexpr const char* unsealed_format_name = "limber plan 2";  // without hash.txt
 constexpr const char* seal_name = "hash.txt";                  // of all other entries
-constexpr std::int64_t most_counted = std::int64_t(1) << 53;  // steps of all rollouts, …
-constexpr const char* earlier_format_name = "limber plan 1";  // the tree as a list of states like any other
+constexpr std::int64_t most_counted = std::int64_t(1) << 53;   // steps of all rollouts, …
+constexpr const char* earlier_format_name = "limber plan 1";   // the tree as a list of states like any other
 
 // A list of states is three arrays: NAME_step (n), NAME_positions and NAME_velocities (n × 3N).
 template <class StateList>
