@@ -194,7 +194,8 @@ namespace {
 
 // Triangle for triangle, but for the rounding of other machines.
 bool same_surface(const SurfaceMesh& a, const SurfaceMesh& b) {
-  return a.triangles == b.triangles && a.positions.rows() == b.positions.rows() &&
+  return a.positions.rows() == b.positions.rows() && a.triangles.rows() == b.triangles.rows() &&
+         a.triangles == b.triangles &&
          (a.positions.rows() == 0 || (a.positions - b.positions).rowwise().norm().maxCoeff() <=
                                          1e-9 * bounding_box(a.positions).diagonal());
 }

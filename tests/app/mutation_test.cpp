@@ -112,6 +112,7 @@ struct Mutation {
   std::string what;
   std::string named;  // in a promise that is broken, or in the complaint
   std::function<void(Mutant&)> make;
+  std::string part = "";  // of the folder, that is verified by itself
 };
 
 constexpr std::size_t ball = 0, block = 1;
@@ -344,7 +345,7 @@ List of_the_scene() {
                     }});
   };
   const std::string replay = "replay gives the same bits",
-                    tree = "searched again from the scene: the same tree";
+                    tree = "searched again from the scene: the same tree", steps = "frame 1 is at step";
   add("goal.radius_m=0.001", "the goal: centre of mass within 0.001 m");
   add("goal.center_of_mass_m=[1.2, 1, 1]", "the goal: centre of mass within");
   add("goal.below=block", "the goal: whole robot below block");
@@ -353,14 +354,12 @@ List of_the_scene() {
   add("planner.settle_speed_m_s=0.0001", "the goal: at rest, slower than 0.0001 m/s");
   add("planner.max_force_n=50", "no force is above the maximum");
   add("planner.settle_force_share=0.5", "no force is above the maximum");
-  add("planner.seed=2", "");  // the seed that searched stands in the settings; see below
-  list.pop_back();
   add("planner.goal_bias=0.9", tree);
   add("planner.guidance=0", tree);
   add("planner.lag=3", tree);
   add("bodies.ball.max_volume_change=0.0001", "ball: volume changes by at most 0.01 %");
   add("bodies.ball.max_stretch=1.001", "ball: tets are stretched within");
-  add("bodies.ball.youngs_modulus_pa=8e3", replay);
+  add("bodies.ball.youngs_modulus_pa=8e3", steps);
   add("bodies.ball.density_kg_m3=90", replay);
   add("bodies.block.material.model=neo_hookean", replay);
   add("bodies.block.damping_ratio=0.5", replay);
@@ -369,8 +368,7 @@ List of_the_scene() {
   add("bodies.ball.friction=1", tree);
   add("world.gravity_m_s2=[0, 0, -1]", replay);
   add("world.contact_offset_m=0.02", tree);
-  add("world.max_dt_s=0.001", "");
-  list.pop_back();
+  add("world.max_dt_s=0.0005", steps);
   add("bodies.ball.pose.position_m=[0.7, 1, 1.3]", "ball: made as the scene says");
   add("bodies.ball.cage.tets=60", "ball: made as the scene says");
   add("bodies.ball.cage.mode=fast", "ball: made as the scene says");
@@ -393,7 +391,7 @@ List of_bodies() {
                     }});
   };
   const std::string surface = "ball: surface is the scene's model",
-                    outside = "ball: no vertex outside the cage",
+                    outside = "body: no vertex outside the cage",
                     binding = "ball: binding brings back the surface", again = "ball: bound again",
                     convex = "block: shells are convex", cover = "block: shells cover the surface",
                     off = "block: shells stand off the surface", label = "block: each tet of the cage",
@@ -421,7 +419,8 @@ List of_bodies() {
     body.cage.positions = ((body.cage.positions.rowwise() - middle) * 0.9).rowwise() + middle;
     bind(body);
   });
-  add(ball, "a larger cage", "replay gives the same bits", [=](PreparedBody& body, auto&) {
+  list.back().part = "bodies/ball";  // the plan alone would be refused for its frames' times
+  add(ball, "a larger cage", "frame 1 is at step", [=](PreparedBody& body, auto&) {
     const Eigen::RowVector3d middle = body.cage.positions.colwise().mean();
     body.cage.positions = ((body.cage.positions.rowwise() - middle) * 1.05).rowwise() + middle;
     bind(body);
@@ -435,6 +434,7 @@ List of_bodies() {
           std::min(body.contact.samples.tet_from_sample[s], int(body.cage.tets.rows()) - 1);
     bind(body);
   });
+  list.back().part = "bodies/ball";
   add(block, "a tet of another shell", label,
       [](PreparedBody& body, auto&) { body.shell_from_tet[3] = 1 - body.shell_from_tet[3]; });
   add(block, "a tet of a shell that is none", label,
@@ -578,9 +578,12 @@ List of_reports(const Json& report) {
                     }});
   };
   const Json flat = report.flatten();
-  for (const auto& [pointer, value] : flat.items())
+  for (const auto& [pointer, value] : flat.items()) {
+    if (pointer.ends_with("/source"))
+      continue;  // only tells when to read anew; the surface is compared itself
     if (const auto at = named.find(pointer.substr(1, pointer.find('/', 1) - 1)); at != named.end())
       add(pointer, at->second);
+  }
   for (const char* key :
        {"samples", "nodes", "cell_m", "unit_m", "error_p99_m", "error_max_m", "memory_mb", "usable"})
     add(std::string("/contact/") + key, "ball: report.json");
@@ -688,7 +691,7 @@ class Mutations_slow : public testing::Test {
         ADD_FAILURE() << "is not made: " << error.what();
         continue;
       }
-      const Result result = limber_program({"verify", bad.string(), "--json"});
+      const Result result = limber_program({"verify", (bad / mutation.part).string(), "--json"});
       EXPECT_TRUE(result.code == exit_defect || result.code == exit_bad_input) << result.code;
       std::string found;
       const Json answer = result.json();
