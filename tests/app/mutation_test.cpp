@@ -360,11 +360,11 @@ List of_the_scene() {
   add("bodies.ball.max_volume_change=0.0001", "ball: volume changes by at most 0.01 %");
   add("bodies.ball.max_stretch=1.001", "ball: tets are stretched within");
   add("bodies.ball.youngs_modulus_pa=8e3", steps);
-  add("bodies.ball.density_kg_m3=90", replay);
+  add("bodies.ball.density_kg_m3=90", steps);
   add("bodies.block.material.model=neo_hookean", replay);
-  add("bodies.block.damping_ratio=0.5", replay);
+  add("bodies.block.damping_ratio=0.5", steps);
   add("bodies.block.contact=cage", replay);
-  add("bodies.block.fixed=walls", replay);
+  add("bodies.block.fixed=[]", replay);
   add("bodies.ball.friction=1", tree);
   add("world.gravity_m_s2=[0, 0, -1]", replay);
   add("world.contact_offset_m=0.02", tree);
