@@ -216,8 +216,8 @@ void write_observables(const fs::path& csv, const fem::World& world, const Motio
   write_file(csv, text);
 }
 
-void write_volume_plot(const fs::path& folder, const scenes::Scene& scene, const fem::World& world,
-                       const MotionFigures& figures, double frames_per_second) {
+VolumePlot volume_plot(const scenes::Scene& scene, const fem::World& world, const MotionFigures& figures,
+                       double frames_per_second) {
   std::vector<render::Curve> curves;
   for (std::size_t b = 0; b < world.bodies.size(); ++b) {
     if (!world.bodies[b].moving) continue;
@@ -230,8 +230,7 @@ void write_volume_plot(const fs::path& folder, const scenes::Scene& scene, const
   }
   const render::PlotLook look{
       .title = scene.name, .x_label = "time (s)", .y_label = "change of volume (%)", .limits = {-10, 10}};
-  write_file(folder / "volume.svg", render::plot_svg(curves, look));
-  render::write_png(folder / "volume.png", render::plot_image(curves, look));
+  return {render::plot_svg(curves, look), render::png_bytes(render::plot_image(curves, look))};
 }
 
 }  // namespace limber::app

@@ -66,8 +66,11 @@ Json json_of(const MotionFigures&);  // as plan, verify and bench print them
 // A row a frame, for each body its figures and then what is of all: docs/files.md.
 void write_observables(const fs::path& csv, const fem::World&, const MotionFigures&);
 
-// volume.svg and volume.png.
-void write_volume_plot(const fs::path& folder, const scenes::Scene&, const fem::World&, const MotionFigures&,
+// The bytes of volume.svg and volume.png.
+struct VolumePlot {
+  std::string svg, png;
+};
+VolumePlot volume_plot(const scenes::Scene&, const fem::World&, const MotionFigures&,
                        double frames_per_second);
 
 }  // namespace limber::app

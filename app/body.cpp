@@ -132,8 +132,32 @@ struct Costs {
 
 }  // namespace
 
+Json input_of(const Json& identity, const PrepareSettings& settings) {
+  // What nobody chooses counts, too: a limber that has other values makes another body.
+  const meshing::ContactShapeSettings c;
+  const meshing::CageOptions cage;
+  return {{"model", identity},
+          {"settings", json_of(settings)},
+          {"cage",
+           {{"min_dihedral_deg", cage.min_dihedral_deg},
+            {"max_dihedral_deg", cage.max_dihedral_deg},
+            {"gap", cage.gap}}},
+          {"contact",
+           {{"cells", c.cells},
+            {"most_cells", c.most_cells},
+            {"most_nodes", c.most_nodes},
+            {"field_error", c.field_error},
+            {"missed_depth", c.missed_depth},
+            {"least_spacing", c.least_spacing},
+            {"most_spacing", c.most_spacing},
+            {"most_flat_spacing", c.most_flat_spacing},
+            {"samples_a_square", c.samples_a_square},
+            {"fewest_most_samples", c.fewest_most_samples},
+            {"most_samples", c.most_samples}}}};
+}
+
 Json prepare_body(const BodySource& source, const PrepareSettings& settings, const fs::path& folder) {
-  const Json input{{"model", source.identity}, {"settings", json_of(settings)}};
+  const Json input = input_of(source.identity, settings);
   if (up_to_date(folder, input)) {
     log::info("{}: up to date", folder.string());
     events::tell({{"event", "body"}, {"folder", folder.string()}, {"up_to_date", true}});
@@ -175,7 +199,6 @@ Json prepare_body(const BodySource& source, const PrepareSettings& settings, con
   progress.update(3, "certify");
   throw_if_stopped();
 
-  const meshing::TetQuality quality = meshing::measure_quality(cage.mesh);
   const meshing::Certificate certificate = meshing::certify(model.surface, cage.mesh);
   costs.end_stage("certify");
   progress.update(4, "bind");
@@ -216,48 +239,24 @@ Json prepare_body(const BodySource& source, const PrepareSettings& settings, con
     warnings.push_back(
         fmt::format("{} triangles cross the boundary of the cage", certificate.triangles_crossing));
 
-  const Box box = bounding_box(model.surface.positions);
   Json report{{"version", version}, {"model", source.model}, {"input", input}};
   report.update(meshing::to_json(model));
   report["warnings"] = warnings;
-  report["surface"] = {{"vertices", model.surface.positions.rows()},
-                       {"triangles", model.surface.triangles.rows()},
-                       {"area_m2", area(model.surface)},
-                       {"volume_m3", volume(model.surface)},
-                       {"lower_m", {box.lower.x(), box.lower.y(), box.lower.z()}},
-                       {"upper_m", {box.upper.x(), box.upper.y(), box.upper.z()}}};
-  report["shells"] = {{"count", decomposition.shells.size()},
-                      {"stopped_by", decomposition.stopped_by},
-                      {"inflation", settings.inflate},
-                      {"sum_of_volumes_m3", decomposition.sum_of_hull_volumes},
-                      {"mean_overshoot", decomposition.mean_overshoot},
-                      {"max_overshoot", decomposition.max_overshoot},
-                      {"vertices_uncovered", decomposition.vertices_uncovered},
-                      {"triangles_uncovered", decomposition.triangles_uncovered},
-                      {"neighbours", decomposition.neighbours}};
-  report["cage"] = {{"mode", made_cage ? "cells" : settings.mode},
-                    {"tets", cage.mesh.tets.rows()},
-                    {"nodes", cage.mesh.positions.rows()},
-                    {"volume_m3", volume(cage.mesh)},
-                    {"volume_ratio", cage.volume_ratio},
-                    {"glued_share", cage.glued_share},
-                    {"min_dihedral_deg", quality.min_dihedral_deg},
-                    {"max_dihedral_deg", quality.max_dihedral_deg},
-                    {"median_min_dihedral_deg", quality.median_min_dihedral_deg}};
-  report["certificate"] = json_of(certificate);
-  report["binding"] = {{"vertices_outside", binding.outside},
-                       {"max_outside_distance_m", binding.max_outside_distance_m}};
-  report["contact"] = {{"usable", contact.usable},
-                       {"samples", contact.samples.tet_from_sample.size()},
-                       {"cells", contact_report.cells},
-                       {"nodes", contact_report.nodes},
-                       {"cell_m", contact.field.cell_m},
-                       {"unit_m", contact.field.unit_m},
-                       {"characteristic_m", contact_report.characteristic_m},
-                       {"error_p99_m", contact_report.error_p99_m},
-                       {"error_max_m", contact_report.error_max_m},
-                       {"open_share", contact_report.open_share},
-                       {"memory_mb", contact_report.memory_mb}};
+  report.update(facts_of_body(model.surface, decomposition.shells, cage.mesh, binding, contact, certificate));
+  report["shells"].update({{"stopped_by", decomposition.stopped_by},
+                           {"inflation", settings.inflate},
+                           {"sum_of_volumes_m3", decomposition.sum_of_hull_volumes},
+                           {"mean_overshoot", decomposition.mean_overshoot},
+                           {"max_overshoot", decomposition.max_overshoot},
+                           {"vertices_uncovered", decomposition.vertices_uncovered},
+                           {"triangles_uncovered", decomposition.triangles_uncovered},
+                           {"neighbours", decomposition.neighbours}});
+  report["cage"].update({{"mode", made_cage ? "cells" : settings.mode},
+                         {"volume_ratio", cage.volume_ratio},
+                         {"glued_share", cage.glued_share}});
+  report["contact"].update({{"cells", contact_report.cells},
+                            {"characteristic_m", contact_report.characteristic_m},
+                            {"open_share", contact_report.open_share}});
   report["cpu_seconds"] = costs.cpu_s;
   report["peak_memory_mb_after"] = costs.peak_mb;
   report["peak_memory_mb"] = std::round(peak_memory_mb());
@@ -265,6 +264,40 @@ Json prepare_body(const BodySource& source, const PrepareSettings& settings, con
   write_json(folder / "report.json", report);
   for (const std::string& warning : warnings) log::warn("{}: {}", source.model, warning);
   return report;
+}
+
+Json facts_of_body(const SurfaceMesh& surface, const std::vector<ConvexShell>& shells, const TetMesh& cage,
+                   const ffd::Binding& binding, const ContactShape& contact,
+                   const meshing::Certificate& certificate) {
+  const Box box = bounding_box(surface.positions);
+  const meshing::TetQuality quality = meshing::measure_quality(cage);
+  const meshing::FieldErrors errors = meshing::field_errors(contact);
+  Json facts;
+  facts["surface"] = {{"vertices", surface.positions.rows()},
+                      {"triangles", surface.triangles.rows()},
+                      {"area_m2", area(surface)},
+                      {"volume_m3", volume(surface)},
+                      {"lower_m", {box.lower.x(), box.lower.y(), box.lower.z()}},
+                      {"upper_m", {box.upper.x(), box.upper.y(), box.upper.z()}}};
+  facts["shells"] = {{"count", shells.size()}};
+  facts["cage"] = {{"tets", cage.tets.rows()},
+                   {"nodes", cage.positions.rows()},
+                   {"volume_m3", volume(cage)},
+                   {"min_dihedral_deg", quality.min_dihedral_deg},
+                   {"max_dihedral_deg", quality.max_dihedral_deg},
+                   {"median_min_dihedral_deg", quality.median_min_dihedral_deg}};
+  facts["certificate"] = json_of(certificate);
+  facts["binding"] = {{"vertices_outside", binding.outside},
+                      {"max_outside_distance_m", binding.max_outside_distance_m}};
+  facts["contact"] = {{"usable", contact.usable},
+                      {"samples", contact.samples.tet_from_sample.size()},
+                      {"nodes", contact.field.values.size()},
+                      {"cell_m", contact.field.cell_m},
+                      {"unit_m", contact.field.unit_m},
+                      {"error_p99_m", errors.p99_m},
+                      {"error_max_m", errors.max_m},
+                      {"memory_mb", double(contact.field.values.size() * sizeof(std::int16_t)) / 1e6}};
+  return facts;
 }
 
 PreparedBody read_body(const fs::path& folder) {

@@ -11,6 +11,7 @@
 #include "core/json.h"
 #include "core/mesh.h"
 #include "ffd/binding.h"
+#include "meshing/certificate.h"
 #include "meshing/import.h"
 #include "scenes/scene.h"
 
@@ -36,6 +37,9 @@ struct BodySource {
   };  // a box in cells brings its own
 };
 
+// What a body's report says it was made from: when that is the same, so is the body.
+Json input_of(const Json& identity, const PrepareSettings&);
+
 // Writes the six files and returns the report; leaves a folder that is up to date as it is.
 Json prepare_body(const BodySource&, const PrepareSettings&, const fs::path& folder);
 
@@ -47,8 +51,14 @@ struct PreparedBody {
   ContactShape contact;
   ffd::NodeGradients gradients;  // of the cage
   scenes::Deformation deformation = scenes::usual_deformation;
+  Points goal_shape_m;  // of a robot whose scene has a goal.shape.cage: that cage's nodes; else empty
   Json report;
 };
+// What a report tells of the files beside it, worked out from these alone: tables within "surface", "shells",
+// "cage", "certificate", "binding" and "contact".
+Json facts_of_body(const SurfaceMesh&, const std::vector<ConvexShell>&, const TetMesh& cage,
+                   const ffd::Binding&, const ContactShape&, const meshing::Certificate&);
+
 // Throws InputError naming the file and the command that renews it when one is missing, damaged, or of
 // another body.
 PreparedBody read_body(const fs::path& folder);

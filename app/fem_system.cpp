@@ -24,6 +24,7 @@ std::uint64_t hash_of(const fem::World& world) {
   for (const fem::Body& body : world.bodies) {
     const fem::Material& m = body.material;
     hasher.value(limber::hash_of(body.cage))
+        .value(int(m.model))
         .value(int(body.moving))
         .value(int(body.kind))
         .value(int(body.self_contact));

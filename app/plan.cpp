@@ -50,31 +50,6 @@ Json legs_of(const plan::Plan& plan) {
   return legs;
 }
 
-Json summary_of(const plan::Plan& plan, const fem::World& world, const fem::Cost& cost,
-                const MotionFigures& figures) {
-  Json volumes;
-  for (std::size_t b = 0; b < world.bodies.size(); ++b)
-    volumes[world.bodies[b].name] = std::round(1e4 * 100 * figures.largest_volume_change[b]) / 1e4;
-  Json json{{"solved", plan.solved()},
-            {"explanation", plan::explain(plan)},
-            {"seed", plan.settings.seed},
-            {"nodes", plan.tree.size()},
-            {"node_bytes", plan.tree.states.bytes() / std::size_t(plan.tree.size())},
-            {"node_bytes_unshared", plan.tree.states.bytes_unshared() / std::size_t(plan.tree.size())},
-            {"distance_m", plan.best_distance_m},
-            {"statistics", plan::json_of(plan.statistics)},
-            {"dynamics", json_of(cost)},
-            {"dt_s", world.dt_s},
-            {"motion_s", double(plan.trajectory.end.step) * world.dt_s},
-            {"frames", plan.trajectory.frames.size()},
-            {"largest_volume_change_percent", volumes},
-            {"tree_hash", hex(plan::hash_of(plan.tree))},
-            {"trajectory_hash", hex(plan::hash_of(plan.trajectory))}};
-  if (!plan.settings.via.empty()) json["legs"] = legs_of(plan);
-  json.update(json_of(figures));
-  return json;
-}
-
 std::string text_of_shortcut(const Json& report) {
   const Json &before = report.at("before"), &after = report.at("after");
   const auto change = [&](const char* key, double unit) {
@@ -174,6 +149,42 @@ bool shortened(const Json& summary, const plan::ShortcutSettings& wanted) {
 bool finished(const plan::Plan& plan) { return plan.solved() || plan.ending == plan::Ending::iterations; }
 
 }  // namespace
+
+Json facts_of(const plan::Plan& plan, const fem::World& world, const FemSystem& system,
+              const MotionFigures& figures) {
+  Json volumes;
+  for (std::size_t b = 0; b < world.bodies.size(); ++b)
+    volumes[world.bodies[b].name] = std::round(1e4 * 100 * figures.largest_volume_change[b]) / 1e4;
+  Json json{{"solved", plan.solved()},
+            {"explanation", plan::explain(plan)},
+            {"seed", plan.settings.seed},
+            {"nodes", plan.tree.size()},
+            {"node_bytes", plan.tree.states.bytes() / std::size_t(plan.tree.size())},
+            {"node_bytes_unshared", plan.tree.states.bytes_unshared() / std::size_t(plan.tree.size())},
+            {"distance_m", plan.best_distance_m},
+            {"statistics", plan::json_of(plan.statistics)},
+            {"dt_s", world.dt_s},
+            {"motion_s", double(plan.trajectory.end.step) * world.dt_s},
+            {"frames", plan.trajectory.frames.size()},
+            {"largest_volume_change_percent", volumes},
+            {"tree_hash", hex(plan::hash_of(plan.tree))},
+            {"trajectory_hash", hex(plan::hash_of(plan.trajectory))}};
+  if (!plan.settings.via.empty()) json["legs"] = legs_of(plan);
+  json.update(json_of(figures));
+  if (plan.solved()) return json;
+  const Diagnosis diagnosis = diagnose(world, system, plan);
+  json["explanation"] = json["explanation"].get<std::string>() + " " + diagnosis.text;
+  json["diagnosis"] = diagnosis.json;
+  return json;
+}
+
+std::map<std::string, std::string> pictures_of(const scenes::Scene& scene, const fem::World& world,
+                                               const plan::Plan& plan, const MotionFigures& figures) {
+  VolumePlot volume = volume_plot(scene, world, figures, plan.settings.frames_per_second);
+  return {{"volume.svg", std::move(volume.svg)},
+          {"volume.png", std::move(volume.png)},
+          {"tree.svg", tree_svg(scene, world, plan)}};
+}
 
 plan::Settings settings_of(const scenes::Scene& scene, const PlanOptions& options) {
   const scenes::PlannerSpec& p = scene.planner;
@@ -295,17 +306,12 @@ Outcome keep_plan(const fs::path& folder, const scenes::Scene& scene, const std:
                   const fem::World& world, const FemSystem& system, const plan::Plan& plan, const Json& extra,
                   const std::string& extra_text) {
   const MotionFigures figures = measure_motion(world, bodies, plan.trajectory);
-  Json summary = summary_of(plan, world, system.cost(), figures);
-  if (!plan.solved()) {
-    const Diagnosis diagnosis = diagnose(world, system, plan);
-    summary["explanation"] = summary["explanation"].get<std::string>() + " " + diagnosis.text;
-    summary["diagnosis"] = diagnosis.json;
-  }
+  Json summary = facts_of(plan, world, system, figures);
+  summary["dynamics"] = json_of(system.cost());
   if (!extra.is_null()) summary.update(extra);
   remove_what_shows_another_plan(folder, summary);
   write_plan_folder(folder, plan, scene, bodies, summary);
-  write_volume_plot(folder, scene, world, figures, plan.settings.frames_per_second);
-  write_file(folder / "tree.svg", tree_svg(scene, world, plan));
+  for (const auto& [name, bytes] : pictures_of(scene, world, plan, figures)) write_file(folder / name, bytes);
   update_manifest(folder, "plan", summary);
   return {plan.solved() ? exit_done : exit_no_plan, summary,
           text_of(summary, extra_text, folder / "plan.npz")};

@@ -58,6 +58,7 @@ PlanFolder read_plan_folder(const fs::path& folder) {
   PlanFolder result;
   plan::PlanFile read = plan::read_plan(file);
   result.plan = std::move(read.plan);
+  result.sealed = read.sealed;
   const Json& extra = read.given;
   try {
     result.scene = scenes::read_scene(extra.at("scene").get<std::string>(), file.string() + " (scene)",

@@ -2,8 +2,10 @@
 // the bodies.
 #pragma once
 
+#include <map>
 #include <vector>
 
+#include "app/analysis.h"
 #include "app/body.h"
 #include "app/commands.h"
 #include "app/fem_system.h"
@@ -18,6 +20,7 @@ struct PlanFolder {
   Json summary;             // as `limber plan --json` printed it
   std::uint64_t file_hash;  // of plan.npz
   Json cage_hashes;         // by body name
+  bool sealed;              // as plan::PlanFile
 };
 
 void write_plan_folder(const fs::path& folder, const plan::Plan&, const scenes::Scene&,
@@ -28,6 +31,13 @@ void write_plan_folder(const fs::path& folder, const plan::Plan&, const scenes::
 Outcome keep_plan(const fs::path& folder, const scenes::Scene&, const std::vector<PreparedBody>&,
                   const fem::World&, const FemSystem&, const plan::Plan&, const Json& extra,
                   const std::string& extra_text);
+
+// All of a summary that follows from the plan: not what the dynamics cost, nor what came after the search.
+Json facts_of(const plan::Plan&, const fem::World&, const FemSystem&, const MotionFigures&);
+
+// The pictures that lie beside plan.npz, name → bytes.
+std::map<std::string, std::string> pictures_of(const scenes::Scene&, const fem::World&, const plan::Plan&,
+                                               const MotionFigures&);
 
 // Throws InputError when plan.npz is missing, damaged, or not limber's.
 PlanFolder read_plan_folder(const fs::path& folder);

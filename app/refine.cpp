@@ -78,8 +78,9 @@ Outcome refine(const RefineOptions& options) {
     if (control.manipulation == Manipulation::control_point)
       control.node = same_node(coarse_bodies[robot].cage, control.node, bodies[robot].cage);
 
-  plan::Settings settings = planned.plan.settings;
-  settings.max_iterations = options.iterations.value_or(settings.max_iterations);
+  plan::Settings settings = settings_of(scene, {});
+  settings.seed = planned.plan.settings.seed;
+  settings.max_iterations = options.iterations.value_or(planned.plan.settings.max_iterations);
   settings.time_limit_s = options.time_limit_s, settings.in_flight = options.in_flight;
   plan::RefineReport report;
   const plan::Plan plan = plan::refine(system, settings, reference, report);

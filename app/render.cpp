@@ -219,6 +219,20 @@ Outcome render(const RenderOptions& options) {
   return {failures.empty() ? exit_done : exit_frames_failed, result, text};
 }
 
+namespace {
+
+// The same plan under a scene that differs in what it looks like alone.
+void film_otherwise(const fs::path& folder, const PlanFolder& planned, const scenes::Scene& scene) {
+  const std::vector<PreparedBody> bodies = read_bodies_of(planned, folder);
+  const fem::World world = build_world(scene, bodies);
+  write_plan_folder(folder, planned.plan, scene, bodies, planned.summary);
+  const MotionFigures figures = measure_motion(world, planned.plan.trajectory);
+  for (const auto& [name, bytes] : pictures_of(scene, world, planned.plan, figures))
+    write_file(folder / name, bytes);
+}
+
+}  // namespace
+
 Outcome run(const PlanOptions& plan_options, const RenderOptions& render_options) {
   const scenes::Scene scene = read_scene(plan_options);
   if (render_options.frames.empty() && render_options.chunk.empty())
@@ -231,8 +245,7 @@ Outcome run(const PlanOptions& plan_options, const RenderOptions& render_options
     const PlanFolder folder = read_plan_folder(plan_options.out);
     planned = {folder.plan.solved() ? exit_done : exit_no_plan, folder.summary, ""};
     if (folder.scene.text != scene.text || folder.scene.sets != scene.sets)  // it may be filmed otherwise
-      write_plan_folder(plan_options.out, folder.plan, scene, read_bodies_of(folder, plan_options.out),
-                        folder.summary);
+      film_otherwise(plan_options.out, folder, scene);
   } else {
     planned = plan(plan_options, scene);
   }

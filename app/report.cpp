@@ -439,7 +439,7 @@ Outcome report(const fs::path& folder, const std::optional<fs::path>& file) {
   const fem::World world = build_world(planned.scene, bodies);
   const FemSystem system(world, goal_rules_of(planned.scene));
   MotionFigures figures;
-  const Outcome verified = verify_plan(planned, bodies, world, figures);
+  const Outcome verified = verify_plan(folder, planned, bodies, world, figures);
   const Findings findings{
       planned, bodies, world, system, figures, verified.json.at("promises"), verified.json.at("measured"),
       folder};

@@ -32,8 +32,10 @@ Json identity_of(const scenes::BodySpec& body, const std::string& model_hash) {
                   {"height_m", file->height_m.value_or(0)},
                   {"up", list(file->up)},
                   {"front", list(file->front)}});
+  if (const auto* made = std::get_if<scenes::MadeModel>(&body.model)) model["height_m"] = made->height_m;
   return {{"model", model},
           {"cells", {body.cage.cells.x(), body.cage.cells.y(), body.cage.cells.z()}},
+          {"cell_m", body.cage.cell_m},
           {"position_m", list(body.pose.position_m)},
           {"axis", list(body.pose.axis)},
           {"angle_deg", body.pose.angle_deg},
@@ -90,10 +92,9 @@ fs::path scenery_file(const fs::path& work_folder, const scenes::BodySpec& body,
   return work_folder / "scenery" / (body.name + extension);
 }
 
-// NAME.ply, and beside it NAME.json, which says where it comes from. A model that is not found leaves an
-// empty mesh: without scenery a scene is still what it is.
-void prepare_scenery(const scenes::Scene& scene, const scenes::BodySpec& body,
-                     const std::vector<fs::path>& data, const fs::path& work_folder) {
+// A model that is not found leaves an empty mesh: without scenery a scene is still what it is.
+BodySource source_of_scenery(const scenes::Scene& scene, const scenes::BodySpec& body,
+                             const std::vector<fs::path>& data) {
   BodySource source;
   try {
     source = source_of(scene, body, data);
@@ -103,6 +104,19 @@ void prepare_scenery(const scenes::Scene& scene, const scenes::BodySpec& body,
     source.load = [] { return meshing::ImportedModel{}; };
   }
   source.identity["triangles"] = body.triangles;
+  return source;
+}
+
+SurfaceMesh make_scenery(const scenes::BodySpec& body, const BodySource& source) {
+  SurfaceMesh surface = source.load().surface;
+  if (body.triangles > 0) surface = meshing::simplify(surface, body.triangles);
+  return surface;
+}
+
+// NAME.ply, and beside it NAME.json, which says where it comes from.
+void prepare_scenery(const scenes::Scene& scene, const scenes::BodySpec& body,
+                     const std::vector<fs::path>& data, const fs::path& work_folder) {
+  const BodySource source = source_of_scenery(scene, body, data);
   const fs::path mesh = scenery_file(work_folder, body, ".ply"),
                  origin = scenery_file(work_folder, body, ".json");
   try {
@@ -114,10 +128,8 @@ void prepare_scenery(const scenes::Scene& scene, const scenes::BodySpec& body,
   } catch (const Json::exception&) {
   }
   log::info("{}: reading {}", mesh.string(), source.model);
-  SurfaceMesh surface = source.load().surface;
-  if (body.triangles > 0) surface = meshing::simplify(surface, body.triangles);
   make_folder(mesh.parent_path());
-  write_ply(mesh, surface);
+  write_ply(mesh, make_scenery(body, source));
   write_json(origin, {{"version", version},
                       {"input", source.identity},
                       {"hash", hex(hash_of(std::string_view(read_file(mesh))))}});
@@ -129,19 +141,110 @@ fs::path body_folder(const fs::path& work_folder, const scenes::BodySpec& body) 
   return work_folder / "bodies" / body.name;
 }
 
+namespace {
+
+PrepareSettings settings_of(const scenes::BodySpec& body) {
+  return {.shells = body.cage.shells, .tets = body.cage.tets, .mode = body.cage.mode};
+}
+
+fs::path goal_cage_file(const scenes::Scene& scene, const fs::path& work_folder) {
+  return body_folder(work_folder, scene.bodies[std::size_t(scene.robot)]) / "goal.msh";
+}
+
+bool has_goal_cage(const scenes::Scene& scene) { return scene.goal.shape && !scene.goal.shape->cage.empty(); }
+
+// A copy of goal.shape.cage lies in the robot's folder: a scene that is read from a plan knows no folder.
+void keep_goal_cage(const scenes::Scene& scene, std::vector<fs::path> folders, const fs::path& work_folder) {
+  const fs::path copy = goal_cage_file(scene, work_folder);
+  if (!has_goal_cage(scene)) {
+    fs::remove(copy);
+    return;
+  }
+  folders.push_back(scene.folder);
+  const auto folder = std::find_if(folders.begin(), folders.end(),
+                                   [&](const fs::path& f) { return fs::exists(f / scene.goal.shape->cage); });
+  const fs::path file = (folder == folders.end() ? scene.folder : *folder) / scene.goal.shape->cage;
+  if (folder == folders.end() && fs::exists(copy)) return;
+  write_msh(copy, read_msh(file));
+}
+
+}  // namespace
+
 std::vector<PreparedBody> prepare_bodies(const scenes::Scene& scene, const std::vector<fs::path>& data,
                                          const fs::path& work_folder) {
   for (const scenes::BodySpec& body : scene.bodies) {
     throw_if_stopped();
     const BodySource source = source_of(scene, body, data);
-    prepare_body(source, {.shells = body.cage.shells, .tets = body.cage.tets, .mode = body.cage.mode},
-                 body_folder(work_folder, body));
+    prepare_body(source, settings_of(body), body_folder(work_folder, body));
   }
+  keep_goal_cage(scene, data, work_folder);
   for (const scenes::BodySpec& body : scene.scenery) {
     throw_if_stopped();
     prepare_scenery(scene, body, data, work_folder);
   }
   return read_bodies(scene, work_folder);
+}
+
+Json identity_of(const scenes::Scene& scene, const scenes::BodySpec& body,
+                 const std::vector<fs::path>& data) {
+  return input_of(source_of(scene, body, data).identity, settings_of(body));
+}
+
+namespace {
+
+// Triangle for triangle, but for the rounding of other machines.
+bool same_surface(const SurfaceMesh& a, const SurfaceMesh& b) {
+  return a.positions.rows() == b.positions.rows() && a.triangles.rows() == b.triangles.rows() &&
+         a.triangles == b.triangles &&
+         (a.positions.rows() == 0 || (a.positions - b.positions).rowwise().norm().maxCoeff() <=
+                                         1e-9 * bounding_box(a.positions).diagonal());
+}
+
+}  // namespace
+
+Origin origin_of_scenery(const scenes::Scene& scene, const scenes::BodySpec& body,
+                         const fs::path& work_folder) {
+  Origin origin;
+  const fs::path mesh = scenery_file(work_folder, body, ".ply");
+  const Json said = read_json(scenery_file(work_folder, body, ".json"));
+  try {
+    Json identity = identity_of(body, said.at("input").at("model").at("source").get<std::string>());
+    identity["triangles"] = body.triangles;
+    origin.placed_so =
+        said.at("input") == identity && said.at("hash") == hex(hash_of(std::string_view(read_file(mesh))));
+    if (const auto* file = std::get_if<scenes::FileModel>(&body.model);
+        file && !scenes::find_model(file->file, {scene.folder}))
+      return origin;
+    const BodySource found = source_of_scenery(scene, body, {});
+    if (found.identity == said.at("input"))
+      origin.same_surface = same_surface(make_scenery(body, found), read_ply(mesh));
+  } catch (const Json::exception&) {
+    // Of a model that was not found, no source is told.
+    origin.placed_so = said.is_object() && !said.value("input", Json::object()).contains("model") &&
+                       read_ply(mesh).positions.rows() == 0;
+  }
+  return origin;
+}
+
+Origin origin_of(const scenes::Scene& scene, const scenes::BodySpec& body, const PreparedBody& prepared) {
+  const Json& said = prepared.report.at("input");
+  Origin origin;
+  try {
+    const std::string source = said.at("model").at("model").at("source").get<std::string>();
+    origin.placed_so = said == input_of(identity_of(body, source), settings_of(body));
+    const auto* file = std::get_if<scenes::FileModel>(&body.model);
+    if (file && !scenes::find_model(file->file, {scene.folder})) {
+      const std::optional<SurfaceMesh> made = scenes::made_surface(body);
+      if (!made || source != hex(hash_of(*made))) return origin;
+    }
+    const BodySource found = source_of(scene, body, {});
+    // A file may have changed, or another of its name lie here.
+    if (file && found.identity.at("model").at("source") != source) return origin;
+    origin.same_surface = same_surface(found.load().surface, prepared.surface);
+  } catch (const Json::exception&) {
+    origin.placed_so = false;
+  }
+  return origin;
 }
 
 std::vector<SurfaceMesh> read_scenery(const scenes::Scene& scene, const fs::path& work_folder) {
@@ -163,6 +266,8 @@ std::vector<PreparedBody> read_bodies(const scenes::Scene& scene, const fs::path
     bodies.push_back(read_body(body_folder(work_folder, body)));
     bodies.back().deformation = body.deformation;
   }
+  if (has_goal_cage(scene))
+    bodies[std::size_t(scene.robot)].goal_shape_m = read_msh(goal_cage_file(scene, work_folder)).positions;
   return bodies;
 }
 
@@ -227,17 +332,16 @@ GoalRules goal_rules_of(const scenes::Scene& scene) {
 
 namespace {
 
-Points goal_shape(const scenes::Scene& scene, const Points& rest) {
+Points goal_shape(const scenes::Scene& scene, const PreparedBody& robot) {
   const scenes::Goal::Shape& shape = *scene.goal.shape;
-  if (!shape.cage.empty()) {
-    const fs::path file = scene.folder / shape.cage;
-    const TetMesh cage = read_msh(file);
-    if (cage.positions.rows() != rest.rows())
+  const Points& rest = robot.cage.positions;
+  if (has_goal_cage(scene)) {
+    if (robot.goal_shape_m.rows() != rest.rows())
       throw InputError(
           fmt::format("{}: goal.shape.cage has {} nodes, the robot's cage {}; deform the cage.msh of its "
                       "folder in bodies/",
-                      file.string(), cage.positions.rows(), rest.rows()));
-    return cage.positions;
+                      shape.cage, robot.goal_shape_m.rows(), rest.rows()));
+    return robot.goal_shape_m;
   }
   const Eigen::Matrix3d turn =
       Eigen::AngleAxisd(shape.angle_deg * std::numbers::pi / 180, shape.axis).toRotationMatrix();
@@ -308,8 +412,7 @@ fem::World build_world(const scenes::Scene& scene, const std::vector<PreparedBod
   spec.walls = scene.walls;
   spec.gravity_m_s2 = scene.gravity_m_s2;
   spec.rest_speed_m_s = scene.rest_speed_m_s;
-  if (scene.goal.shape)
-    spec.goal_shape_m = goal_shape(scene, prepared[std::size_t(scene.robot)].cage.positions);
+  if (scene.goal.shape) spec.goal_shape_m = goal_shape(scene, prepared[std::size_t(scene.robot)]);
   spec.max_dt_s = scene.max_dt_s.value_or(0);
   try {
     return fem::build_world(spec);

@@ -17,6 +17,19 @@ fs::path body_folder(const fs::path& work_folder, const scenes::BodySpec&);
 std::vector<PreparedBody> prepare_bodies(const scenes::Scene&, const std::vector<fs::path>& data,
                                          const fs::path& work_folder);
 
+// All that a body's files depend on, as its report has it under "input". Throws InputError when its model is
+// not found.
+Json identity_of(const scenes::Scene&, const scenes::BodySpec&, const std::vector<fs::path>& data);
+
+// What a scene says of a body that was prepared before.
+struct Origin {
+  bool placed_so = false;            // its report tells of the scene's pose, cage and settings
+  std::optional<bool> same_surface;  // read and placed again; nothing where the model file is not here
+};
+Origin origin_of(const scenes::Scene&, const scenes::BodySpec&, const PreparedBody&);
+// The same of scenery. Throws InputError when its files are missing or damaged.
+Origin origin_of_scenery(const scenes::Scene&, const scenes::BodySpec&, const fs::path& work_folder);
+
 // The scene's scenery, in world coordinates, from `scenery/` of the work folder, where prepare_bodies puts
 // it. Throws InputError when a mesh is missing or damaged.
 std::vector<SurfaceMesh> read_scenery(const scenes::Scene&, const fs::path& work_folder);

@@ -14,8 +14,9 @@ struct SeenLimits {
   double least_stretch = 0.5, largest_stretch = 2;
 };
 
-// Checks every promise, as `limber verify` prints them; `figures` are overwritten by those of the replay.
-Outcome verify_plan(const PlanFolder&, const std::vector<PreparedBody>&, const fem::World&,
-                    MotionFigures& figures);
+// Checks every promise of a work folder, as `limber verify` prints them; `figures` are overwritten by those
+// of the replay.
+Outcome verify_plan(const fs::path& folder, const PlanFolder&, const std::vector<PreparedBody>&,
+                    const fem::World&, MotionFigures& figures);
 
 }  // namespace limber::app

@@ -6,6 +6,7 @@
 #include <memory>
 
 #include "core/error.h"
+#include "core/hash.h"
 #include "core/json.h"
 
 namespace limber {
@@ -151,6 +152,18 @@ std::string npy_file(const NpyArray& array) {
   text += header;
   text.append(reinterpret_cast<const char*>(array.bytes.data()), array.bytes.size());
   return text;
+}
+
+std::uint64_t hash_of(const Npz& npz, std::string_view left_out) {
+  Hasher hasher;
+  for (const auto& [name, array] : npz.arrays)
+    hasher.text(name)
+        .text(array.dtype)
+        .values(std::span(array.shape))
+        .values(std::span<const std::byte>(array.bytes));
+  for (const auto& [name, text] : npz.texts)
+    if (name != left_out) hasher.text(name).text(text);
+  return hasher.digest();
 }
 
 void write_npz(const fs::path& path, const Npz& npz) {

@@ -73,6 +73,9 @@ struct Npz {
 
 std::string npy_file(const NpyArray&);  // the bytes of its entry
 
+// Of the names, types, shapes and bytes of all entries but this one.
+std::uint64_t hash_of(const Npz&, std::string_view left_out);
+
 void write_npz(const fs::path&, const Npz&);
 // Throws InputError when it is not a zip, is cut short, fails a checksum, or holds an array of another kind.
 Npz read_npz(const fs::path&);

@@ -113,23 +113,6 @@ HalfSpaces half_spaces(const ConvexShell& shell) {
   return h;
 }
 
-std::vector<int> label_tets(const TetMesh& mesh, const std::vector<ConvexShell>& shells) {
-  std::vector<HalfSpaces> bounds;
-  for (const ConvexShell& shell : shells) bounds.push_back(half_spaces(shell));
-  std::vector<int> label(std::size_t(mesh.tets.rows()), 0);
-  for (std::size_t t = 0; t < label.size(); ++t) {
-    Vec3 middle = Vec3::Zero();
-    for (int k = 0; k < 4; ++k)
-      middle += 0.25 * mesh.positions.row(mesh.tets(Eigen::Index(t), k)).transpose();
-    double deepest = -1e300;
-    for (std::size_t s = 0; s < bounds.size(); ++s) {
-      const double depth = (bounds[s].offsets - bounds[s].normals * middle).minCoeff();
-      if (depth > deepest) deepest = depth, label[t] = int(s);
-    }
-  }
-  return label;
-}
-
 int component_count(const Tets& tets) {
   const std::vector<int> lowest = detail::components(tets);
   int count = 0;
@@ -298,6 +281,23 @@ void measure(const SurfaceMesh& surface, const CageOptions& options, Cage& cage)
 }
 
 }  // namespace
+
+std::vector<int> label_tets(const TetMesh& mesh, const std::vector<ConvexShell>& shells) {
+  std::vector<HalfSpaces> bounds;
+  for (const ConvexShell& shell : shells) bounds.push_back(half_spaces(shell));
+  std::vector<int> label(std::size_t(mesh.tets.rows()), 0);
+  for (std::size_t t = 0; t < label.size(); ++t) {
+    Vec3 middle = Vec3::Zero();
+    for (int k = 0; k < 4; ++k)
+      middle += 0.25 * mesh.positions.row(mesh.tets(Eigen::Index(t), k)).transpose();
+    double deepest = -1e300;
+    for (std::size_t s = 0; s < bounds.size(); ++s) {
+      const double depth = (bounds[s].offsets - bounds[s].normals * middle).minCoeff();
+      if (depth > deepest) deepest = depth, label[t] = int(s);
+    }
+  }
+  return label;
+}
 
 Cage build_cage(const SurfaceMesh& surface, const std::vector<ConvexShell>& shells,
                 const CageOptions& options) {

@@ -39,6 +39,9 @@ struct Cage {
   std::vector<std::string> notes;  // what the user should know: a budget missed, a model of several pieces
 };
 
+// (T) The shell that holds each tet's middle most deeply, 0 when there are no shells.
+std::vector<int> label_tets(const TetMesh&, const std::vector<ConvexShell>&);
+
 // `surface` may be open, doubled, self-intersecting; the winding number says what is inside. It must pass
 // validate(). `shells` may be empty, except in mode paper; in the other modes they only label the tets. Same
 // input, same bytes, also when the triangles come in another order, or all coordinates times a power of two.

@@ -135,20 +135,20 @@ SurfaceSamples bound(const std::vector<detail::SurfaceSample>& samples, const Te
   return result;
 }
 
-// The error of the field where it should be 0: on 99 % of the samples' area, and everywhere.
-std::pair<double, double> errors(const DistanceField& field,
-                                 const std::vector<detail::SurfaceSample>& samples) {
-  std::vector<std::pair<double, double>> error_and_area;
-  double area = 0;
-  for (const auto& s : samples) {
-    error_and_area.emplace_back(std::abs(field.at(s.position)), s.area_m2);
-    area += s.area_m2;
-  }
+// Where the field should be 0, how far it is from that, and the area that this stands for.
+FieldErrors errors_of(std::vector<std::pair<double, double>> error_and_area) {
+  double area = 0, up_to = 0;
   std::sort(error_and_area.begin(), error_and_area.end());
-  double up_to = 0;
+  for (const auto& [error, share] : error_and_area) area += share;
   for (const auto& [error, share] : error_and_area)
     if ((up_to += share) >= 0.99 * area) return {error, error_and_area.back().first};
-  return {0, 0};
+  return {};
+}
+
+FieldErrors errors(const DistanceField& field, const std::vector<detail::SurfaceSample>& samples) {
+  std::vector<std::pair<double, double>> all;
+  for (const auto& s : samples) all.emplace_back(std::abs(field.at(s.position)), s.area_m2);
+  return errors_of(std::move(all));
 }
 
 // Lower bounds of the coordinates of a tet's points at which the field is not above zero, from the cells of
@@ -239,6 +239,21 @@ ContactShape nothing(const Box& box, Eigen::Index tets) {
 
 }  // namespace
 
+Weights least_weights(const DistanceField& field, const TetMesh& cage) {
+  const TetCoordinates coordinates(cage);
+  Weights least(cage.tets.rows(), 4);
+  parallel_for(int(cage.tets.rows()),
+               [&](int t) { least.row(t) = LeastWeights(field, coordinates, t).bound(); });
+  return least;
+}
+
+FieldErrors field_errors(const ContactShape& shape) {
+  std::vector<std::pair<double, double>> all;
+  for (Eigen::Index s = 0; s < shape.samples.area_m2.size(); ++s)
+    all.emplace_back(std::abs(shape.field.at(shape.samples.positions_m.row(s))), shape.samples.area_m2[s]);
+  return errors_of(std::move(all));
+}
+
 ContactShape make_contact_shape(const SurfaceMesh& surface, const TetMesh& cage,
                                 const ContactShapeSettings& settings, ContactShapeReport* report) {
   LIMBER_CHECK(settings.cells >= 8 && settings.cells <= settings.most_cells && settings.most_cells <= 1000,
@@ -292,7 +307,8 @@ ContactShape make_contact_shape(const SurfaceMesh& surface, const TetMesh& cage,
                                        most);
       if (samples.empty()) return give_up(no_inside);
     }
-    std::tie(r.error_p99_m, r.error_max_m) = errors(shape.field, samples);
+    const FieldErrors at_samples = errors(shape.field, samples);
+    r.error_p99_m = at_samples.p99_m, r.error_max_m = at_samples.max_m;
     const double wanted = settings.field_error * r.characteristic_m;
     const bool thin = thickness < well_resolved_cells * shape.field.cell_m;
     const int most = thin ? most_cells_for_thin_walls : settings.most_cells;
@@ -326,9 +342,9 @@ ContactShape make_contact_shape(const SurfaceMesh& surface, const TetMesh& cage,
 
   const TetCoordinates coordinates(cage);
   shape.samples = bound(samples, cage, coordinates);
-  shape.least_weight.resize(cage.tets.rows(), 4);
-  parallel_for(int(cage.tets.rows()),
-               [&](int t) { shape.least_weight.row(t) = LeastWeights(shape.field, coordinates, t).bound(); });
+  shape.least_weight = least_weights(shape.field, cage);
+  const FieldErrors at_samples = field_errors(shape);
+  r.error_p99_m = at_samples.p99_m, r.error_max_m = at_samples.max_m;
   r.cpu_s = cpu_seconds() - start;
   return shape;
 }

@@ -44,4 +44,12 @@ struct ContactShapeReport {
 ContactShape make_contact_shape(const SurfaceMesh& surface, const TetMesh& cage,
                                 const ContactShapeSettings& = {}, ContactShapeReport* = nullptr);
 
+// What follows from other parts of a shape. (T × 4): ContactShape::least_weight.
+Weights least_weights(const DistanceField&, const TetMesh& cage);
+// The field where it should be 0: on 99 % of the samples' area, and at the worst of them.
+struct FieldErrors {
+  double p99_m = 0, max_m = 0;
+};
+FieldErrors field_errors(const ContactShape&);
+
 }  // namespace limber::meshing

@@ -121,8 +121,9 @@ class Runner {
     const bool rests = system_.mean_speed(state_) < settings_.settle.mean_speed_m_s,
                holds = system_.goal_holds(state_);
     if ((rests && holds) || course_.settle_steps >= settle_limit_)
-      return end((rests || settle_limit_ == 0) && holds && in_goal() ? Course::rests_in_goal
-                                                                     : Course::ends_elsewhere);
+      return end((rests || settings_.settle.max_duration_s == 0) && holds && in_goal()
+                     ? Course::rests_in_goal
+                     : Course::ends_elsewhere);
     steps_left_ = std::min(steps_of(settle_check_s, system_.dt_s()), settle_limit_ - course_.settle_steps);
   }
 

@@ -12,9 +12,11 @@ namespace limber::plan {
 
 namespace {
 
-constexpr const char* format_name = "limber plan 2";
-constexpr std::int64_t most_counted = std::int64_t(1) << 53;  // steps of all rollouts, …
-constexpr const char* earlier_format_name = "limber plan 1";  // the tree as a list of states like any other
+constexpr const char* format_name = "limber plan 3";
+constexpr const char* unsealed_format_name = "limber plan 2";  // without hash.txt
+constexpr const char* seal_name = "hash.txt";                  // of all other entries
+constexpr std::int64_t most_counted = std::int64_t(1) << 53;   // steps of all rollouts, …
+constexpr const char* earlier_format_name = "limber plan 1";   // the tree as a list of states like any other
 
 // A list of states is three arrays: NAME_step (n), NAME_positions and NAME_velocities (n × 3N).
 template <class StateList>
@@ -271,6 +273,20 @@ class Reader {
                         plan.settings.frames_per_second));
   }
 
+  // Entries that nothing else contradicts are at least those that were written.
+  void require_seal() const {
+    const auto found = file_.texts.find(seal_name);
+    require(found != file_.texts.end() && found->second == hex(hash_of(file_, seal_name)) + "\n",
+            "an entry was changed since it was written");
+  }
+
+  // What the tree says once more.
+  void require_path_nodes(const std::vector<std::int32_t>& path) const {
+    const auto written = array<std::int32_t>("path_node_of_tree", -1, 1);
+    require(std::equal(written.begin(), written.end(), path.begin(), path.end()),
+            "path_node_of_tree is not the way through the tree to best_node");
+  }
+
   Json meta() const { return parse_json(file_.text("meta.json"), path_.string() + ": meta.json"); }
 
  private:
@@ -350,6 +366,7 @@ void write_plan(const fs::path& path, const Plan& plan, const Json& given) {
   meta["trajectory_hash"] = hex(hash_of(plan.trajectory));
   meta["given"] = given;
   file.texts["meta.json"] = meta.dump(2) + "\n";
+  file.texts[seal_name] = hex(hash_of(file, seal_name)) + "\n";
   write_npz(path, file);
 }
 
@@ -357,9 +374,10 @@ PlanFile read_plan(const fs::path& path) {
   const Reader reader(path);
   const Json meta = reader.meta();
   try {
-    const bool shared = meta.at("format") == format_name;
-    reader.require(shared || meta.at("format") == earlier_format_name, "it is not of this version's format");
     PlanFile file;
+    file.sealed = meta.at("format") == format_name;
+    const bool shared = file.sealed || meta.at("format") == unsealed_format_name;
+    reader.require(shared || meta.at("format") == earlier_format_name, "it is not of this version's format");
     Plan& plan = file.plan;
     plan.tree = reader.tree(shared);
     plan.settings = settings_from_json(meta.at("settings"), path.string());
@@ -377,6 +395,8 @@ PlanFile read_plan(const fs::path& path) {
     const int nodes = plan.tree.size();
     reader.require(plan.best_node >= 0 && plan.best_node < nodes, "best_node is not a node of the tree");
     reader.require(plan.goal_node == -1 || plan.goal_node == plan.best_node, "goal_node is not best_node");
+    reader.require(meta.at("solved") == plan.solved(),
+                   fmt::format("solved is {}, and goal_node {}", meta.at("solved").dump(), plan.goal_node));
     if (!plan.settings.via.empty()) plan.legs = reader.legs(meta.at("legs"), plan);
 
     Trajectory& t = plan.trajectory;
@@ -395,6 +415,8 @@ PlanFile read_plan(const fs::path& path) {
                    "the tree was changed since it was written");
     reader.require(meta.at("trajectory_hash") == hex(hash_of(t)),
                    "the path was changed since it was written");
+    reader.require_path_nodes(path_to(plan.tree, plan.best_node));
+    if (file.sealed) reader.require_seal();
     file.given = meta.at("given");
     return file;
   } catch (const Json::exception& trouble) {

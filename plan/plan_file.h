@@ -8,7 +8,8 @@ namespace limber::plan {
 
 struct PlanFile {
   Plan plan;
-  Json given;  // the caller's own: scene text, versions
+  Json given;           // the caller's own: scene text, versions
+  bool sealed = false;  // one hash stood over all entries; not in files of former formats
 };
 
 void write_plan(const fs::path&, const Plan&, const Json& given);

@@ -58,6 +58,22 @@ TEST(Course, DoesNotDependOnItsNeighboursLanesOrThreads) {
   set_thread_count(0);
 }
 
+// A settle that is too short for a step is asked for all the same: who moves does not rest.
+TEST(Course, WhoMovesDoesNotRestHoweverShortTheSettle) {
+  const Toy toy(5, false, false, 99);
+  Settings s = toy_settings();
+  Course course;
+  course.from = toy.start();
+  std::fill(course.from.velocities.begin(), course.from.velocities.end(), 1.f);
+  s.goal.center_of_mass_m = toy.robot_center(course.from), s.goal.radius_m = 1;
+  for (const auto& [duration_s, result] :
+       {std::pair(0.0, Course::rests_in_goal), std::pair(0.001, Course::ends_elsewhere)}) {
+    s.settle.max_duration_s = duration_s;
+    run(toy, s, {&course, 1}, {});
+    EXPECT_EQ(course.result, result) << duration_s;
+  }
+}
+
 // What a course says it ran is what gives its end, step by step.
 TEST(Course, ItsControlsAreWhatWasRun) {
   const Toy toy(5, true, false, 99);

@@ -1,0 +1,732 @@
+// A certificate is worth what it refuses: ways to make a good work folder wrong, each by an adversary who
+// knows limber, changes one thing and then makes all hashes, reports, figures and pictures fit. verify must
+// name each. A new promise wants its mutations here: one line in the list of its file.
+#include <Eigen/LU>
+#include <map>
+
+#include "app/fem_system.h"
+#include "app/manifest.h"
+#include "app/plan_folder.h"
+#include "app/scene_world.h"
+#include "core/contact_shape_file.h"
+#include "core/hash.h"
+#include "core/mesh_files.h"
+#include "core/npz.h"
+#include "ffd/binding_file.h"
+#include "meshing/certificate.h"
+#include "meshing/contact_shape.h"
+#include "plan/plan_file.h"
+#include "tests/app/program.h"
+
+namespace limber::app {
+namespace {
+
+// A soft ball, a soft block of two convex parts, and a post that is only seen.
+constexpr const char* scene_text = R"(name = "mutants"
+[world]
+bounds_m = [[0, 0, 0], [4, 2, 2]]
+gravity_m_s2 = [0, 0, 0]
+[[bodies]]
+name = "ball"
+role = "robot"
+model = { sphere = { diameter_m = 0.6, triangle_m = 0.06 } }
+cage = { tets = 48 }
+material = { youngs_modulus_pa = 5e3, poisson_ratio = 0.45, density_kg_m3 = 100 }
+pose = { position_m = [0.6, 1, 1.3] }
+[[bodies]]
+name = "block"
+role = "obstacle"
+model = { blocks = { solids = [[[-0.2, -0.8, -0.4], [0.2, 0.8, 0]], [[-0.2, -0.3, 0], [0.2, 0.3, 0.4]]], triangle_m = 0.1 } }
+cage = { tets = 120, shells = 2 }
+material = { youngs_modulus_pa = 5e3, poisson_ratio = 0.45, density_kg_m3 = 100 }
+pose = { position_m = [2, 1, 0.58] }
+fixed = [{ box_m = [[0, 0, 0], [4, 2, 0.2]] }]
+[[bodies]]
+name = "post"
+role = "scenery"
+model = { box = { size_m = [0.1, 0.1, 1] } }
+pose = { position_m = [3.5, 0.2, 0.5] }
+[goal]
+center_of_mass_m = [3.2, 1, 1]
+radius_m = 0.3
+[planner]
+preset = "fast"
+seed = 1
+iterations = 400
+max_force_n = 100
+[film]
+frames_per_second = 5
+)";
+
+// A work folder in memory, to be changed and written so that it fits together again.
+struct Mutant {
+  explicit Mutant(const fs::path& at) : folder(at), planned(read_plan_folder(at)) {
+    bodies = read_bodies_of(planned, at);
+    for (const scenes::BodySpec& body : planned.scene.bodies)
+      shells.push_back(read_obj_shells(body_folder(at, body) / "shells.obj"));
+  }
+
+  // Body b's files and its report, certificate and hashes included, as limber writes them.
+  void write_body(std::size_t b) {
+    PreparedBody& body = bodies[b];
+    const fs::path at = body_folder(folder, planned.scene.bodies[b]);
+    write_ply(at / "surface.ply", body.surface);
+    write_obj(at / "shells.obj", shells[b]);
+    write_msh(at / "cage.msh", body.cage, body.shell_from_tet);
+    ffd::write_binding(at / "binding.npz", body.binding, body.surface, body.cage);
+    write_contact_shape(at / "contact.npz", body.contact, body.surface, body.cage);
+    const Json facts = facts_of_body(body.surface, shells[b], body.cage, body.binding, body.contact,
+                                     meshing::certify(body.surface, body.cage));
+    for (const auto& [table, figures] : facts.items()) body.report[table].update(figures);
+    write_report(b);
+  }
+  void write_report(std::size_t b) {
+    const fs::path at = body_folder(folder, planned.scene.bodies[b]);
+    for (const auto& [name, hash] : bodies[b].report.at("files").items())
+      bodies[b].report["files"][name] = hex(hash_of(std::string_view(read_file(at / name))));
+    write_json(at / "report.json", bodies[b].report);
+  }
+  // plan.npz with the world's hash, its summary, manifest.json and the pictures.
+  void write_plan() {
+    const fem::World world = build_world(planned.scene, bodies);
+    const FemSystem system(world, goal_rules_of(planned.scene));
+    planned.plan.system_hash = system.hash();
+    const MotionFigures figures = measure_motion(world, bodies, planned.plan.trajectory);
+    planned.summary.update(facts_of(planned.plan, world, system, figures));
+    for (const auto& [name, bytes] : pictures_of(planned.scene, world, planned.plan, figures))
+      write_file(folder / name, bytes);
+    write_summary();
+  }
+  void write_summary() {
+    write_plan_folder(folder, planned.plan, planned.scene, bodies, planned.summary);
+    update_manifest(folder, "plan", planned.summary);
+  }
+
+  fs::path folder;
+  PlanFolder planned;
+  std::vector<PreparedBody> bodies;
+  std::vector<std::vector<ConvexShell>> shells;
+};
+
+struct Mutation {
+  std::string what;
+  std::string named;  // in a promise that is broken, or in the complaint
+  std::function<void(Mutant&)> make;
+  std::string part = "";  // of the folder, that is verified by itself
+};
+
+constexpr std::size_t ball = 0, block = 1;
+using List = std::vector<Mutation>;
+
+std::size_t leaf_of(const plan::Plan& p) {  // a node that is not on the path
+  const std::vector<int> path = plan::path_to(p.tree, p.best_node);
+  for (int n = p.tree.size() - 1; n > 0; --n)
+    if (std::count(path.begin(), path.end(), n) == 0 &&
+        std::count(p.tree.parents.begin(), p.tree.parents.end(), n) == 0)
+      return std::size_t(n);
+  throw std::logic_error("the tree is a path");
+}
+
+// States are shared: to change one, all are put together anew.
+void change_state(plan::Plan& p, std::size_t node, const std::function<void(State&)>& change) {
+  plan::States states;
+  for (std::size_t n = 0; n < std::size_t(p.tree.size()); ++n) {
+    State state = p.tree.states[n];
+    if (n == node) change(state);
+    states.push_back(state, p.tree.parents[n]);
+  }
+  p.tree.states = states;
+}
+
+// Of the tree and the path. All that follows from them is made anew.
+List of_the_plan() {
+  List list;
+  const auto add = [&](std::string what, std::string named, std::function<void(plan::Plan&)> change) {
+    list.push_back({std::move(what), std::move(named), [change = std::move(change)](Mutant& m) {
+                      change(m.planned.plan);
+                      m.write_plan();
+                    }});
+  };
+  const std::string tree = "searched again from the scene: the same tree",
+                    counts = "searched again from the scene: the same counts",
+                    replay = "replay gives the same bits", way = "the path is the way through the tree",
+                    settings = "the plan's settings are the scene's",
+                    claims = "what the plan tells of itself";
+  add("a node's position", tree,
+      [](plan::Plan& p) { change_state(p, leaf_of(p), [](State& s) { s.positions[7] += 1e-3f; }); });
+  add("a node's velocity", tree,
+      [](plan::Plan& p) { change_state(p, leaf_of(p), [](State& s) { s.velocities[7] += 1e-3f; }); });
+  add("a node of the path", way, [](plan::Plan& p) {
+    change_state(p, std::size_t(p.best_node), [](State& s) { s.positions[0] += 1e-3f; });
+  });
+  add("the start", tree, [](plan::Plan& p) { change_state(p, 0, [](State& s) { s.velocities[0] = 0.1f; }); });
+  add("the tree's force", tree, [](plan::Plan& p) { p.tree.controls[leaf_of(p)].force_n *= 0.9f; });
+  add("the tree's kind of push", tree,
+      [](plan::Plan& p) { p.tree.controls[leaf_of(p)].manipulation = Manipulation::none; });
+  add("the tree's radius", tree, [](plan::Plan& p) { p.tree.controls[leaf_of(p)].radius_m += 0.1f; });
+  add("the tree's target", tree, [](plan::Plan& p) { p.tree.controls[leaf_of(p)].target_m.x() += 0.1f; });
+  add("the tree's largest force", tree, [](plan::Plan& p) { p.tree.controls[leaf_of(p)].max_force_n += 1; });
+  add("the tree's node of the robot", tree, [](plan::Plan& p) {
+    Control& c = p.tree.controls[leaf_of(p)];
+    c.node = c.node == 0 ? 1 : 0;
+  });
+  add("the tree's steps", tree, [](plan::Plan& p) {
+    p.tree.controls[leaf_of(p)].steps += 5;
+    change_state(p, leaf_of(p), [](State& s) { s.step += 5; });
+  });
+  add("a parent", tree, [](plan::Plan& p) {
+    const std::size_t leaf = leaf_of(p);
+    p.tree.parents[leaf] = p.tree.parents[leaf] == 0 ? 1 : 0;
+    change_state(p, leaf, [&](State& s) {
+      s.step = p.tree.states[std::size_t(p.tree.parents[leaf])].step + p.tree.controls[leaf].steps;
+    });
+  });
+  add("an iteration", tree, [](plan::Plan& p) { ++p.tree.iterations[leaf_of(p)]; });
+  add("a centre", tree, [](plan::Plan& p) { p.tree.centers.x[leaf_of(p)] += 1e-3f; });
+  add("a node more", tree, [](plan::Plan& p) {
+    p.tree.add(p.tree.states[1], p.tree.parents[1], p.tree.controls[1], p.tree.iterations[1],
+               p.tree.centers[1]);
+  });
+  add("a node more that was not searched for", tree, [](plan::Plan& p) {
+    p.tree.add(p.tree.states[1], p.tree.parents[1], p.tree.controls[1], -1, p.tree.centers[1]);
+  });
+  add("a push that is too strong", "no force is above the maximum", [](plan::Plan& p) {
+    Control& c = p.tree.controls[leaf_of(p)];
+    c.manipulation = Manipulation::body, c.force_n = Vec3f(150, 0, 0);
+  });
+
+  add("the path's force", replay, [](plan::Plan& p) { p.trajectory.controls[0].force_n *= 0.99f; });
+  add("the path's force and the tree's", replay, [](plan::Plan& p) {
+    const std::vector<int> path = plan::path_to(p.tree, p.best_node);
+    p.trajectory.controls[0].force_n *= 0.99f;
+    p.tree.controls[std::size_t(path[1])].force_n *= 0.99f;
+  });
+  add("the path's kind of push", replay,
+      [](plan::Plan& p) { p.trajectory.controls[0].manipulation = Manipulation::none; });
+  add("the path's radius", way, [](plan::Plan& p) { p.trajectory.controls[0].radius_m += 0.1f; });
+  add("the path's node of the robot", way, [](plan::Plan& p) {
+    Control& c = p.trajectory.controls[0];
+    c.node = c.node == 0 ? 1 : 0;
+  });
+  add("the path's target", way, [](plan::Plan& p) { p.trajectory.controls[0].target_m.y() += 0.1f; });
+  add("the settle's target", replay, [](plan::Plan& p) { p.trajectory.controls.back().target_m.x() -= 1; });
+  add("the settle's force", replay, [](plan::Plan& p) { p.trajectory.controls.back().max_force_n = 99; });
+  add("a settle that is too strong", "no force is above the maximum",
+      [](plan::Plan& p) { p.trajectory.controls.back().max_force_n = 1000; });
+  add("a step from the last push to the settle", replay, [](plan::Plan& p) {
+    auto& c = p.trajectory.controls;
+    --c[c.size() - 2].steps, ++c.back().steps, ++p.trajectory.settle_steps;
+  });
+  add("a frame's position", replay, [](plan::Plan& p) { p.trajectory.frames[2].positions[1] += 1e-4f; });
+  add("a frame's velocity", replay, [](plan::Plan& p) { p.trajectory.frames[2].velocities[1] += 1e-4f; });
+  add("the end's position", replay, [](plan::Plan& p) { p.trajectory.end.positions[1] += 1e-4f; });
+  add("the end's velocity", replay, [](plan::Plan& p) { p.trajectory.end.velocities[1] = 0; });
+  add("no settle", "the goal: at rest", [](plan::Plan& p) {
+    plan::Trajectory& t = p.trajectory;
+    t.controls.pop_back();
+    t.settle_steps = 0;
+    t.end = p.tree.states[std::size_t(p.best_node)];
+    std::erase_if(t.frames, [&](const State& s) { return s.step > t.end.step; });
+  });
+  add("a path that does not move", "the goal: centre of mass within", [](plan::Plan& p) {
+    plan::Trajectory& t = p.trajectory;
+    t.controls.clear();
+    t.settle_steps = 0;
+    t.end = p.tree.states[0];
+    t.frames.resize(1);
+    p.best_node = p.goal_node = 0;
+    p.best_distance_m = (Vec3(0.6, 1, 1.3) - Vec3(3.2, 1, 1)).norm();
+  });
+  add("not solved", "the plan says that it is solved", [](plan::Plan& p) {
+    p.goal_node = -1, p.ending = plan::Ending::iterations;
+    p.settings.max_iterations = p.statistics.iterations;
+  });
+  add("another best node", way, [](plan::Plan& p) { p.best_node = p.goal_node = int(leaf_of(p)); });
+  add("the best distance", claims, [](plan::Plan& p) { p.best_distance_m *= 0.5; });
+  add("what ended it", claims, [](plan::Plan& p) { p.ending = plan::Ending::time; });
+
+  add("iterations", counts, [](plan::Plan& p) { ++p.statistics.iterations; });
+  add("fewer iterations", counts, [](plan::Plan& p) { --p.statistics.iterations; });
+  add("how many diverged", counts, [](plan::Plan& p) { ++p.statistics.diverged; });
+  add("how many were rejected", counts, [](plan::Plan& p) { ++p.statistics.rejected; });
+  add("steps of rollouts", counts, [](plan::Plan& p) { --p.statistics.rollout_steps; });
+  add("fewer rollouts than iterations", counts, [](plan::Plan& p) { p.statistics.rollouts = 1; });
+  add("rollouts in vain", counts, [](plan::Plan& p) { ++p.statistics.rollouts_wrong; });
+
+  add("another seed", tree, [](plan::Plan& p) { ++p.settings.seed; });
+  using Settings = plan::Settings;
+  const std::vector<std::pair<const char*, std::function<void(Settings&)>>> keys{
+      {"goal.center_of_mass_m", [](Settings& s) { s.goal.center_of_mass_m.x() -= 0.01; }},
+      {"goal.radius_m", [](Settings& s) { s.goal.radius_m *= 2; }},
+      {"goal.box_m",
+       [](Settings& s) {
+         s.goal.box_m = Box{Vec3(3, 0.5, 0.5), Vec3(4, 1.5, 1.5)};
+       }},
+      {"via", [](Settings& s) { s.goal_bias = 0.2; }},
+      {"weights.body", [](Settings& s) { s.weights.body += 0.1; }},
+      {"weights.control_point", [](Settings& s) { s.weights.control_point += 0.1; }},
+      {"weights.interpolation", [](Settings& s) { s.weights.interpolation += 0.1; }},
+      {"max_force_n", [](Settings& s) { s.max_force_n = 1000; }},
+      {"min_force_share", [](Settings& s) { s.min_force_share = 0; }},
+      {"max_force_share", [](Settings& s) { s.max_force_share = 0.9; }},
+      {"min_duration_s", [](Settings& s) { s.min_duration_s = 0.1; }},
+      {"max_duration_s", [](Settings& s) { s.max_duration_s = 9; }},
+      {"control_point_radius_m", [](Settings& s) { s.control_point_radius_m = 1; }},
+      {"settle.max_duration_s", [](Settings& s) { s.settle.max_duration_s = 9; }},
+      {"settle.mean_speed_m_s", [](Settings& s) { s.settle.mean_speed_m_s = 9; }},
+      {"settle.max_force_share", [](Settings& s) { s.settle.max_force_share = 0.5; }},
+      {"settle.hold", [](Settings& s) { s.settle.hold = !s.settle.hold; }},
+      {"laws.lag", [](Settings& s) { ++s.laws.lag; }},
+      {"laws.metric", [](Settings& s) { s.laws.metric = plan::Metric::distance; }},
+      {"laws.time_weight", [](Settings& s) { s.laws.time_weight = 0.5; }},
+      {"laws.guidance", [](Settings& s) { s.laws.guidance = 0.5; }},
+      {"laws.soft_price", [](Settings& s) { s.laws.soft_price = 1; }},
+      {"laws.learn_prices", [](Settings& s) { s.laws.learn_prices = false; }},
+      {"laws.steer", [](Settings& s) { s.laws.steer = false; }},
+      {"laws.look_s", [](Settings& s) { s.laws.look_s = 0.2; }},
+      {"laws.stop_in_goal", [](Settings& s) { s.laws.stop_in_goal = false; }},
+      {"laws.hold", [](Settings& s) { s.laws.hold = false; }},
+      {"laws.end_hopeless", [](Settings& s) { s.laws.end_hopeless = false; }}};
+  for (const auto& [key, change] : keys)
+    add(std::string("the setting ") + key, settings,
+        [change = change](plan::Plan& p) { change(p.settings); });
+  return list;
+}
+
+// What plan.npz tells about itself in words and figures: each key of its summary, with and without the
+// manifest's.
+List of_the_summary(const Json& summary) {
+  List list;
+  const auto other = [](const Json& value) -> Json {
+    if (value.is_boolean()) return !value.get<bool>();
+    if (value.is_number_integer()) return value.get<std::int64_t>() + 1;
+    if (value.is_number()) return value.get<double>() * 1.01 + 1e-6;
+    if (value.is_string()) return value.get<std::string>() + "?";
+    return Json(7);
+  };
+  const Json flat = summary.flatten();
+  for (const auto& [pointer, value] : flat.items()) {
+    if (pointer.starts_with("/dynamics")) continue;  // what it cost: nobody can know that any more
+    list.push_back({"summary" + pointer, "what the plan tells of itself",
+                    [pointer = pointer, value = other(value)](Mutant& m) {
+                      m.planned.summary.at(Json::json_pointer(pointer)) = value;
+                      m.write_summary();
+                    }});
+  }
+  list.push_back({"a summary with more in it", "what the plan tells of itself", [](Mutant& m) {
+                    m.planned.summary["quality"] = "best";
+                    m.write_summary();
+                  }});
+  list.push_back(
+      {"a summary of shortcuts that were not", "what the plan tells of itself", [](Mutant& m) {
+         const Json costs{
+             {"duration_s", 1.0}, {"effort_n_s", 1.0}, {"strain_energy_j", 1.0}, {"volume_change", 0.01}};
+         m.planned.summary["shortcut"] = {{"cost", "duration"}, {"rounds", 8},     {"accepted", 3},
+                                          {"cpu_s", 1.0},       {"before", costs}, {"after", costs}};
+         m.write_summary();
+       }});
+  return list;
+}
+
+// The scene's text with another value, and the world and the settings that follow from it.
+List of_the_scene() {
+  List list;
+  const auto add = [&](const std::string& set, const std::string& named) {
+    list.push_back({"the scene with " + set, named, [set](Mutant& m) {
+                      PlanFolder& f = m.planned;
+                      std::vector<std::string> sets = f.scene.sets;
+                      sets.push_back(set);
+                      f.scene = scenes::read_scene(f.scene.text, "scene", sets);
+                      plan::Settings settings = settings_of(f.scene, {});
+                      settings.seed = f.plan.settings.seed;
+                      settings.max_iterations = f.plan.settings.max_iterations;
+                      f.plan.settings = settings;
+                      m.write_plan();
+                    }});
+  };
+  const std::string replay = "replay gives the same bits",
+                    tree = "searched again from the scene: the same tree", steps = "frame 1 is at step";
+  add("goal.radius_m=0.001", "the goal: centre of mass within 0.001 m");
+  add("goal.center_of_mass_m=[1.2, 1, 1]", "the goal: centre of mass within");
+  add("goal.below=block", "the goal: whole robot below block");
+  add("goal.shape={angle_deg=90, turn_tolerance_deg=1}", "the goal: turned within 1 degrees");
+  add("goal.shape={stretch=[2, 1, 1], tolerance_m=0.01}", "the goal: every node within 0.01 m");
+  add("planner.settle_speed_m_s=0.0001", "the goal: at rest, slower than 0.0001 m/s");
+  add("planner.max_force_n=50", "no force is above the maximum");
+  add("planner.settle_force_share=0.5", "no force is above the maximum");
+  add("planner.goal_bias=0.9", tree);
+  add("planner.guidance=0", tree);
+  add("planner.lag=3", tree);
+  add("bodies.ball.max_volume_change=0.0001", "ball: volume changes by at most 0.01 %");
+  add("bodies.ball.max_stretch=1.001", "ball: tets are stretched within");
+  add("bodies.ball.youngs_modulus_pa=8e3", steps);
+  add("bodies.ball.density_kg_m3=90", steps);
+  add("bodies.block.material.model=neo_hookean", replay);
+  add("bodies.block.damping_ratio=0.5", steps);
+  add("bodies.block.contact=cage", replay);
+  add("bodies.block.fixed=[]", replay);
+  add("bodies.ball.friction=1", tree);
+  add("world.gravity_m_s2=[0, 0, -1]", replay);
+  add("world.contact_offset_m=0.02", tree);
+  add("world.max_dt_s=0.0005", steps);
+  add("bodies.ball.pose.position_m=[0.7, 1, 1.3]", "ball: made as the scene says");
+  add("bodies.ball.cage.tets=60", "ball: made as the scene says");
+  add("bodies.ball.cage.mode=fast", "ball: made as the scene says");
+  add("bodies.block.cage.shells=3", "block: made as the scene says");
+  add("bodies.block.model.blocks.triangle_m=0.2", "block: surface is the scene's model");
+  add("bodies.post.pose.angle_deg=10", "post: made as the scene says");
+  add("film.frames_per_second=6", "plan.npz");
+  return list;
+}
+
+// Of one body. Its files, its report and the plan's hashes are made to fit.
+List of_bodies() {
+  List list;
+  using Change = std::function<void(PreparedBody&, std::vector<ConvexShell>&)>;
+  const auto add = [&](std::size_t b, std::string what, std::string named, Change change) {
+    list.push_back({std::move(what), std::move(named), [b, change = std::move(change)](Mutant& m) {
+                      change(m.bodies[b], m.shells[b]);
+                      m.write_body(b);
+                      m.write_plan();
+                    }});
+  };
+  const std::string surface = "ball: surface is the scene's model",
+                    outside = "body: no vertex outside the cage",
+                    binding = "ball: binding brings back the surface", again = "ball: bound again",
+                    convex = "block: shells are convex", cover = "block: shells cover the surface",
+                    off = "block: shells stand off the surface", label = "block: each tet of the cage",
+                    field = "ball: distances for contact", samples = "ball: samples for contact";
+  const auto bind = [](PreparedBody& body) { body.binding = ffd::bind(body.surface, body.cage); };
+
+  add(ball, "a vertex of the surface", surface, [=](PreparedBody& body, auto&) {
+    body.surface.positions(5, 2) *= 1.001;
+    bind(body);
+  });
+  add(ball, "the whole surface, smaller", surface, [=](PreparedBody& body, auto&) {
+    const Eigen::RowVector3d middle = body.surface.positions.colwise().mean();
+    body.surface.positions = ((body.surface.positions.rowwise() - middle) * 0.9).rowwise() + middle;
+    bind(body);
+  });
+  add(ball, "a triangle less", surface, [](PreparedBody& body, auto&) {
+    body.surface.triangles.conservativeResize(body.surface.triangles.rows() - 1, 3);
+  });
+  add(ball, "a triangle turned inside out", surface, [](PreparedBody& body, auto&) {
+    std::swap(body.surface.triangles(3, 0), body.surface.triangles(3, 1));
+  });
+
+  add(ball, "a cage that is too small", outside, [=](PreparedBody& body, auto&) {
+    const Eigen::RowVector3d middle = body.cage.positions.colwise().mean();
+    body.cage.positions = ((body.cage.positions.rowwise() - middle) * 0.9).rowwise() + middle;
+    bind(body);
+  });
+  list.back().part = "bodies/ball";  // the plan alone would be refused for its frames' times
+  add(ball, "a larger cage", "frame 1 is at step", [=](PreparedBody& body, auto&) {
+    const Eigen::RowVector3d middle = body.cage.positions.colwise().mean();
+    body.cage.positions = ((body.cage.positions.rowwise() - middle) * 1.05).rowwise() + middle;
+    bind(body);
+  });
+  add(ball, "a tet less", outside, [=](PreparedBody& body, auto&) {
+    body.cage.tets.conservativeResize(body.cage.tets.rows() - 1, 4);
+    body.shell_from_tet.pop_back();
+    body.contact.least_weight.conservativeResize(body.cage.tets.rows(), 4);
+    for (Eigen::Index s = 0; s < body.contact.samples.tet_from_sample.size(); ++s)
+      body.contact.samples.tet_from_sample[s] =
+          std::min(body.contact.samples.tet_from_sample[s], int(body.cage.tets.rows()) - 1);
+    bind(body);
+  });
+  list.back().part = "bodies/ball";
+  add(block, "a tet of another shell", label,
+      [](PreparedBody& body, auto&) { body.shell_from_tet[3] = 1 - body.shell_from_tet[3]; });
+  add(block, "a tet of a shell that is none", label,
+      [](PreparedBody& body, auto&) { body.shell_from_tet[3] = 5; });
+
+  add(block, "a shell's corner pulled out", off, [](PreparedBody&, auto& shells) {
+    const Eigen::RowVector3d middle = shells[0].vertices.colwise().mean();
+    shells[0].vertices.row(0) = middle + (shells[0].vertices.row(0) - middle) * 1.01;
+  });
+  add(block, "a shell's corner pushed in", "block: shells", [](PreparedBody&, auto& shells) {
+    const Eigen::RowVector3d middle = shells[0].vertices.colwise().mean();
+    shells[0].vertices.row(0) = middle + (shells[0].vertices.row(0) - middle) * 0.8;
+  });
+  add(block, "a shell that is too small", cover, [](PreparedBody&, auto& shells) {
+    const Eigen::RowVector3d middle = shells[0].vertices.colwise().mean();
+    shells[0].vertices = ((shells[0].vertices.rowwise() - middle) * 0.99).rowwise() + middle;
+  });
+  add(block, "a shell that is too large", off, [](PreparedBody&, auto& shells) {
+    const Eigen::RowVector3d middle = shells[0].vertices.colwise().mean();
+    shells[0].vertices = ((shells[0].vertices.rowwise() - middle) * 1.1).rowwise() + middle;
+  });
+  add(block, "a shell less", cover, [](PreparedBody& body, auto& shells) {
+    shells.pop_back();
+    std::fill(body.shell_from_tet.begin(), body.shell_from_tet.end(), 0);
+  });
+  add(block, "a shell with a hole", convex, [](PreparedBody&, auto& shells) {
+    shells[0].triangles.conservativeResize(shells[0].triangles.rows() - 1, 3);
+  });
+  add(block, "a shell turned inside out", convex,
+      [](PreparedBody&, auto& shells) { shells[0].triangles.col(0).swap(shells[0].triangles.col(1)); });
+
+  add(ball, "every vertex bound to one tet", binding,
+      [](PreparedBody& body, auto&) { body.binding.tet_from_vertex.setZero(); });
+  add(ball, "weights (1, 0, 0, 0)", binding,
+      [](PreparedBody& body, auto&) { body.binding.weights.rowwise() = Eigen::RowVector4d(1, 0, 0, 0); });
+  add(ball, "one vertex bound a hair off", binding, [](PreparedBody& body, auto&) {
+    body.binding.weights(7, 0) += 1e-4, body.binding.weights(7, 1) -= 1e-4;
+  });
+  add(ball, "one vertex bound to the next tet, by extrapolation", binding, [](PreparedBody& body, auto&) {
+    const int t = body.binding.tet_from_vertex[7] == 0 ? 1 : 0;
+    Eigen::Matrix3d edges;
+    for (int k = 0; k < 3; ++k)
+      edges.col(k) =
+          body.cage.positions.row(body.cage.tets(t, k)) - body.cage.positions.row(body.cage.tets(t, 3));
+    const Vec3 w =
+        edges.inverse() *
+        (body.surface.positions.row(7) - body.cage.positions.row(body.cage.tets(t, 3))).transpose();
+    body.binding.tet_from_vertex[7] = t;
+    body.binding.weights.row(7) << w[0], w[1], w[2], 1 - w.sum();
+  });
+  add(ball, "vertices said to be outside", again,
+      [](PreparedBody& body, auto&) { body.binding.outside = 3; });
+  add(ball, "how far vertices are outside", again,
+      [](PreparedBody& body, auto&) { body.binding.max_outside_distance_m = 0.1; });
+  add(ball, "which vertex is farthest outside", again,
+      [](PreparedBody& body, auto&) { body.binding.farthest_outside_vertex = 4; });
+
+  const auto fit = [](PreparedBody& body) {  // what follows from the field
+    body.contact.least_weight = meshing::least_weights(body.contact.field, body.cage);
+  };
+  add(ball, "all distances larger", field, [=](PreparedBody& body, auto&) {
+    const int by = int(2 * body.contact.field.cell_m / body.contact.field.unit_m);
+    for (std::int16_t& v : body.contact.field.values) v = std::int16_t(std::min(32000, v + by));
+    fit(body);
+  });
+  add(ball, "all distances the other way round", field, [=](PreparedBody& body, auto&) {
+    for (std::int16_t& v : body.contact.field.values) v = std::int16_t(-v);
+    fit(body);
+  });
+  add(ball, "one distance", field, [=](PreparedBody& body, auto&) {
+    body.contact.field.values[body.contact.field.values.size() / 3] = 0;
+    fit(body);
+  });
+  add(ball, "the unit of distances", field, [=](PreparedBody& body, auto&) {
+    body.contact.field.unit_m *= 1.2;
+    fit(body);
+  });
+  add(ball, "the cells of the field", field, [=](PreparedBody& body, auto&) {
+    body.contact.field.cell_m *= 1.1;
+    fit(body);
+  });
+  add(ball, "the place of the field", field, [=](PreparedBody& body, auto&) {
+    body.contact.field.lower_m.x() += 3 * body.contact.field.cell_m;
+    fit(body);
+  });
+  add(ball, "a field of one number", field, [=](PreparedBody& body, auto&) {
+    std::fill(body.contact.field.values.begin(), body.contact.field.values.end(), std::int16_t(32000));
+    fit(body);
+  });
+  add(ball, "tets in which nothing is solid", field,
+      [](PreparedBody& body, auto&) { body.contact.least_weight.setConstant(2); });
+  add(ball, "tets that may be solid anywhere", field,
+      [](PreparedBody& body, auto&) { body.contact.least_weight.setZero(); });
+  add(ball, "a sample off the surface", samples,
+      [](PreparedBody& body, auto&) { body.contact.samples.positions_m(9, 0) += 1e-4; });
+  add(ball, "a sample bound beside itself", samples, [](PreparedBody& body, auto&) {
+    body.contact.samples.weights(9, 0) += 1e-4, body.contact.samples.weights(9, 1) -= 1e-4;
+  });
+  add(ball, "a sample in another tet", samples, [](PreparedBody& body, auto&) {
+    auto& tets = body.contact.samples.tet_from_sample;
+    tets[0] = 0, tets[tets.size() - 1] = int(body.cage.tets.rows()) - 1;
+    for (Eigen::Index s = 1; s < tets.size(); ++s)
+      if (tets[s] > tets[s - 1]) {
+        tets[s - 1] = tets[s];
+        break;
+      }
+  });
+  add(ball, "a sample that stands for more", samples,
+      [](PreparedBody& body, auto&) { body.contact.samples.area_m2[9] *= 2; });
+  add(ball, "half of the samples", samples, [](PreparedBody& body, auto&) {
+    SurfaceSamples& s = body.contact.samples;
+    const Eigen::Index half = s.area_m2.size() / 2;
+    s.area_m2 *= s.area_m2.sum() / s.area_m2.head(half).sum();
+    s.positions_m.conservativeResize(half, 3), s.weights.conservativeResize(half, 4);
+    s.tet_from_sample.conservativeResize(half), s.area_m2.conservativeResize(half);
+  });
+  add(ball, "contact by the cage", "ball: contact is by the cage", [](PreparedBody& body, auto&) {
+    SurfaceSamples& s = body.contact.samples;
+    body.contact.usable = false;
+    s.positions_m.resize(0, 3), s.weights.resize(0, 4), s.tet_from_sample.resize(0), s.area_m2.resize(0);
+  });
+  return list;
+}
+
+// A report that tells something else than its files, key by key.
+List of_reports(const Json& report) {
+  List list;
+  const std::map<std::string, std::string> named{{"surface", "ball: report.json"},
+                                                 {"certificate", "ball: "},
+                                                 {"binding", "ball: report.json"},
+                                                 {"input", "ball: made as the scene says"}};
+  const auto add = [&](const std::string& pointer, const std::string& name) {
+    const Json value = report.at(Json::json_pointer(pointer));
+    const Json other = value.is_boolean()          ? Json(!value.get<bool>())
+                       : value.is_number_integer() ? Json(value.get<std::int64_t>() + 1)
+                       : value.is_number()         ? Json(value.get<double>() * 1.01 + 1e-6)
+                                                   : Json(value.get<std::string>() + "0");
+    list.push_back({"report.json" + pointer, name, [=](Mutant& m) {
+                      m.bodies[ball].report.at(Json::json_pointer(pointer)) = other;
+                      m.write_report(ball);
+                    }});
+  };
+  const Json flat = report.flatten();
+  for (const auto& [pointer, value] : flat.items()) {
+    if (pointer.ends_with("/source"))
+      continue;  // only tells when to read anew; the surface is compared itself
+    if (const auto at = named.find(pointer.substr(1, pointer.find('/', 1) - 1)); at != named.end())
+      add(pointer, at->second);
+  }
+  for (const char* key :
+       {"samples", "nodes", "cell_m", "unit_m", "error_p99_m", "error_max_m", "memory_mb", "usable"})
+    add(std::string("/contact/") + key, "ball: report.json");
+  for (const char* key :
+       {"tets", "nodes", "volume_m3", "min_dihedral_deg", "max_dihedral_deg", "median_min_dihedral_deg"})
+    add(std::string("/cage/") + key, "ball: report.json");
+  add("/shells/count", "ball: report.json");
+  add("/shells/mean_overshoot", "ball: shells stand off");
+  add("/shells/max_overshoot", "ball: shells stand off");
+  return list;
+}
+
+// Files that lack, are cut, or are another's.
+List of_files() {
+  List list;
+  const auto replace = [&](const std::string& name, const std::string& named,
+                           std::function<std::string(std::string)> change) {
+    list.push_back({"the file " + name, named, [=](Mutant& m) {
+                      const std::string bytes = change(read_file(m.folder / name));
+                      write_file(m.folder / name, bytes);
+                    }});
+  };
+  const auto with_one_more = [](std::string bytes) { return bytes + " "; };
+  const auto half = [](std::string bytes) { return bytes.substr(0, bytes.size() / 2); };
+  for (const char* name : {"surface.ply", "shells.obj", "cage.msh", "binding.npz", "contact.npz"}) {
+    replace("bodies/ball/" + std::string(name), name, with_one_more);
+    replace("bodies/ball/" + std::string(name), name, half);
+  }
+  replace("bodies/ball/report.json", "report.json", half);
+  replace("plan.npz", "plan.npz", half);
+  for (const char* name : {"tree.svg", "volume.svg", "volume.png"}) {
+    replace(name, name, with_one_more);
+    list.push_back({std::string("no ") + name, name, [=](Mutant& m) { fs::remove(m.folder / name); }});
+  }
+  list.push_back(
+      {"no manifest.json", "manifest.json", [](Mutant& m) { fs::remove(m.folder / "manifest.json"); }});
+  list.push_back({"a manifest of another plan", "manifest.json", [](Mutant& m) {
+                    Json summary = m.planned.summary;
+                    summary["trajectory_hash"] = "0123456789abcdef";
+                    update_manifest(m.folder, "plan", summary);
+                  }});
+  for (const char* name :
+       {"surface.ply", "shells.obj", "cage.msh", "binding.npz", "contact.npz", "report.json"})
+    list.push_back({std::string("no ") + name, name,
+                    [=](Mutant& m) { fs::remove(m.folder / "bodies" / "ball" / name); }});
+  list.push_back({"a plan without its hash", "one hash stands over all of plan.npz", [](Mutant& m) {
+                    Npz npz = read_npz(m.folder / "plan.npz");
+                    npz.texts.erase("hash.txt");
+                    std::string& meta = npz.texts.at("meta.json");
+                    meta.replace(meta.find("limber plan 3"), 13, "limber plan 2");
+                    write_npz(m.folder / "plan.npz", npz);
+                  }});
+  list.push_back({"what a search cost, without the hash", "an entry was changed", [](Mutant& m) {
+                    Npz npz = read_npz(m.folder / "plan.npz");
+                    std::string& meta = npz.texts.at("meta.json");
+                    meta.replace(meta.find("\"cpu_s\": "), 9, "\"cpu_s\": 1");
+                    write_npz(m.folder / "plan.npz", npz);
+                  }});
+  list.push_back({"the hash of a cage", "bodies/ball", [](Mutant& m) {
+                    m.bodies[ball].cage.positions(0, 0) -= 0.01;  // its files stay
+                    m.write_summary();
+                  }});
+  list.push_back({"scenery moved", "post: surface is the scene's model", [](Mutant& m) {
+                    const fs::path ply = m.folder / "scenery" / "post.ply",
+                                   json = m.folder / "scenery" / "post.json";
+                    SurfaceMesh mesh = read_ply(ply);
+                    mesh.positions.col(0).array() += 0.1;
+                    write_ply(ply, mesh);
+                    Json said = read_json(json);
+                    said["hash"] = hex(hash_of(std::string_view(read_file(ply))));
+                    write_json(json, said);
+                  }});
+  list.push_back({"scenery that its hash is not of", "post: made as the scene says", [](Mutant& m) {
+                    const fs::path ply = m.folder / "scenery" / "post.ply";
+                    SurfaceMesh mesh = read_ply(ply);
+                    mesh.positions(0, 0) += 1e-3;
+                    write_ply(ply, mesh);
+                  }});
+  return list;
+}
+
+class Mutations_slow : public testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    shared_ = new TemporaryFolder;
+    std::ofstream(shared_->path() / "scene.toml") << scene_text;
+    planned_ = limber_program({"plan", (shared_->path() / "scene.toml").string(), "-o", good().string()});
+  }
+  static void TearDownTestSuite() { delete shared_; }
+  static fs::path good() { return shared_->path() / "good"; }
+
+  void SetUp() override { ASSERT_EQ(planned_.code, exit_done) << planned_.err; }
+
+  // Each mutant is refused, by the promise or complaint that is said.
+  static void expect_named(const List& list) {
+    const fs::path bad = shared_->path() / "bad";
+    for (const Mutation& mutation : list) {
+      SCOPED_TRACE(mutation.what);
+      fs::remove_all(bad);
+      fs::copy(good(), bad, fs::copy_options::recursive);
+      try {
+        Mutant mutant(bad);
+        mutation.make(mutant);
+      } catch (const std::exception& error) {
+        ADD_FAILURE() << "is not made: " << error.what();
+        continue;
+      }
+      const Result result = limber_program({"verify", (bad / mutation.part).string(), "--json"});
+      EXPECT_TRUE(result.code == exit_defect || result.code == exit_bad_input) << result.code;
+      std::string found;
+      const Json answer = result.json();
+      for (const Json& row : answer.value("promises", Json::array()))
+        if (!row.at("kept").get<bool>()) found += row.at("promise").get<std::string>() + "\n";
+      if (result.code == exit_bad_input) found = answer.at("error").get<std::string>();
+      EXPECT_NE(found.find(mutation.named), std::string::npos)
+          << "wanted: " << mutation.named << "\nfound: " << (found.empty() ? result.out : found);
+    }
+    fmt::print("{} mutants\n", list.size());
+  }
+
+ private:
+  static inline TemporaryFolder* shared_;
+  static inline Result planned_;
+};
+
+TEST_F(Mutations_slow, TheGoodFolderKeepsEveryPromise) {
+  const Result result = limber_program({"verify", good().string()});
+  EXPECT_EQ(result.code, exit_done) << result.out << result.err;
+  // What a mutant is written by changes nothing where nothing is changed.
+  Mutant same(good());
+  const auto before = contents(good());
+  for (const std::size_t b : {ball, block}) same.write_body(b);
+  same.write_plan();
+  EXPECT_EQ(contents(good()), before);
+}
+TEST_F(Mutations_slow, OfThePlan) { expect_named(of_the_plan()); }
+TEST_F(Mutations_slow, OfItsSummary) { expect_named(of_the_summary(read_plan_folder(good()).summary)); }
+TEST_F(Mutations_slow, OfTheScene) { expect_named(of_the_scene()); }
+TEST_F(Mutations_slow, OfBodies) { expect_named(of_bodies()); }
+TEST_F(Mutations_slow, OfReports) {
+  expect_named(of_reports(read_json(good() / "bodies" / "ball" / "report.json")));
+}
+TEST_F(Mutations_slow, OfFiles) { expect_named(of_files()); }
+
+}  // namespace
+}  // namespace limber::app
