@@ -256,16 +256,20 @@ void film(const Findings& f, Page& page, Json& result) {
 }
 
 void promises(const Findings& f, Page& page) {
+  const auto found = [](const Json& row) {  // a promise that is kept may have nothing to tell
+    const std::string value = row.at("value").get<std::string>();
+    return value.empty() ? "–" : escaped(value);
+  };
   page.add(
       "<h2>Promises</h2>\n<div class=\"card wide\"><table "
       "id=\"promises\">\n<tr><th></th><th>promise</th><th>found</th></tr>\n");
   for (const Json& p : f.promises)
     page.add("<tr><td class=\"{0}\">{1} {0}</td><td>{2}</td><td>{3}</td></tr>\n",
              p.at("kept").get<bool>() ? "kept" : "broken", p.at("kept").get<bool>() ? "✓" : "✗",
-             escaped(p.at("promise").get<std::string>()), escaped(p.at("value").get<std::string>()));
+             escaped(p.at("promise").get<std::string>()), found(p));
   for (const Json& m : f.measured)
     page.add("<tr><td>found</td><td>{}</td><td>{}</td></tr>\n", escaped(m.at("what").get<std::string>()),
-             escaped(m.at("value").get<std::string>()));
+             found(m));
   page.add(
       "</table></div>\n<p class=\"note\">Checked anew for this page, as by <code>limber "
       "verify</code>; what is found is no promise.</p>\n");

@@ -76,6 +76,14 @@ std::string chambers(const std::vector<Vec3>& path) {
   return way;
 }
 
+// Those in the order in which the ball first comes there: a wall may throw it back once or twice.
+std::string first_visits(const std::string& way) {
+  std::string first;
+  for (std::size_t i = 0; i < way.size(); i += 3)
+    if (first.find(way.substr(i, 2)) == first.npos) first.append(first.empty() ? "" : " ").append(way, i, 2);
+  return first;
+}
+
 // Only its size makes the direct window be avoided: where it is wider than the ball, the ball takes it.
 TEST_F(Controls, TheSmallestWindowIsAvoidedAndAWideOneTaken) {
   const scenes::Scene windows = scene_of("windows", {});
@@ -85,9 +93,12 @@ TEST_F(Controls, TheSmallestWindowIsAvoidedAndAWideOneTaken) {
                 "4.4, 2.7]], [[4, 5.7, 0.7], [4.4, 7.1, 2.1]], [[5.75, 4, 2.1], [7.05, 4.4, 3.4]]]"});
   for (int seed = 1; seed <= 2; ++seed) {
     EXPECT_TRUE(plan_of(windows, seed, 600).solved()) << seed;
-    EXPECT_EQ(chambers(path_), "FL BL BR FR") << seed;
+    const std::string way = chambers(path_);
+    EXPECT_EQ(first_visits(way), "FL BL BR FR") << seed << ": " << way;
+    EXPECT_EQ(way.find("FL FR"), way.npos) << seed << ": " << way;
+    EXPECT_EQ(way.substr(way.size() - 2), "FR") << seed << ": " << way;
     EXPECT_TRUE(plan_of(wide, seed, 600).solved()) << seed;
-    EXPECT_EQ(chambers(path_), "FL FR") << seed;
+    EXPECT_EQ(first_visits(chambers(path_)), "FL FR") << seed;
   }
 }
 
