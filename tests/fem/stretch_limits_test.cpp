@@ -156,7 +156,7 @@ TEST(StretchLimits, SameBitsForAnyLanesAndInstructionSet) {
     control.radius_m = 0.8, control.steps = 20 + rng.below(60);
     control.force_n = (3000 * rng.direction()).cast<float>();
   }
-  const State start = rest_state(world);
+  const State start = thrown(world, 0.3, rng).state();  // so that limits act, in other tets as it goes on
   const auto run = [&](int lanes, InstructionSet set) {
     std::vector<Rollout> rollouts;
     for (const Control& control : controls) rollouts.push_back({&start, control, {}, {}});
