@@ -269,7 +269,7 @@ std::vector<ContactForce> contact_forces(const World& world, const State& state)
   }
   constexpr detail::Layout rows{3, 1};
   const detail::LaneView<float> view{x.data(), v.data(),     f.data(),     rows,         rows,
-                                     1,        lower.data(), upper.data(), travel.data()};
+                                     1,        lower.data(), upper.data(), travel.data(), travel.data()};
   std::vector<detail::Exerted<float>> exerted;
   const auto ask = [&](auto contacts) {
     contacts.tell(&exerted);

@@ -171,7 +171,8 @@ struct StretchedTets {
   const int* nodes;          // (4 a tet) of the world
   const Real* inverse_rest;  // (9 a tet) of the edges at rest from node 0 as columns, row by row
   int count;
-  Real least2, most2;
+  Real least, most;
+  const Real* reach;  // no singular value changes by more than this times what its nodes move, against any place
 };
 
 template <class Real>
@@ -188,9 +189,13 @@ struct Kernels {
   void (*move_rigid)(const RigidMotion<Real>&, Real* x, Real* v, Real* f);
   // Adds the forces of the wall on what is beyond it.
   void (*push_off)(const Wall<Real>&, const Real* x, const Real* v, Real* f);
+  // [lane] The largest square of a velocity of the nodes [first, last) against their mean.
+  void (*inner_speed2)(int first, int last, const Real* v, Real* speed2);
   // Which tets have a singular value beyond a limit, or are inverted, in some lane, ascending, and in which
-  // lanes, as bits. Returns how many.
-  int (*find_stretched)(const StretchedTets<Real>&, const Real* x, int* tets, unsigned* lanes);
+  // lanes, as bits. Returns how many. A tet sleeps in a lane while `travel` [lane], of the body's nodes against
+  // their mean, is below `asleep_until` [tet][lane]. Reads multiples of block_size.
+  int (*find_stretched)(const StretchedTets<Real>&, const Real* x, const Real* travel, Real* asleep_until,
+                        int* tets, unsigned* lanes);
   // The planes of tets[k].corner, and their boxes moved out by `reach`.
   void (*find_planes)(const TetAndEdge* tets, int count, const Real* places, Real reach, TetPlanes<Real>*);
   // The points p, or segments from p to q, whose boxes meet the tet's and that are not outside of one of its

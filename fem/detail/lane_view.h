@@ -12,8 +12,8 @@ struct LaneView {
   Layout state, force;  // of x and v, of f
   int stride;           // lanes
   // Boxes of the bodies, [(3 body + c) stride], and how far each body's fastest node can have come since
-  // load, [body stride].
-  const Real *lower, *upper, *travel;
+  // load, [body stride]; that against the mean of its nodes too, of deformable bodies.
+  const Real *lower, *upper, *travel, *inner_travel;
   // Bodies that take no part in this step, [body stride], or null: nothing is looked for between two of them.
   const Real* asleep = nullptr;
   bool sleeps(int body) const { return asleep && asleep[body * stride] > 0; }

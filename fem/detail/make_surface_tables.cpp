@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 
 #include "core/error.h"
 #include "fem/detail/surface_contact.h"
@@ -49,6 +50,7 @@ void append(const Body& body, double offset_m, const Topology& topology, Tables6
     out.field.nodes[c] = shape.field.nodes[std::size_t(c)], out.field.lower[c] = shape.field.lower_m[c];
   out.reach_factor = 1;
   const SurfaceSamples& samples = shape.samples;
+  std::map<int, std::vector<int>> wall_tets;  // of a node
   Eigen::Index s = 0;
   for (int t = 0; t < tets; ++t) {
     const int tet = body.first_tet + t;
@@ -81,10 +83,16 @@ void append(const Body& body, double offset_m, const Topology& topology, Tables6
       if (!which) tables.first_held_sample.push_back(int(tables.samples.size()));
     }
     s = end;
-    if (tables.first_held_sample.back() > tables.first_sample.back()) out.wall_tets.push_back(tet);
+    if (tables.first_held_sample.back() > tables.first_sample.back())
+      for (const int node : nodes) wall_tets[node].push_back(tet);
     if (tables.first_sample.back() < int(tables.samples.size())) out.sampled_tets.push_back(tet);
   }
   LIMBER_CHECK(s == samples.positions_m.rows(), s, samples.positions_m.rows());
+  for (const auto& [node, tets_of_node] : wall_tets) {
+    out.wall_nodes.push_back(node), out.first_tet_of_wall_node.push_back(int(out.tets_of_wall_nodes.size()));
+    out.tets_of_wall_nodes.insert(out.tets_of_wall_nodes.end(), tets_of_node.begin(), tets_of_node.end());
+  }
+  out.first_tet_of_wall_node.push_back(int(out.tets_of_wall_nodes.size()));
 }
 
 void append_tets_round_nodes(const Body& body, Tables64& tables) {
@@ -115,7 +123,8 @@ SurfaceTables<float> single_precision(const Tables64& t) {
     copy.field.inverse_cell = float(b.field.inverse_cell), copy.field.unit = float(b.field.unit);
     copy.reach_factor = 1.0001f * float(b.reach_factor);
     copy.sampled_tets = b.sampled_tets, copy.cored_tets = b.cored_tets;
-    copy.wall_tets = b.wall_tets;
+    copy.wall_nodes = b.wall_nodes, copy.first_tet_of_wall_node = b.first_tet_of_wall_node;
+    copy.tets_of_wall_nodes = b.tets_of_wall_nodes;
   }
   out.offset.assign(t.offset.begin(), t.offset.end());
   out.tets_round_node = t.tets_round_node;
@@ -137,7 +146,7 @@ std::vector<double> gaps_at_rest(const World& world, double offset_m) {
   constexpr Layout rows{3, 1};
   SurfaceContacts<double> contacts(world, kernels<double>(best_isa(), 1), 1);
   for (const auto& touch : contacts.find(0, {x.data(), still.data(), forces.data(), rows, rows, 1,
-                                             lower.data(), upper.data(), travel.data()})) {
+                                             lower.data(), upper.data(), travel.data(), travel.data()})) {
     if (touch.against < 0) continue;
     const std::size_t one = std::size_t(touch.body), other = std::size_t(touch.against);
     for (double* gap : {&gaps[one * bodies + other], &gaps[other * bodies + one]})

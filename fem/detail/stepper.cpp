@@ -40,7 +40,8 @@ Stepper<Real>::Stepper(const World& world, int lanes, Isa isa)
       rest_speed2_(Real(world.rest_speed_m_s * world.rest_speed_m_s)),
       rest_gain2_(rest_speed2_ * Real(world.dt_s * world.dt_s)),  // gained within a second
       still_gain2_(100 * rest_gain2_),                            // within a tenth of it
-      speed2_before_(std::size_t(lanes), 0) {
+      speed2_before_(std::size_t(lanes), 0),
+      inner_speed2_(std::size_t(lanes), 0) {
   if (world.touches_on_surfaces())
     surface_contacts_.emplace(world, kernels_, lanes);
   else
@@ -50,7 +51,10 @@ Stepper<Real>::Stepper(const World& world, int lanes, Isa isa)
   f_.assign(nodes * std::size_t(force_layout_.node), 0);
   push_.assign(std::size_t(3 * world.bodies[world.robot].node_count() * lanes), 0);
   lower_.resize(3 * bodies), upper_.resize(3 * bodies);
-  speed2_.assign(bodies, 0), travel_.assign(bodies, 0);
+  for (const Body& body : world.bodies)
+    wears_inside_.push_back(body.kind != BodyKind::rigid &&
+                            (std::isfinite(body.max_stretch) || body.self_contact));
+  speed2_.assign(bodies, 0), travel_.assign(bodies, 0), inner_travel_.assign(bodies, 0);
   unchanged_.assign(bodies, 0), asleep_.assign(bodies, 0), stands_.assign(bodies, 0);
   met_.assign(world.bodies.size() * bodies, false);
   all_asleep_.assign(world.bodies.size(), false), pushed_asleep_ = all_asleep_;
@@ -92,6 +96,9 @@ void Stepper<Real>::load(int lane, const Real* positions, const Real* velocities
     unchanged_[b * lanes_ + lane] = body.moving ? 0 : 1;
   }
   surface_contacts_ ? surface_contacts_->forget(lane) : contacts_->forget(lane);
+  stretch_limits_.forget(lane);
+  for (std::size_t b = 0; b < world_.bodies.size(); ++b)  // of idle lanes nothing wakes
+    inner_travel_[b * lanes_ + lane] = contact ? Real(0) : -std::numeric_limits<Real>::infinity();
   contact_[lane] = contact;
   controls_[lane] = control;
 
@@ -131,7 +138,8 @@ LaneView<Real> Stepper<Real>::view(int lane) {
           &f_[lane],      state_layout_,
           force_layout_,  lanes_,
           &lower_[lane],  &upper_[lane],
-          &travel_[lane], &asleep_[lane]};
+          &travel_[lane], &inner_travel_[lane],
+          &asleep_[lane]};
 }
 
 template <class Real>
@@ -233,8 +241,7 @@ void Stepper<Real>::add_contact_forces() {
 
 template <class Real>
 void Stepper<Real>::add_stretch_limits() {
-  if (stretch_limits_.empty()) return;
-  stretch_limits_.find(state_.data());
+  stretch_limits_.find(state_.data(), inner_travel_.data(), all_asleep_);
   for (int lane = 0; lane < lanes_; ++lane)
     if (contact_[lane]) stretch_limits_.add_forces(lane, view(lane));
 }
@@ -304,6 +311,10 @@ void Stepper<Real>::integrate() {
       unchanged_[first + lane] = stands_[first + lane] > 0 && speed2_before_[lane] == 0;
     for (int lane = 0; lane < lanes_; ++lane)
       travel_[first + lane] += motion.dt * std::sqrt(speed2_[first + lane]);
+    if (!wears_inside_[b]) continue;
+    kernels_.inner_speed2(body.first_node, body.last_node, v, inner_speed2_.data());
+    for (int lane = 0; lane < lanes_; ++lane)
+      inner_travel_[first + lane] += motion.dt * std::sqrt(inner_speed2_[lane]);
   }
 }
 

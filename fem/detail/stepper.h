@@ -72,6 +72,9 @@ class Stepper {
   Numbers push_;             // [robot node][xyz][lane] accelerations
   Numbers lower_, upper_;    // [body][xyz][lane]
   Numbers speed2_, travel_;  // [body][lane]
+  // [body][lane] of nodes against their mean, of bodies that ask for it.
+  Numbers inner_travel_;
+  std::vector<bool> wears_inside_;
   // Sleep (docs/dynamics.md), all [body][lane], 0 or 1: is as it was a step ago; takes no part in this step;
   // stood still in this step. And [pair of bodies][lane]: their boxes met a step ago.
   Numbers unchanged_, asleep_, stands_;
@@ -80,7 +83,7 @@ class Stepper {
   std::vector<Control> controls_;                 // [lane]
   std::vector<bool> contact_;                     // [lane]
   Real rest_speed2_, rest_gain2_, still_gain2_;
-  Numbers speed2_before_;  // [lane]
+  Numbers speed2_before_, inner_speed2_;  // [lane]
   Cost cost_;
 };
 

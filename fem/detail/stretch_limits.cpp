@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "fem/detail/contact.h"
 #include "fem/detail/penalty.h"
@@ -48,30 +49,47 @@ StretchLimits<Real>::StretchLimits(const World& world, const Kernels<Real>& kern
     const fem::Body& body = world.bodies[b];
     if (!body.moving || body.kind == BodyKind::rigid || !std::isfinite(body.max_stretch)) continue;
     const double most = 1 + free_share * (body.max_stretch - 1);
-    bodies_.push_back(
-        {int(b), {}, Real(1 / most), Real(most), Real(half_stiff_share * (body.max_stretch - 1)), 0, {}, {}});
+    Body& limited = bodies_.emplace_back();
+    limited.index = int(b), limited.least = Real(1 / most), limited.most = Real(most);
+    limited.half_stiff = Real(half_stiff_share * (body.max_stretch - 1));
     first.push_back(nodes_.size() / 4);
     for (std::size_t t = 0; t < body.inverse_rest_edges.size(); ++t) {
       const int* node = world.topology.tets[std::size_t(body.first_tet) + t].node;
       nodes_.insert(nodes_.end(), node, node + 4);
-      for (int i = 0; i < 9; ++i) inverse_rest_.push_back(Real(body.inverse_rest_edges[t](i / 3, i % 3)));
+      const Eigen::Matrix3d& inverse = body.inverse_rest_edges[t];
+      for (int i = 0; i < 9; ++i) inverse_rest_.push_back(Real(inverse(i / 3, i % 3)));
+      // Rows are the gradients of the weights of nodes 1 … 3; F changes by Σ movement × gradient.
+      limited.reach.push_back(Real(inverse.rowwise().norm().sum() + inverse.colwise().sum().norm()));
     }
   }
   first.push_back(nodes_.size() / 4);
   for (std::size_t k = 0; k < bodies_.size(); ++k) {
     Body& body = bodies_[k];
     const int count = int(first[k + 1] - first[k]);
-    body.tets = {&nodes_[4 * first[k]], &inverse_rest_[9 * first[k]], count, body.least * body.least,
-                 body.most * body.most};
+    body.tets = {&nodes_[4 * first[k]], &inverse_rest_[9 * first[k]], count,
+                 body.least,            body.most,                    body.reach.data()};
     body.stretched.resize(std::size_t(count)), body.lanes.resize(std::size_t(count));
+    body.asleep_until.resize(std::size_t(count * kernels.lanes + block_size));
   }
+  for (int lane = 0; lane < kernels.lanes; ++lane) forget(lane);
   loads_.assign(std::size_t(world.nodes), 0);
 }
 
 template <class Real>
-void StretchLimits<Real>::find(const Real* x) {
+void StretchLimits<Real>::forget(int lane) {
   for (Body& body : bodies_)
-    body.found = kernels_.find_stretched(body.tets, x, body.stretched.data(), body.lanes.data());
+    for (int t = 0; t < body.tets.count; ++t)
+      body.asleep_until[std::size_t(t * kernels_.lanes + lane)] = std::numeric_limits<Real>::lowest();
+}
+
+template <class Real>
+void StretchLimits<Real>::find(const Real* x, const Real* inner_travel, const std::vector<bool>& all_asleep) {
+  for (Body& body : bodies_)
+    body.found = all_asleep[std::size_t(body.index)]
+                     ? 0
+                     : kernels_.find_stretched(body.tets, x, inner_travel + body.index * kernels_.lanes,
+                                               body.asleep_until.data(), body.stretched.data(),
+                                               body.lanes.data());
 }
 
 template <class Real>

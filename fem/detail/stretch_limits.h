@@ -17,9 +17,10 @@ template <class Real>
 class StretchLimits {
  public:
   StretchLimits(const World&, const Kernels<Real>&);
-  bool empty() const { return bodies_.empty(); }
-  // Finds the tets that are stretched in some lane; x of all lanes.
-  void find(const Real* x);
+  void forget(int lane);  // the lane holds another state now
+  // Finds the tets that are stretched in some lane; x of all lanes. `inner_travel` [body][lane]: how far nodes
+  // can have come since then against their body's mean. Bodies that are all asleep are left out.
+  void find(const Real* x, const Real* inner_travel, const std::vector<bool>& all_asleep);
   // Adds to view.f the forces of those of this lane.
   void add_forces(int lane, const LaneView<Real>& view);
 
@@ -30,8 +31,10 @@ class StretchLimits {
     Real least, most;  // of singular values, where the force begins
     Real half_stiff;   // so far beyond it has half of its stiffness
     int found = 0;
-    std::vector<int> stretched;   // of the body's tets
-    std::vector<unsigned> lanes;  // of each of these, bits
+    std::vector<Real> reach;         // a tet: of the kernel
+    std::vector<Real> asleep_until;  // [tet][lane] inner travel; filled up for the kernel
+    std::vector<int> stretched;      // of the body's tets
+    std::vector<unsigned> lanes;     // of each of these, bits
   };
   // A singular value beyond its limit: which the tet's nodes take farther by weight × movement along the
   // direction. Weights without their signs sum to 2, as those of a contact.

@@ -94,14 +94,13 @@ SurfaceContacts<Real>::SurfaceContacts(const World& world, const Kernels<Real>& 
     if (body.kind == BodyKind::rigid) bearings_.resize(world.bodies.size());
   const std::size_t tets = topology_.tets.size(), samples = surface_.samples.size();
   lists_.resize(std::size_t(lanes) * pairs_.size());
-  self_travel_.assign(std::size_t(lanes * bodies_), 0);
   places_.resize(std::size_t(first_sample_row_) + samples);
   stamps_.assign(std::size_t(world_nodes_) + tets + samples, 0);
   loads_.assign(std::size_t(world_nodes_), 0);
-  beside_.assign(tets, -1);
-  walls_asleep_until_.resize(self_travel_.size());
+  beside_.assign(tets, -1), sides_.assign(tets, 0);
+  walls_asleep_until_.resize(std::size_t(lanes * bodies_));
   for (int k = 0; k < lanes * bodies_; ++k)
-    walls_asleep_until_[k].assign(surface_.bodies[k % bodies_].wall_tets.size() + block_size,
+    walls_asleep_until_[k].assign(surface_.bodies[k % bodies_].wall_nodes.size() + block_size,
                                   std::numeric_limits<Real>::lowest());
 }
 
@@ -156,9 +155,9 @@ void SurfaceContacts<Real>::find_core(const LaneView<Real>& view, int tet) {
 
 // How far points of the two bodies can have come to one another since the lane was loaded.
 template <class Real>
-Real SurfaceContacts<Real>::travel_of(int lane, const LaneView<Real>& view, int a, int b) {
+Real SurfaceContacts<Real>::travel_of(const LaneView<Real>& view, int a, int b) {
   const Real factor_a = surface_.bodies[a].reach_factor, factor_b = surface_.bodies[b].reach_factor;
-  if (a == b) return (1 + factor_a) * self_travel_[lane * bodies_ + a];
+  if (a == b) return (1 + factor_a) * view.inner_travel[a * view.stride];
   return factor_a * view.travel[a * view.stride] + factor_b * view.travel[b * view.stride];
 }
 
@@ -186,29 +185,13 @@ template <class Real>
 void SurfaceContacts<Real>::find_pair(int lane, const LaneView<Real>& view, std::size_t pair) {
   const auto [a, b] = pairs_[pair];
   if (view.sleeps(a) && view.sleeps(b)) return;
-  if (a == b) {  // of the step that led here
-    const Topology::Body& body = topology_.bodies[a];
-    Real mean[3] = {0, 0, 0}, fastest2 = 0;
-    for (int n = body.first_node; n < body.last_node; ++n)
-      for (int c = 0; c < 3; ++c) mean[c] += view.v[view.state.at(n, c)];
-    for (Real& m : mean) m /= Real(body.last_node - body.first_node);
-    for (int n = body.first_node; n < body.last_node; ++n) {
-      Real square = 0;
-      for (int c = 0; c < 3; ++c) {
-        const Real way = view.v[view.state.at(n, c)] - mean[c];
-        square += way * way;
-      }
-      fastest2 = std::max(fastest2, square);
-    }
-    self_travel_[lane * bodies_ + a] += Real(world_.dt_s) * std::sqrt(fastest2);
-  }
   const Real apart = offset(a, b);
   for (int c = 0; c < 3; ++c) {
     const int ka = (3 * a + c) * view.stride, kb = (3 * b + c) * view.stride;
     if (view.lower[ka] - apart > view.upper[kb] || view.lower[kb] - apart > view.upper[ka]) return;
   }
   List& list = lists_[lane * pairs_.size() + pair];
-  const Real travel = travel_of(lane, view, a, b);
+  const Real travel = travel_of(view, a, b);
   if (!list.built || travel - list.travel_at_build > kept * list.reach) {
     // A list that holds little may as well reach farther, and so last longer; its results are the same.
     const std::size_t held = list.near[0].candidates.size() + list.near[1].candidates.size();
@@ -492,8 +475,7 @@ bool SurfaceContacts<Real>::measure(const LaneView<Real>& view, int from, int in
   return true;
 }
 
-// A tet sleeps until its nodes can have come to a wall. Sides 0 … 2 are the lower walls, 3 … 5 the upper
-// ones.
+// A node sleeps until it can have come to a wall. Sides 0 … 2 are the lower walls, 3 … 5 the upper ones.
 template <class Real>
 void SurfaceContacts<Real>::find_walls(int lane, const LaneView<Real>& view, int body) {
   const Real slack = surface_.wall_slack;
@@ -505,55 +487,66 @@ void SurfaceContacts<Real>::find_walls(int lane, const LaneView<Real>& view, int
     any |= view.lower[k] < least[c] || view.upper[k] > most[c];
   }
   if (!any) return;
-  const std::vector<int>& tets = surface_.bodies[body].wall_tets;
+  const typename Tables::Body& table = surface_.bodies[body];
   std::vector<Real>& asleep_until = walls_asleep_until_[lane * bodies_ + body];
   const Real travel = view.travel[body * view.stride], rounding_m = Real(1e-3) * slack;
-  if (awake_.size() < tets.size() + block_size)
-    awake_.resize(tets.size() + block_size), distance_.resize(awake_.size());
-  const int awake = kernels_.find_at_most(asleep_until.data(), int(tets.size()), travel, awake_.data());
-  for (int t = 0; t < awake; ++t) {
-    const int tet = tets[awake_[t]];
-    const int* node = topology_.tets[tet].node;
-    int sides = 0;
+  if (awake_.size() < asleep_until.size()) awake_.resize(asleep_until.size()), distance_.resize(awake_.size());
+  const int awake =
+      kernels_.find_at_most(asleep_until.data(), int(table.wall_nodes.size()), travel, awake_.data());
+  beyond_tets_.clear();
+  for (int i = 0; i < awake; ++i) {
+    const int k = awake_[i];
+    const Real* at = node_place(view, table.wall_nodes[k]).at;
+    unsigned sides = 0;
     Real nearest = std::numeric_limits<Real>::max();
-    const Real* corner[4];
-    for (int i = 0; i < 4; ++i) corner[i] = node_place(view, node[i]).at;
     for (int c = 0; c < 3; ++c) {
-      const Real lower = std::min(std::min(corner[0][c], corner[1][c]), std::min(corner[2][c], corner[3][c])),
-                 upper = std::max(std::max(corner[0][c], corner[1][c]), std::max(corner[2][c], corner[3][c]));
-      nearest = std::min(nearest, std::min(lower - least[c], most[c] - upper));
-      if (lower < least[c]) sides |= 1 << c;
-      if (upper > most[c]) sides |= 8 << c;
+      nearest = std::min(nearest, std::min(at[c] - least[c], most[c] - at[c]));
+      sides |= unsigned(at[c] < least[c]) << c | unsigned(at[c] > most[c]) << (3 + c);
     }
     if (sides == 0) {
-      asleep_until[awake_[t]] = travel + kept * nearest - rounding_m;
+      asleep_until[k] = travel + kept * nearest - rounding_m;
       continue;
     }
+    for (int t = table.first_tet_of_wall_node[k]; t < table.first_tet_of_wall_node[k + 1]; ++t) {
+      const int tet = table.tets_of_wall_nodes[t];
+      if (sides_[tet] == 0) beyond_tets_.push_back(tet);
+      sides_[tet] |= static_cast<unsigned char>(sides);
+    }
+  }
+  std::sort(beyond_tets_.begin(), beyond_tets_.end());
+  for (const int tet : beyond_tets_) {
+    const Real* corner[4];
+    for (int i = 0; i < 4; ++i) corner[i] = node_place(view, topology_.tets[tet].node[i]).at;
     const int first = surface_.first_sample[tet], count = surface_.first_held_sample[tet] - first;
-    if (int(beyond_.size()) < count) beyond_.resize(std::size_t(count));
+    const std::size_t most_found = std::size_t(count + block_size);
+    if (within_.size() < most_found) within_.resize(most_found);
+    if (awake_.size() < most_found) awake_.resize(most_found), distance_.resize(most_found);
     for (int side = 0; side < 6; ++side) {
-      if ((sides >> side & 1) == 0) continue;
+      if ((sides_[tet] >> side & 1) == 0) continue;
       const int axis = side % 3;
       const Real inward = side < 3 ? Real(1) : Real(-1), wall = side < 3 ? least[axis] : most[axis];
-      Real out[4];
-      for (int i = 0; i < 4; ++i) out[i] = inward * (wall - places_[node[i]].at[axis]);
-      Real* const beyond = beyond_.data();
+      Real in[4];
+      for (int i = 0; i < 4; ++i) in[i] = inward * (corner[i][axis] - wall);
+      Real* const within = within_.data();
       const Real *w0 = &surface_.weights[0][first], *w1 = &surface_.weights[1][first],
                  *w2 = &surface_.weights[2][first], *w3 = &surface_.weights[3][first];
-      for (int k = 0; k < count; ++k)
-        beyond[k] = w0[k] * out[0] + w1[k] * out[1] + w2[k] * out[2] + w3[k] * out[3];
-      for (int k = 0; k < count; ++k) {
-        if (!(beyond[k] > 0)) continue;
+#pragma GCC ivdep
+      for (int k = 0; k < count; ++k) within[k] = w0[k] * in[0] + w1[k] * in[1] + w2[k] * in[2] + w3[k] * in[3];
+      const int found = kernels_.find_at_most(within, count, Real(0), awake_.data());
+      for (int i = 0; i < found; ++i) {
+        const int k = awake_[i];
+        if (!(within[k] < 0)) continue;
         const typename Tables::Sample& sample = surface_.samples[first + k];
         SurfaceTouch<Real>& touch = touches_.emplace_back();
         touch.body = body, touch.against = -1, touch.sample = first + k, touch.tet = -1;
-        touch.nodes = 4, touch.depth = beyond[k];
+        touch.nodes = 4, touch.depth = -within[k];
         std::copy_n(sample.node, 4, touch.node), std::copy_n(sample.weight, 4, touch.weight);
         std::copy_n(sample_place(view, first + k).at, 3, touch.place);
         for (Real& c : touch.normal) c = 0;
         touch.normal[axis] = inward;
       }
     }
+    sides_[tet] = 0;
   }
 }
 

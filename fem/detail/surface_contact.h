@@ -73,7 +73,7 @@ class SurfaceContacts {
   void find_core(const LaneView<Real>&, int tet);
   int row_of_core(int tet) const { return world_nodes_ + 4 * tet; }
   int row_of_sample(int sample) const { return first_sample_row_ + sample; }
-  Real travel_of(int lane, const LaneView<Real>&, int a, int b);
+  Real travel_of(const LaneView<Real>&, int a, int b);
   void build(const LaneView<Real>&, int from, int into, Real reach, Near&);
   void collect_groups(const LaneView<Real>&, int from, const Real lower[3], const Real upper[3], Real reach);
   void sort_groups(const Real lower[3], const Real upper[3]);
@@ -101,8 +101,7 @@ class SurfaceContacts {
   Real step_;
   std::vector<std::pair<int, int>> pairs_;  // a body with itself, or a < b
   std::vector<List> lists_;                 // [lane × pairs + pair]
-  std::vector<Real> self_travel_;           // [lane × bodies + body] of nodes against their mean
-  // [lane × bodies + body], of its wall_tets: travel before which none of their nodes can be beyond a wall.
+  // [lane × bodies + body], of its wall_nodes: travel before which they cannot be beyond a wall.
   std::vector<std::vector<Real>> walls_asleep_until_;
   std::vector<SurfaceTouch<Real>> touches_;
   // Rows: the world's nodes, four corners of each core, the samples; those are of this call whose stamp is.
@@ -127,7 +126,9 @@ class SurfaceContacts {
   std::vector<TetPlanes<Real>> planes_;
   std::vector<NearTet<Real>> near_tet_;
   std::vector<int> beside_;   // a tet
-  std::vector<Real> beyond_;  // how far the samples of a tet are beyond a wall
+  std::vector<Real> within_;  // how far the samples of a tet are within a wall; filled up for the kernel
+  std::vector<int> beyond_tets_;
+  std::vector<unsigned char> sides_;  // a tet: of walls that some node of it is beyond, bits; else 0
 };
 
 extern template class SurfaceContacts<float>;

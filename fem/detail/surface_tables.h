@@ -33,7 +33,8 @@ struct SurfaceTables {
     Field field;
     Real reach_factor;  // no corner of a core moves farther than this times the body's fastest node
     std::vector<int> sampled_tets, cored_tets;  // world tets, ascending
-    std::vector<int> wall_tets;                 // those with a sample that walls can push
+    // Nodes of the tets with a sample that walls can push, ascending, and of each those tets.
+    std::vector<int> wall_nodes, first_tet_of_wall_node, tets_of_wall_nodes;
   };
   std::vector<Sample> samples;   // ascending by tet
   std::vector<Real> weights[4];  // of the samples, in columns

@@ -11,7 +11,7 @@ namespace limber::fem::testing {
 // One lane of a world, with the boxes and travel that a stepper would keep.
 struct Lane {
   const World& world;
-  std::vector<float> x, v, f, lower, upper, travel;
+  std::vector<float> x, v, f, lower, upper, travel, inner_travel;
 
   explicit Lane(const World& w)
       : world(w),
@@ -20,7 +20,8 @@ struct Lane {
         f(x.size()),
         lower(3 * w.bodies.size()),
         upper(lower),
-        travel(w.bodies.size()) {
+        travel(w.bodies.size()),
+        inner_travel(travel) {
     update_boxes();
   }
   void update_boxes() {
@@ -42,7 +43,7 @@ struct Lane {
       farthest = std::max(farthest, (q - p).norm());
       p = q;
     }
-    travel[body] += farthest;
+    travel[body] += farthest, inner_travel[body] += 2 * farthest;
     update_boxes();
   }
   State state() const {
@@ -52,7 +53,8 @@ struct Lane {
     return state;
   }
   detail::LaneView<float> view() {
-    return {x.data(), v.data(), f.data(), {3, 1}, {3, 1}, 1, lower.data(), upper.data(), travel.data()};
+    return {x.data(), v.data(),     f.data(),     {3, 1},        {3, 1},
+            1,        lower.data(), upper.data(), travel.data(), inner_travel.data()};
   }
   Vec3 place(int point) const {
     const auto& p = world.topology.points[point];

@@ -33,7 +33,7 @@ std::vector<Vec3> forces_of(Lane& lane) {
   // The kernel of one lane reads records of eight numbers.
   std::vector<float> records(8 * std::size_t(lane.world.nodes), 0.f);
   for (int n = 0; n < lane.world.nodes; ++n) std::copy_n(&lane.x[3 * n], 3, &records[8 * n]);
-  limits.find(records.data());
+  limits.find(records.data(), lane.inner_travel.data(), {false});
   std::fill(lane.f.begin(), lane.f.end(), 0.f);
   limits.add_forces(0, lane.view());
   std::vector<Vec3> forces;
