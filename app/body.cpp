@@ -313,7 +313,7 @@ PreparedBody read_body(const fs::path& folder) {
     body.cage = read_msh(folder / "cage.msh", &body.shell_from_tet);
     body.binding = ffd::read_binding(folder / "binding.npz", body.surface, body.cage);
     body.contact = read_contact_shape(folder / "contact.npz", body.surface, body.cage);
-    body.gradients = ffd::node_gradients(body.cage);
+    body.gradients = node_gradients(body.cage);
   } catch (const InputError& error) {
     throw InputError(fmt::format(
         "{}; make the body anew with limber prepare, or the scene's bodies with limber plan", error.what()));

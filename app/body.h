@@ -49,8 +49,8 @@ struct PreparedBody {
   std::vector<int> shell_from_tet;  // (T)
   ffd::Binding binding;
   ContactShape contact;
-  ffd::NodeGradients gradients;  // of the cage
-  scenes::Deformation deformation = scenes::usual_deformation;
+  NodeGradients gradients;  // of the cage
+  scenes::Deformation deformation = scenes::Deformation::linear;
   Points goal_shape_m;  // of a robot whose scene has a goal.shape.cage: that cage's nodes; else empty
   Json report;
 };

@@ -27,7 +27,8 @@ std::uint64_t hash_of(const fem::World& world) {
         .value(int(m.model))
         .value(int(body.moving))
         .value(int(body.kind))
-        .value(int(body.self_contact));
+        .value(int(body.self_contact))
+        .value(int(body.phong));
     for (const double v : {m.youngs_modulus_pa, m.poisson_ratio, m.density_kg_m3, m.damping_ratio, m.friction,
                            body.stiffness_share, body.max_volume_change, body.max_stretch})
       hasher.value(v);

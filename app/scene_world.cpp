@@ -373,6 +373,7 @@ void set_contact(const scenes::Scene& scene, const std::vector<PreparedBody>& pr
   for (std::size_t b = 0; b < prepared.size(); ++b) {
     const scenes::BodySpec& body = scene.bodies[b];
     const bool on_surface = body.contact == scenes::Contact::surface && prepared[b].contact.usable;
+    spec.bodies[b].phong = !all_cages && body.deformation == scenes::Deformation::phong;
     if (!all_cages)
       spec.bodies[b].shape = std::make_shared<const ContactShape>(
           on_surface ? prepared[b].contact : shape_of_cage(prepared[b].cage));

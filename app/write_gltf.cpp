@@ -300,7 +300,7 @@ class Writer {
 
   // The surface is the mean, by the binding's weights, of maps X ↦ x + L (X − X⁰), one a node of the cage: L
   // is 1 in linear deformation and ½ F in Phong's.
-  std::vector<Eigen::Matrix3d> maps_of_nodes(int b, const ffd::NodeGradients& gradients,
+  std::vector<Eigen::Matrix3d> maps_of_nodes(int b, const NodeGradients& gradients,
                                              const Points& cage) const {
     std::vector<Eigen::Matrix3d> maps(std::size_t(cage.rows()), Eigen::Matrix3d::Identity());
     if (!bends(b)) return maps;
@@ -361,8 +361,7 @@ class Writer {
       Stretch last;
     };
     std::vector<Channels> channels(upper.size());
-    const ffd::NodeGradients gradients =
-        ffd::node_gradients({rest, motion_.bodies[std::size_t(b)].cage.tets});  // y up
+    const NodeGradients gradients = node_gradients({rest, motion_.bodies[std::size_t(b)].cage.tets});  // y up
     for (const Points& place : places) {
       throw_if_stopped();
       const std::vector<Eigen::Matrix3d> maps = maps_of_nodes(b, gradients, place);

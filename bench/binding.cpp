@@ -48,7 +48,7 @@ void measure(const std::string& path, const SurfaceMesh& surface, int tets) {
   const double bind_s = seconds_of([&] { binding = ffd::bind(surface, cage); });
   Points moved, normals;
   const double deform_s = seconds_of([&] { ffd::deform(binding, cage.tets, cage.positions, moved); });
-  const ffd::NodeGradients gradients = ffd::node_gradients(cage);
+  const NodeGradients gradients = node_gradients(cage);
   Points bent;
   const double phong_s =
       seconds_of([&] { ffd::deform_phong(binding, cage, gradients, cage.positions, bent); });

@@ -268,7 +268,7 @@ std::vector<ContactForce> contact_forces(const World& world, const State& state)
     for (int c = 0; c < 3; ++c) lower.push_back(float(box.lower[c])), upper.push_back(float(box.upper[c]));
   }
   constexpr detail::Layout rows{3, 1};
-  const detail::LaneView<float> view{x.data(), v.data(),     f.data(),     rows,         rows,
+  const detail::LaneView<float> view{x.data(), v.data(),     f.data(),     rows,          rows,
                                      1,        lower.data(), upper.data(), travel.data(), travel.data()};
   std::vector<detail::Exerted<float>> exerted;
   const auto ask = [&](auto contacts) {

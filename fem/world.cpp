@@ -117,6 +117,7 @@ Body make_body(const BodySpec& spec) {
   for (int n : spec.fixed_nodes) body.fixed[n] = true;
   body.moving = std::find(body.fixed.begin(), body.fixed.end(), false) != body.fixed.end();
   body.node_mass_kg.assign(std::size_t(nodes), 0.0);
+  body.phong = spec.phong && spec.shape && body.moving && spec.kind == BodyKind::deformable;
   body.rest_volume_m3 = volume(body.cage);
   const std::size_t tets = std::size_t(spec.cage.tets.rows());
   body.youngs_modulus_from_tet_pa = spec.youngs_modulus_from_tet_pa;

@@ -53,6 +53,7 @@ struct BodySpec {
   // Of the fine surface that the cage moves: contact is where that is. All bodies of a world have one, or
   // none has: then contact is between the cages. Shared, for it is large and never changes.
   std::shared_ptr<const ContactShape> shape = nullptr;
+  bool phong = false;  // the cage moves that surface by Phong Deformation (docs/binding.md); else linearly
 };
 
 struct WorldSpec {
@@ -87,8 +88,9 @@ struct Body {
   std::vector<double> youngs_modulus_from_tet_pa,
       density_from_tet_kg_m3;  // (T) the material's, or a part's own
   double mass_kg, rest_volume_m3;
-  std::shared_ptr<const ContactShape> shape;        // as given
-  double max_volume_change, max_stretch;            // as asked for
+  std::shared_ptr<const ContactShape> shape;  // as given
+  bool phong;                             // as asked for; false unless deformable, moving and with a shape
+  double max_volume_change, max_stretch;  // as asked for
   std::vector<Eigen::Matrix3d> inverse_rest_edges;  // (T) of the edges from a tet's node 0, as columns
   double stiffness_share;     // by which the elements' stiffness is multiplied; 1 unless mesh_independent
   double elastic_dt_limit_s;  // largest stable step of the damped elastic body; infinite unless deformable

@@ -4,6 +4,7 @@
 #pragma once
 
 #include "core/mesh.h"
+#include "core/node_gradients.h"
 
 namespace limber::ffd {
 
@@ -22,16 +23,6 @@ Binding bind(const SurfaceMesh& surface, const TetMesh& cage);
 
 // surface_positions (V × 3) is overwritten; it allocates only where it has another size.
 void deform(const Binding&, const Tets&, const Points& cage_positions, Points& surface_positions);
-
-// What turns positions of a cage's nodes into deformation gradients at the nodes: F_i = Σ_j x_j g_ijᵀ is the
-// mean of the gradients of the tets round node i, by their rest volumes. Σ_j g_ij = 0; 0 for a node of no
-// tet.
-struct NodeGradients {
-  std::vector<int> begin;      // (N + 1) node i has the entries begin[i] … begin[i + 1] − 1 of the others
-  std::vector<int> neighbour;  // j: i itself and all that share a tet with it, ascending
-  Points gradient;             // g_ij, 1/m
-};
-NodeGradients node_gradients(const TetMesh& rest_cage);
 
 // F of each node, row after row.
 using Gradients = Eigen::Matrix<double, Eigen::Dynamic, 9, Eigen::RowMajor>;  // (N × 9)

@@ -98,7 +98,6 @@ struct FixedSpec {
 
 // How the fine surface follows the nodes of its cage: docs/binding.md.
 enum class Deformation { linear, phong };
-constexpr Deformation usual_deformation = Deformation::linear;  // of a scene that does not say
 
 // Of soft bodies that are touched at their surface, where the scene does not say; and what is no limit.
 constexpr double usual_max_stretch = 2, any_stretch = 1000;
@@ -110,7 +109,7 @@ struct BodySpec {
   Contact contact = Contact::surface;
   std::optional<bool>
       self_contact;  // parts of it push one another apart; nothing: wherever it can reach itself
-  Deformation deformation = usual_deformation;
+  Deformation deformation = Deformation::linear;
   double max_volume_change = 0.1;  // |V − V0|/V0 in all states of a plan, in (0, 1]
   // > 1: the body stiffens towards tets whose singular values are outside of 1/s and s, and in all states of
   // a plan they are within. Nothing, or any_stretch: no limit.

@@ -172,7 +172,8 @@ struct StretchedTets {
   const Real* inverse_rest;  // (9 a tet) of the edges at rest from node 0 as columns, row by row
   int count;
   Real least, most;
-  const Real* reach;  // no singular value changes by more than this times what its nodes move, against any place
+  const Real*
+      reach;  // no singular value changes by more than this times what its nodes move, against any place
 };
 
 template <class Real>
@@ -192,8 +193,8 @@ struct Kernels {
   // [lane] The largest square of a velocity of the nodes [first, last) against their mean.
   void (*inner_speed2)(int first, int last, const Real* v, Real* speed2);
   // Which tets have a singular value beyond a limit, or are inverted, in some lane, ascending, and in which
-  // lanes, as bits. Returns how many. A tet sleeps in a lane while `travel` [lane], of the body's nodes against
-  // their mean, is below `asleep_until` [tet][lane]. Reads multiples of block_size.
+  // lanes, as bits. Returns how many. A tet sleeps in a lane while `travel` [lane], of the body's nodes
+  // against their mean, is below `asleep_until` [tet][lane]. Reads multiples of block_size.
   int (*find_stretched)(const StretchedTets<Real>&, const Real* x, const Real* travel, Real* asleep_until,
                         int* tets, unsigned* lanes);
   // The planes of tets[k].corner, and their boxes moved out by `reach`.

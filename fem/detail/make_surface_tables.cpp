@@ -5,6 +5,7 @@
 #include <map>
 
 #include "core/error.h"
+#include "core/node_gradients.h"
 #include "fem/detail/surface_contact.h"
 
 namespace limber::fem::detail {
@@ -37,6 +38,64 @@ double reach_factor(const Tables64::Core& core) {
   double sum = 0, most = 0;
   for (const double l : core.least) sum += std::abs(l);
   for (const double l : core.least) most = std::max(most, sum - std::abs(l) + std::abs(l + core.scale));
+  return most;
+}
+
+// What Phong Deformation needs of all bodies.
+void append_slopes(const World& world, Tables64& tables) {
+  std::vector<std::vector<Tables64::Slope>> slopes(std::size_t(world.nodes));
+  bool any = false;
+  for (const Body& body : world.bodies) {
+    if (!body.phong) continue;
+    any = true;
+    const NodeGradients gradients = node_gradients(body.cage);
+    for (int n = 0; n < body.node_count(); ++n)
+      for (int k = gradients.begin[std::size_t(n)]; k < gradients.begin[std::size_t(n) + 1]; ++k)
+        slopes[std::size_t(body.first_node + n)].push_back(
+            {body.first_node + gradients.neighbour[std::size_t(k)],
+             {gradients.gradient(k, 0), gradients.gradient(k, 1), gradients.gradient(k, 2)}});
+  }
+  if (!any) return;
+  for (const auto& of_node : slopes) {
+    tables.first_slope.push_back(int(tables.slopes.size()));
+    tables.slopes.insert(tables.slopes.end(), of_node.begin(), of_node.end());
+  }
+  tables.first_slope.push_back(int(tables.slopes.size()));
+  tables.weight_gradients.resize(9 * world.topology.tets.size());
+  for (const Body& body : world.bodies)
+    for (std::size_t t = 0; t < body.inverse_rest_edges.size(); ++t)
+      for (int i = 0; i < 9; ++i)
+        tables.weight_gradients[9 * (std::size_t(body.first_tet) + t) + std::size_t(i)] =
+            body.inverse_rest_edges[t](i / 3, i % 3);
+}
+
+double bulge_of(const Body& body, double skin_m) {
+  if (!body.phong) return 0;
+  constexpr double of_skin = 0.3, of_size = 0.02;
+  return std::min(of_skin * skin_m, of_size * bounding_box(body.cage.positions).size().maxCoeff());
+}
+
+// Of ¼ ½ |(Fᵢ − Fⱼ) (Xⱼ − Xᵢ)|, the largest over the edges of tets, a node's movement by one.
+double bend_factor_of(const Body& body, const Tables64& tables) {
+  double most = 0;
+  std::map<int, Vec3> difference;
+  for (Eigen::Index t = 0; t < body.cage.tets.rows() && body.phong; ++t)
+    for (int i = 0; i < 4; ++i)
+      for (int j = 0; j < i; ++j) {
+        const int ends[2] = {body.cage.tets(t, i), body.cage.tets(t, j)};
+        difference.clear();
+        for (const int side : {0, 1})
+          for (int k = tables.first_slope[std::size_t(body.first_node + ends[side])];
+               k < tables.first_slope[std::size_t(body.first_node + ends[side]) + 1]; ++k) {
+            const Tables64::Slope& slope = tables.slopes[std::size_t(k)];
+            difference.try_emplace(slope.node, Vec3::Zero()).first->second +=
+                (side == 0 ? 1.0 : -1.0) * Eigen::Map<const Vec3>(slope.gradient);
+          }
+        const Vec3 edge = body.cage.positions.row(ends[1]) - body.cage.positions.row(ends[0]);
+        double sum = 0;
+        for (const auto& [node, gradient] : difference) sum += std::abs(gradient.dot(edge));
+        most = std::max(most, 0.25 * 0.5 * sum);
+      }
   return most;
 }
 
@@ -102,6 +161,18 @@ void append_tets_round_nodes(const Body& body, Tables64& tables) {
                                                                                             t);
 }
 
+void append_shares(const World& world, Tables64& tables) {
+  if (tables.slopes.empty()) return;
+  std::vector<double> scratch(std::size_t(world.nodes), 0.0);
+  const double* rest = world.tables64.rest_positions.data();
+  for (const auto& sample : tables.samples) {
+    tables.first_share.push_back(int(tables.shares.size()));
+    if (tables.first_slope[std::size_t(sample.node[0])] < tables.first_slope[std::size_t(sample.node[0]) + 1])
+      tables.spread(rest, sample.node, sample.weight, 1, scratch, tables.shares);
+  }
+  tables.first_share.push_back(int(tables.shares.size()));
+}
+
 SurfaceTables<float> single_precision(const Tables64& t) {
   SurfaceTables<float> out;
   for (const auto& s : t.samples) {
@@ -121,12 +192,18 @@ SurfaceTables<float> single_precision(const Tables64& t) {
     copy.field.values = b.field.values;
     std::copy_n(b.field.nodes, 3, copy.field.nodes), std::copy_n(b.field.lower, 3, copy.field.lower);
     copy.field.inverse_cell = float(b.field.inverse_cell), copy.field.unit = float(b.field.unit);
+    copy.phong = b.phong, copy.bulge = float(b.bulge), copy.bend_factor = 1.0001f * float(b.bend_factor);
     copy.reach_factor = 1.0001f * float(b.reach_factor);
     copy.sampled_tets = b.sampled_tets, copy.cored_tets = b.cored_tets;
     copy.wall_nodes = b.wall_nodes, copy.first_tet_of_wall_node = b.first_tet_of_wall_node;
     copy.tets_of_wall_nodes = b.tets_of_wall_nodes;
   }
   out.offset.assign(t.offset.begin(), t.offset.end());
+  for (const auto& s : t.slopes)
+    out.slopes.push_back({s.node, {float(s.gradient[0]), float(s.gradient[1]), float(s.gradient[2])}});
+  out.first_slope = t.first_slope, out.first_share = t.first_share;
+  for (const auto& s : t.shares) out.shares.push_back({s.node, float(s.weight)});
+  out.weight_gradients.assign(t.weight_gradients.begin(), t.weight_gradients.end());
   out.tets_round_node = t.tets_round_node;
   return out;
 }
@@ -166,6 +243,12 @@ void make_surface_tables(double offset_m, World& world) {
   Tables64& tables = world.surfaces64;
   tables.bodies.resize(world.bodies.size());
   tables.tets_round_node.resize(std::size_t(world.nodes));
+  append_slopes(world, tables);
+  for (std::size_t b = 0; b < world.bodies.size(); ++b) {
+    Tables64::Body& body = tables.bodies[b];
+    body.phong = world.bodies[b].phong, body.bulge = bulge_of(world.bodies[b], world.tables64.skin[b]);
+    body.bend_factor = bend_factor_of(world.bodies[b], tables);
+  }
   for (const bool moving : {true, false})  // in the order of the world's tets
     for (std::size_t b = 0; b < world.bodies.size(); ++b) {
       if (world.bodies[b].moving != moving) continue;
@@ -173,6 +256,7 @@ void make_surface_tables(double offset_m, World& world) {
       if (world.bodies[b].self_contact) append_tets_round_nodes(world.bodies[b], tables);
     }
   tables.first_sample.push_back(int(tables.samples.size()));
+  append_shares(world, tables);
   const std::size_t bodies = world.bodies.size();
   tables.wall_slack = 0.05 * offset_m;
   tables.offset.assign(bodies * bodies, offset_m);

@@ -53,7 +53,7 @@ Stepper<Real>::Stepper(const World& world, int lanes, Isa isa)
   lower_.resize(3 * bodies), upper_.resize(3 * bodies);
   for (const Body& body : world.bodies)
     wears_inside_.push_back(body.kind != BodyKind::rigid &&
-                            (std::isfinite(body.max_stretch) || body.self_contact));
+                            (std::isfinite(body.max_stretch) || body.self_contact || body.phong));
   speed2_.assign(bodies, 0), travel_.assign(bodies, 0), inner_travel_.assign(bodies, 0);
   unchanged_.assign(bodies, 0), asleep_.assign(bodies, 0), stands_.assign(bodies, 0);
   met_.assign(world.bodies.size() * bodies, false);

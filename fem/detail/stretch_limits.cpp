@@ -66,8 +66,8 @@ StretchLimits<Real>::StretchLimits(const World& world, const Kernels<Real>& kern
   for (std::size_t k = 0; k < bodies_.size(); ++k) {
     Body& body = bodies_[k];
     const int count = int(first[k + 1] - first[k]);
-    body.tets = {&nodes_[4 * first[k]], &inverse_rest_[9 * first[k]], count,
-                 body.least,            body.most,                    body.reach.data()};
+    body.tets = {&nodes_[4 * first[k]], &inverse_rest_[9 * first[k]], count, body.least, body.most,
+                 body.reach.data()};
     body.stretched.resize(std::size_t(count)), body.lanes.resize(std::size_t(count));
     body.asleep_until.resize(std::size_t(count * kernels.lanes + block_size));
   }
@@ -85,11 +85,11 @@ void StretchLimits<Real>::forget(int lane) {
 template <class Real>
 void StretchLimits<Real>::find(const Real* x, const Real* inner_travel, const std::vector<bool>& all_asleep) {
   for (Body& body : bodies_)
-    body.found = all_asleep[std::size_t(body.index)]
-                     ? 0
-                     : kernels_.find_stretched(body.tets, x, inner_travel + body.index * kernels_.lanes,
-                                               body.asleep_until.data(), body.stretched.data(),
-                                               body.lanes.data());
+    body.found =
+        all_asleep[std::size_t(body.index)]
+            ? 0
+            : kernels_.find_stretched(body.tets, x, inner_travel + body.index * kernels_.lanes,
+                                      body.asleep_until.data(), body.stretched.data(), body.lanes.data());
 }
 
 template <class Real>

@@ -18,8 +18,8 @@ class StretchLimits {
  public:
   StretchLimits(const World&, const Kernels<Real>&);
   void forget(int lane);  // the lane holds another state now
-  // Finds the tets that are stretched in some lane; x of all lanes. `inner_travel` [body][lane]: how far nodes
-  // can have come since then against their body's mean. Bodies that are all asleep are left out.
+  // Finds the tets that are stretched in some lane; x of all lanes. `inner_travel` [body][lane]: how far
+  // nodes can have come since then against their body's mean. Bodies that are all asleep are left out.
   void find(const Real* x, const Real* inner_travel, const std::vector<bool>& all_asleep);
   // Adds to view.f the forces of those of this lane.
   void add_forces(int lane, const LaneView<Real>& view);

@@ -74,6 +74,31 @@ Real SurfaceTables<Real>::Field::at(const Real place[3], Real gradient[3]) const
 }
 
 template <class Real>
+void SurfaceTables<Real>::spread(const Real* rest, const int node[4], const Real weight[4], Real sign,
+                                 std::vector<Real>& scratch, std::vector<Share>& out) const {
+  Real at_rest[3] = {0, 0, 0};
+  for (int i = 0; i < 4; ++i)
+    for (int c = 0; c < 3; ++c) at_rest[c] += weight[i] * rest[3 * node[i] + c];
+  const std::size_t first = out.size();
+  for (int i = 0; i < 4; ++i) {
+    Real half[3];
+    for (int c = 0; c < 3; ++c) half[c] = Real(0.5) * weight[i] * (at_rest[c] - rest[3 * node[i] + c]);
+    for (int k = first_slope[node[i]]; k < first_slope[node[i] + 1]; ++k) {  // the node itself among them
+      Real& sum = scratch[slopes[k].node];
+      if (sum == 0) out.push_back({slopes[k].node, 0});
+      sum += dot(half, slopes[k].gradient) + (slopes[k].node == node[i] ? weight[i] : Real(0));
+    }
+  }
+  std::size_t kept_shares = first;  // a sum may have been 0 in between
+  for (std::size_t k = first; k < out.size(); ++k) {
+    Real& sum = scratch[out[k].node];
+    if (sum != 0) out[kept_shares++] = {out[k].node, sign * sum};
+    sum = 0;
+  }
+  out.resize(kept_shares);
+}
+
+template <class Real>
 SurfaceContacts<Real>::SurfaceContacts(const World& world, const Kernels<Real>& kernels, int lanes)
     : world_(world),
       topology_(world.topology),
@@ -84,6 +109,8 @@ SurfaceContacts<Real>::SurfaceContacts(const World& world, const Kernels<Real>& 
       world_nodes_(world.nodes),
       first_sample_row_(world.nodes + 4 * int(world.topology.tets.size())),
       first_sample_stamp_(world.nodes + int(world.topology.tets.size())),
+      first_slopes_stamp_(first_sample_stamp_ + int(surface_.samples.size())),
+      first_bends_stamp_(first_slopes_stamp_ + (surface_.slopes.empty() ? 0 : world.nodes)),
       step_(Real(world.contact_dt_s)) {
   for (int a = 0; a < bodies_; ++a) {
     if (world.bodies[a].moving && world.bodies[a].self_contact) pairs_.emplace_back(a, a);
@@ -95,7 +122,9 @@ SurfaceContacts<Real>::SurfaceContacts(const World& world, const Kernels<Real>& 
   const std::size_t tets = topology_.tets.size(), samples = surface_.samples.size();
   lists_.resize(std::size_t(lanes) * pairs_.size());
   places_.resize(std::size_t(first_sample_row_) + samples);
-  stamps_.assign(std::size_t(world_nodes_) + tets + samples, 0);
+  if (!surface_.slopes.empty())
+    slopes_.resize(std::size_t(world_nodes_)), spread_.resize(slopes_.size(), 0), bends_.resize(tets);
+  stamps_.assign(std::size_t(first_bends_stamp_) + bends_.size(), 0);
   loads_.assign(std::size_t(world_nodes_), 0);
   beside_.assign(tets, -1), sides_.assign(tets, 0);
   walls_asleep_until_.resize(std::size_t(lanes * bodies_));
@@ -142,6 +171,74 @@ auto SurfaceContacts<Real>::sample_place(const LaneView<Real>& view, int index) 
 }
 
 template <class Real>
+auto SurfaceContacts<Real>::slopes_at(const LaneView<Real>& view, int node) -> const Slopes& {
+  Slopes& slopes = slopes_[node];
+  unsigned& stamp = stamps_[first_slopes_stamp_ + node];
+  if (stamp == stamp_) return slopes;
+  stamp = stamp_;
+  Row sum[3] = {{}, {}, {}};
+  for (int k = surface_.first_slope[node]; k < surface_.first_slope[node + 1]; ++k) {
+    const typename Tables::Slope& slope = surface_.slopes[k];
+    const Row place = node_place(view, slope.node).row;
+    for (int c = 0; c < 3; ++c) sum[c] += slope.gradient[c] * place;
+  }
+  for (int c = 0; c < 3; ++c) slopes.column[c].row = sum[c];
+  return slopes;
+}
+
+// ½ Σ wᵢ Fᵢ (X − Xᵢ) = Σ wᵢ wⱼ ½ (Fᵢ − Fⱼ) (Xⱼ − Xᵢ) over the edges; in the middle of one ¼ of its own.
+template <class Real>
+auto SurfaceContacts<Real>::bends_of(const LaneView<Real>& view, int tet) -> const Bends& {
+  Bends& bends = bends_[tet];
+  unsigned& stamp = stamps_[first_bends_stamp_ + tet];
+  if (stamp == stamp_) return bends;
+  stamp = stamp_;
+  const int* node = topology_.tets[tet].node;
+  const Real* rest = tables_.rest_positions.data();
+  Real most2 = 0;
+  for (int i = 0, e = 0; i < 4; ++i) {
+    const Slopes& own = slopes_at(view, node[i]);
+    for (int j = i + 1; j < 4; ++j, ++e) {
+      const Slopes& other = slopes_at(view, node[j]);
+      Row sum = {};
+      for (int c = 0; c < 3; ++c) {
+        const Real way = Real(0.5) * (rest[3 * node[j] + c] - rest[3 * node[i] + c]);
+        sum += way * (own.column[c].row - other.column[c].row);
+      }
+      bends.of_edge[e].row = sum;
+      most2 = std::max(most2, dot(bends.of_edge[e].at, bends.of_edge[e].at));
+    }
+  }
+  bends.most = Real(0.25) * std::sqrt(most2);
+  return bends;
+}
+
+template <class Real>
+Real SurfaceContacts<Real>::bulge_of(const LaneView<Real>& view, int body, int tet) {
+  const typename Tables::Body& table = surface_.bodies[body];
+  return table.phong ? std::min(bends_of(view, tet).most, table.bulge) : Real(0);
+}
+
+template <class Real>
+Real SurfaceContacts<Real>::sample_bulge(const LaneView<Real>& view, int body, int index) {
+  const typename Tables::Body& table = surface_.bodies[body];
+  if (!table.phong) return 0;
+  const typename Tables::Sample& sample = surface_.samples[index];
+  const Place way = bend(bends_of(view, sample.tet), sample.weight);
+  return std::min(std::sqrt(dot(way.at, way.at)), table.bulge);
+}
+
+// By how much Phong Deformation moves a place away from where linear deformation has it.
+template <class Real>
+auto SurfaceContacts<Real>::bend(const Bends& bends, const Real w[4]) -> Place {
+  Place way;
+  way.row = (w[0] * w[1]) * bends.of_edge[0].row + (w[0] * w[2]) * bends.of_edge[1].row +
+            (w[0] * w[3]) * bends.of_edge[2].row + (w[1] * w[2]) * bends.of_edge[3].row +
+            (w[1] * w[3]) * bends.of_edge[4].row + (w[2] * w[3]) * bends.of_edge[5].row;
+  return way;
+}
+
+template <class Real>
 void SurfaceContacts<Real>::find_core(const LaneView<Real>& view, int tet) {
   unsigned& stamp = stamps_[world_nodes_ + tet];
   if (stamp == stamp_) return;
@@ -157,8 +254,12 @@ void SurfaceContacts<Real>::find_core(const LaneView<Real>& view, int tet) {
 template <class Real>
 Real SurfaceContacts<Real>::travel_of(const LaneView<Real>& view, int a, int b) {
   const Real factor_a = surface_.bodies[a].reach_factor, factor_b = surface_.bodies[b].reach_factor;
-  if (a == b) return (1 + factor_a) * view.inner_travel[a * view.stride];
-  return factor_a * view.travel[a * view.stride] + factor_b * view.travel[b * view.stride];
+  Real travel = a == b ? (1 + factor_a) * view.inner_travel[a * view.stride]
+                       : factor_a * view.travel[a * view.stride] + factor_b * view.travel[b * view.stride];
+  for (const int body : {a, b})
+    if (surface_.bodies[body].phong)
+      travel += surface_.bodies[body].bend_factor * view.inner_travel[body * view.stride];
+  return travel;
 }
 
 template <class Real>
@@ -168,13 +269,13 @@ void SurfaceContacts<Real>::add_forces(int lane, const LaneView<Real>& view) {
   share_loads(view);
   for (const SurfaceTouch<Real>& touch : touches_) respond(view, touch);
   for (const SurfaceTouch<Real>& touch : touches_)
-    for (int i = 0; i < touch.nodes; ++i) loads_[touch.node[i]] = 0;
+    for (int i = touch.first_share; i < touch.last_share; ++i) loads_[shares_[i].node] = 0;
 }
 
 template <class Real>
 const std::vector<SurfaceTouch<Real>>& SurfaceContacts<Real>::find(int lane, const LaneView<Real>& view) {
   if (++stamp_ == 0) std::fill(stamps_.begin(), stamps_.end(), 0u), stamp_ = 1;
-  touches_.clear();
+  touches_.clear(), shares_.clear();
   for (std::size_t p = 0; p < pairs_.size(); ++p) find_pair(lane, view, p);
   for (int body = 0; body < bodies_ && world_.walls; ++body)
     if (topology_.bodies[body].moving && !view.sleeps(body)) find_walls(lane, view, body);
@@ -303,7 +404,8 @@ void SurfaceContacts<Real>::build(const LaneView<Real>& view, int from, int into
       lower[c] = groups_[0].lower[c], upper[c] = groups_[0].upper[c];
       for (const Group& group : groups_)
         lower[c] = std::min(lower[c], group.lower[c]), upper[c] = std::max(upper[c], group.upper[c]);
-      lower[c] -= reach, upper[c] += reach;
+      const Real margin = reach + surface_.bodies[from].bulge + surface_.bodies[into].bulge;
+      lower[c] -= margin, upper[c] += margin;
     }
     for (const int tet : surface_.bodies[into].cored_tets) {
       find_core(view, tet);
@@ -318,11 +420,15 @@ void SurfaceContacts<Real>::build(const LaneView<Real>& view, int from, int into
       if (meet) near_tets_.push_back({{row, row + 1, row + 2, row + 3}, -1, -1, tet, -1});
     }
   }
+  Real from_bulge = 0, into_bulge = 0;  // the largest that are near
+  for (const Group& group : groups_) from_bulge = std::max(from_bulge, bulge_of(view, from, group.tet));
+  for (const TetAndEdge& tet : near_tets_) into_bulge = std::max(into_bulge, bulge_of(view, into, tet.tet));
+  const Real margin = reach + from_bulge + into_bulge;
   const int first = groups_.empty() ? 0 : surface_.first_sample[groups_.front().tet],
             last = groups_.empty() ? 0 : surface_.first_sample[groups_.back().tet + 1];
   sort_groups(lower, upper);
   planes_.resize((near_tets_.size() + block_size - 1) / block_size);
-  kernels_.find_planes(near_tets_.data(), int(near_tets_.size()), &places_[0].at[0], reach, planes_.data());
+  kernels_.find_planes(near_tets_.data(), int(near_tets_.size()), &places_[0].at[0], margin, planes_.data());
   // beside_[tet] is k of the last near tet that it shares a node with.
   const auto mark_beside = [&](int tet, int k) {
     for (const int node : topology_.tets[tet].node)
@@ -339,20 +445,23 @@ void SurfaceContacts<Real>::build(const LaneView<Real>& view, int from, int into
                       *const uppers[3] = {&group_boxes_[3][begin], &group_boxes_[4][begin],
                                           &group_boxes_[5][begin]};
     const int meeting =
-        kernels_.meeting_boxes(planes, column, lowers, uppers, end - begin, reach, meeting_.data());
+        kernels_.meeting_boxes(planes, column, lowers, uppers, end - begin, margin, meeting_.data());
     if (from == into && meeting > 0) mark_beside(near_tets_[k].tet, int(k));
+    const Real tet_bulge = meeting > 0 ? bulge_of(view, into, near_tets_[k].tet) : Real(0);
     for (int m = 0; m < meeting; ++m) {
       const Group& group = groups_[begin + meeting_[m]];
       if (from == into && beside_[group.tet] == int(k)) continue;
       const Real* const at[3] = {&columns_[0][group.begin], &columns_[1][group.begin],
                                  &columns_[2][group.begin]};
       near_tet_.resize(std::size_t(group.count));
-      const int count = kernels_.near_points(planes, column, at, at, group.count, reach, near_tet_.data());
+      const int count = kernels_.near_points(planes, column, at, at, group.count, margin, near_tet_.data());
       for (int i = 0; i < count; ++i) {
         const int sample = group.first_sample + near_tet_[i].item;
+        const Real distance = near_tet_[i].distance - tet_bulge - sample_bulge(view, from, sample);
+        if (distance > reach) continue;
         TetAndEdge& found = found_.emplace_back(near_tets_[k]);
         found.from = found.to = row_of_sample(sample), found.point = sample;
-        found_distance_.push_back(near_tet_[i].distance);
+        found_distance_.push_back(distance);
       }
     }
   }
@@ -373,6 +482,7 @@ void SurfaceContacts<Real>::build(const LaneView<Real>& view, int from, int into
 template <class Real>
 void SurfaceContacts<Real>::find_in(const LaneView<Real>& view, int from, int into, Real reach, Real travel,
                                     Near& near) {
+  const bool bends = surface_.bodies[from].phong || surface_.bodies[into].phong;
   const std::size_t count = near.candidates.size();
   if (awake_.size() < count + block_size) awake_.resize(count + block_size), distance_.resize(awake_.size());
   const int awake = kernels_.find_at_most(near.asleep_until.data(), int(count), travel, awake_.data());
@@ -388,11 +498,12 @@ void SurfaceContacts<Real>::find_in(const LaneView<Real>& view, int from, int in
     int best = -1;
     Real best_weight[4], best_least = -std::numeric_limits<Real>::max();
     for (; i < awake && near.candidates[awake_[i]].point == sample; ++i) {
-      near.asleep_until[awake_[i]] = travel + kept * distance_[i] - rounding * reach;
-      if (distance_[i] > certain * reach) continue;
       const int tet = near.candidates[awake_[i]].tet;
+      const Real bulge = bends ? sample_bulge(view, from, sample) + bulge_of(view, into, tet) : Real(0);
+      near.asleep_until[awake_[i]] = travel + kept * (distance_[i] - bulge) - rounding * reach;
+      if (distance_[i] > bulge + certain * reach) continue;
       Real weight[4];
-      if (!weights_in(view, tet, place, weight)) continue;
+      if (!barycentric(view, tet, place, weight) || !near_core(view, tet, place, weight, bulge)) continue;
       const Real least = std::min(std::min(weight[0], weight[1]), std::min(weight[2], weight[3]));
       if (!(least > best_least)) continue;
       best = tet, best_least = least;
@@ -402,10 +513,37 @@ void SurfaceContacts<Real>::find_in(const LaneView<Real>& view, int from, int in
   }
 }
 
-// False outside of the tet's core, and in a tet that is inverted.
+// Whether a place and its weights are beyond no face of the tet's core, nor of its box, by more than `out`.
 template <class Real>
-bool SurfaceContacts<Real>::weights_in(const LaneView<Real>& view, int tet, const Real place[3],
-                                       Real weight[4]) {
+bool SurfaceContacts<Real>::near_core(const LaneView<Real>& view, int tet, const Real place[3],
+                                      const Real weight[4], Real out) {
+  const typename Tables::Core& core = surface_.cores[tet];
+  bool inside = true;
+  for (int i = 0; i < 4; ++i) inside &= weight[i] >= core.least[i];
+  if (inside || out == 0) return inside;
+  const Place* at = &places_[row_of_core(tet)];
+  for (int c = 0; c < 3; ++c)
+    if (place[c] < std::min(std::min(at[0].at[c], at[1].at[c]), std::min(at[2].at[c], at[3].at[c])) - out ||
+        place[c] > std::max(std::max(at[0].at[c], at[1].at[c]), std::max(at[2].at[c], at[3].at[c])) + out)
+      return false;
+  const int* node = topology_.tets[tet].node;
+  const Real* corner[4];
+  for (int i = 0; i < 4; ++i) corner[i] = node_place(view, node[i]).at;
+  Real edge[3][3], normal[4][3];
+  for (int i = 0; i < 3; ++i)
+    for (int c = 0; c < 3; ++c) edge[i][c] = corner[i + 1][c] - corner[0][c];
+  for (int i = 0; i < 3; ++i) cross(edge[(i + 1) % 3], edge[(i + 2) % 3], normal[i + 1]);
+  for (int c = 0; c < 3; ++c) normal[0][c] = normal[1][c] + normal[2][c] + normal[3][c];
+  const Real volume6 = dot(normal[1], edge[0]);
+  for (int i = 0; i < 4; ++i)
+    if ((core.least[i] - weight[i]) * volume6 > out * std::sqrt(dot(normal[i], normal[i]))) return false;
+  return true;
+}
+
+// False in a tet that is inverted.
+template <class Real>
+bool SurfaceContacts<Real>::barycentric(const LaneView<Real>& view, int tet, const Real place[3],
+                                        Real weight[4]) {
   const int* node = topology_.tets[tet].node;
   const Real* corner[4];
   for (int i = 0; i < 4; ++i) corner[i] = node_place(view, node[i]).at;
@@ -423,29 +561,19 @@ bool SurfaceContacts<Real>::weights_in(const LaneView<Real>& view, int tet, cons
     weight[i + 1] = dot(normal, p) / volume6;
     weight[0] -= weight[i + 1];
   }
-  const typename Tables::Core& core = surface_.cores[tet];
-  bool inside = true;
-  for (int i = 0; i < 4; ++i) inside &= weight[i] >= core.least[i];
-  return inside;
+  return true;
 }
 
-// Reads the field at rest, and turns its gradient into that of the distance where the tet is now. Appends a
-// touch where the surface is nearer than the offset, or above.
+// Reads the field at rest, and turns its gradient into that of the distance where the tet is now.
 template <class Real>
-bool SurfaceContacts<Real>::measure(const LaneView<Real>& view, int from, int into, int sample, int tet,
-                                    const Real weight[4]) {
-  const Real near = offset(from, into);
-  for (int c = 0; c < 3; ++c) {  // what is farther off is not in every list
-    const int k = (3 * into + c) * view.stride;
-    const Real at = places_[row_of_sample(sample)].at[c];
-    if (at < view.lower[k] - near || at > view.upper[k] + near) return false;
-  }
+bool SurfaceContacts<Real>::find_surface(const LaneView<Real>& view, int body, int tet, const Real weight[4],
+                                         Surface& found) {
   const int* node = topology_.tets[tet].node;
   const Real* rest = tables_.rest_positions.data();
   Real at_rest[3] = {0, 0, 0}, gradient[3];
   for (int i = 0; i < 4; ++i)
     for (int c = 0; c < 3; ++c) at_rest[c] += weight[i] * rest[3 * node[i] + c];
-  const Real distance = surface_.bodies[into].field.at(at_rest, gradient);
+  const Real distance = surface_.bodies[body].field.at(at_rest, gradient);
   const Real* corner[4];
   for (int i = 0; i < 4; ++i) corner[i] = node_place(view, node[i]).at;
   Real edge[3][3], normal[3], now[3] = {0, 0, 0}, volume6 = 0;
@@ -458,19 +586,100 @@ bool SurfaceContacts<Real>::measure(const LaneView<Real>& view, int from, int in
     for (int c = 0; c < 3; ++c) rise += gradient[c] * (rest[3 * node[i + 1] + c] - rest[3 * node[0] + c]);
     for (int c = 0; c < 3; ++c) now[c] += rise / volume6 * normal[c];
   }
-  const Real steepness = std::sqrt(dot(now, now));
-  if (!(steepness > Real(1e-3))) return false;
-  SurfaceTouch<Real> touch;
-  touch.depth = surface_.offset[from * bodies_ + into] - distance / steepness;
-  if (!(touch.depth > 0)) return false;
-  touch.body = from, touch.against = into, touch.sample = sample, touch.tet = tet, touch.nodes = 8;
-  const typename Tables::Sample& own = surface_.samples[sample];
-  for (int i = 0; i < 4; ++i) {
-    touch.node[i] = own.node[i], touch.weight[i] = own.weight[i];
-    touch.node[4 + i] = node[i], touch.weight[4 + i] = -weight[i];
+  return found.set(distance, now);
+}
+
+// The same of a surface that Phong Deformation moves. The place at rest is found by Newton's method, from
+// that of linear deformation, whose weights are given, with the gradients of nodes as the Jacobian; `weight`
+// becomes that of the place found, which may lie outside of the tet.
+template <class Real>
+bool SurfaceContacts<Real>::find_bent_surface(const LaneView<Real>& view, int body, int tet,
+                                              const Place& place, Real weight[4], Surface& found) {
+  constexpr int steps = 2;
+  constexpr Real thin = Real(1e-2);
+  const int* node = topology_.tets[tet].node;
+  const Real* weight_gradient = &surface_.weight_gradients[9 * std::size_t(tet)];
+  const Bends& bends = bends_of(view, tet);
+  Place row[3];  // of the inverse of the deformation gradient
+  for (int step = 0; step < steps; ++step) {
+    Place column[3], off;
+    for (Place& c : column) c.row = Row{};
+    off.row = place.row - bend(bends, weight).row;
+    for (int i = 0; i < 4; ++i) {
+      const Slopes& slopes = slopes_at(view, node[i]);
+      for (int c = 0; c < 3; ++c) column[c].row += weight[i] * slopes.column[c].row;
+      off.row -= weight[i] * node_place(view, node[i]).row;
+    }
+    for (int c = 0; c < 3; ++c)
+      cross(column[(c + 1) % 3].at, column[(c + 2) % 3].at, row[c].at), row[c].at[3] = 0;
+    const Real volume = dot(row[0].at, column[0].at);
+    if (!(volume > thin)) return false;
+    Real way[3];
+    for (int c = 0; c < 3; ++c) row[c].row *= 1 / volume, way[c] = dot(row[c].at, off.at);
+    for (int i = 0; i < 3; ++i) {
+      const Real more = dot(weight_gradient + 3 * i, way);
+      weight[i + 1] += more, weight[0] -= more;
+    }
   }
-  std::copy_n(places_[row_of_sample(sample)].at, 3, touch.place);
-  for (int c = 0; c < 3; ++c) touch.normal[c] = now[c] / steepness;
+  const Real* rest = tables_.rest_positions.data();
+  Real at_rest[3] = {0, 0, 0}, gradient[3], now[3] = {0, 0, 0};
+  for (int i = 0; i < 4; ++i)
+    for (int c = 0; c < 3; ++c) at_rest[c] += weight[i] * rest[3 * node[i] + c];
+  const Real distance = surface_.bodies[body].field.at(at_rest, gradient);
+  for (int i = 0; i < 3; ++i)
+    for (int c = 0; c < 3; ++c) now[c] += gradient[i] * row[i].at[c];
+  return found.set(distance, now);
+}
+
+// Appends a touch where the surface is nearer than the offset, or above.
+template <class Real>
+bool SurfaceContacts<Real>::measure(const LaneView<Real>& view, int from, int into, int sample, int tet,
+                                    const Real weight[4]) {
+  const Real near = offset(from, into), apart = surface_.offset[from * bodies_ + into];
+  for (int c = 0; c < 3; ++c) {  // what is farther off is not in every list
+    const int k = (3 * into + c) * view.stride;
+    const Real at = places_[row_of_sample(sample)].at[c];
+    if (at < view.lower[k] - near || at > view.upper[k] + near) return false;
+  }
+  const bool from_bends = surface_.bodies[from].phong, into_bends = surface_.bodies[into].phong;
+  const typename Tables::Sample& own = surface_.samples[sample];
+  const int* node = topology_.tets[tet].node;
+  Surface surface;
+  if (!find_surface(view, into, tet, weight, surface)) return false;
+  Place place = places_[row_of_sample(sample)];
+  Real against[4];
+  std::copy_n(weight, 4, against);
+  if (from_bends || into_bends) {
+    // To first order the bends shift the distance by their parts along the normal; a third more for the rest.
+    Place bent, against_bent;
+    bent.row = against_bent.row = Row{};
+    if (from_bends) bent = bend(bends_of(view, own.tet), own.weight);
+    if (into_bends) against_bent = bend(bends_of(view, tet), weight);
+    const Real slack =
+        (std::sqrt(dot(bent.at, bent.at)) + std::sqrt(dot(against_bent.at, against_bent.at))) / 3;
+    if (surface.distance + dot(surface.normal, bent.at) - dot(surface.normal, against_bent.at) >
+        apart + slack)
+      return false;
+    if (from_bends) {
+      place.row += bent.row;
+      if (!barycentric(view, tet, place.at, against)) return false;
+    }
+    if (!(into_bends ? find_bent_surface(view, into, tet, place, against, surface)
+                     : find_surface(view, into, tet, against, surface)))
+      return false;
+  }
+  SurfaceTouch<Real> touch;
+  touch.depth = apart - surface.distance;
+  if (!(touch.depth > 0)) return false;
+  touch.body = from, touch.against = into, touch.sample = sample, touch.tet = tet;
+  share_sample(from, sample, touch);
+  if (into_bends)
+    surface_.spread(tables_.rest_positions.data(), node, against, -1, spread_, shares_);
+  else
+    for (int i = 0; i < 4; ++i) shares_.push_back({node[i], -against[i]});
+  touch.last_share = int(shares_.size());
+  std::copy_n(place.at, 3, touch.place);
+  std::copy_n(surface.normal, 3, touch.normal);
   touches_.push_back(touch);
   return true;
 }
@@ -478,19 +687,21 @@ bool SurfaceContacts<Real>::measure(const LaneView<Real>& view, int from, int in
 // A node sleeps until it can have come to a wall. Sides 0 … 2 are the lower walls, 3 … 5 the upper ones.
 template <class Real>
 void SurfaceContacts<Real>::find_walls(int lane, const LaneView<Real>& view, int body) {
-  const Real slack = surface_.wall_slack;
-  Real least[3], most[3];  // where no wall is beyond
+  const typename Tables::Body& table = surface_.bodies[body];
+  const Real slack = surface_.wall_slack, bulge = table.bulge;
+  Real least[3], most[3];  // where no surface is beyond a wall
   bool any = false;
   for (int c = 0; c < 3; ++c) {
-    least[c] = Real(world_.bounds_m.lower[c]) - slack, most[c] = Real(world_.bounds_m.upper[c]) + slack;
+    least[c] = Real(world_.bounds_m.lower[c]) - slack + bulge;
+    most[c] = Real(world_.bounds_m.upper[c]) + slack - bulge;
     const int k = (3 * body + c) * view.stride;
     any |= view.lower[k] < least[c] || view.upper[k] > most[c];
   }
   if (!any) return;
-  const typename Tables::Body& table = surface_.bodies[body];
   std::vector<Real>& asleep_until = walls_asleep_until_[lane * bodies_ + body];
   const Real travel = view.travel[body * view.stride], rounding_m = Real(1e-3) * slack;
-  if (awake_.size() < asleep_until.size()) awake_.resize(asleep_until.size()), distance_.resize(awake_.size());
+  if (awake_.size() < asleep_until.size())
+    awake_.resize(asleep_until.size()), distance_.resize(awake_.size());
   const int awake =
       kernels_.find_at_most(asleep_until.data(), int(table.wall_nodes.size()), travel, awake_.data());
   beyond_tets_.clear();
@@ -518,36 +729,62 @@ void SurfaceContacts<Real>::find_walls(int lane, const LaneView<Real>& view, int
     const Real* corner[4];
     for (int i = 0; i < 4; ++i) corner[i] = node_place(view, topology_.tets[tet].node[i]).at;
     const int first = surface_.first_sample[tet], count = surface_.first_held_sample[tet] - first;
+    const Bends* bends = table.phong ? &bends_of(view, tet) : nullptr;
     const std::size_t most_found = std::size_t(count + block_size);
     if (within_.size() < most_found) within_.resize(most_found);
     if (awake_.size() < most_found) awake_.resize(most_found), distance_.resize(most_found);
     for (int side = 0; side < 6; ++side) {
       if ((sides_[tet] >> side & 1) == 0) continue;
       const int axis = side % 3;
-      const Real inward = side < 3 ? Real(1) : Real(-1), wall = side < 3 ? least[axis] : most[axis];
+      const Real inward = side < 3 ? Real(1) : Real(-1),
+                 wall = side < 3 ? least[axis] - bulge : most[axis] + bulge;
       Real in[4];
       for (int i = 0; i < 4; ++i) in[i] = inward * (corner[i][axis] - wall);
       Real* const within = within_.data();
       const Real *w0 = &surface_.weights[0][first], *w1 = &surface_.weights[1][first],
                  *w2 = &surface_.weights[2][first], *w3 = &surface_.weights[3][first];
 #pragma GCC ivdep
-      for (int k = 0; k < count; ++k) within[k] = w0[k] * in[0] + w1[k] * in[1] + w2[k] * in[2] + w3[k] * in[3];
+      for (int k = 0; k < count; ++k)
+        within[k] = w0[k] * in[0] + w1[k] * in[1] + w2[k] * in[2] + w3[k] * in[3];
+      if (bends) {
+        Real h[6];
+        for (int e = 0; e < 6; ++e) h[e] = inward * bends->of_edge[e].at[axis];
+#pragma GCC ivdep
+        for (int k = 0; k < count; ++k)
+          within[k] += w0[k] * (w1[k] * h[0] + w2[k] * h[1] + w3[k] * h[2]) +
+                       w1[k] * (w2[k] * h[3] + w3[k] * h[4]) + w2[k] * w3[k] * h[5];
+      }
       const int found = kernels_.find_at_most(within, count, Real(0), awake_.data());
       for (int i = 0; i < found; ++i) {
         const int k = awake_[i];
         if (!(within[k] < 0)) continue;
-        const typename Tables::Sample& sample = surface_.samples[first + k];
         SurfaceTouch<Real>& touch = touches_.emplace_back();
         touch.body = body, touch.against = -1, touch.sample = first + k, touch.tet = -1;
-        touch.nodes = 4, touch.depth = -within[k];
-        std::copy_n(sample.node, 4, touch.node), std::copy_n(sample.weight, 4, touch.weight);
-        std::copy_n(sample_place(view, first + k).at, 3, touch.place);
+        touch.depth = -within[k];
+        share_sample(body, first + k, touch);
+        Place place = sample_place(view, first + k);
+        if (bends) place.row += bend(*bends, surface_.samples[first + k].weight).row;
+        std::copy_n(place.at, 3, touch.place);
         for (Real& c : touch.normal) c = 0;
         touch.normal[axis] = inward;
       }
     }
     sides_[tet] = 0;
   }
+}
+
+template <class Real>
+void SurfaceContacts<Real>::share_sample(int body, int index, SurfaceTouch<Real>& touch) {
+  touch.first_share = int(shares_.size());
+  if (surface_.bodies[body].phong) {
+    const Share* shares = surface_.shares.data();
+    shares_.insert(shares_.end(), shares + surface_.first_share[index],
+                   shares + surface_.first_share[index + 1]);
+  } else {
+    const typename Tables::Sample& sample = surface_.samples[index];
+    for (int i = 0; i < 4; ++i) shares_.push_back({sample.node[i], sample.weight[i]});
+  }
+  touch.first_against = touch.last_share = int(shares_.size());
 }
 
 template <class Real>
@@ -561,7 +798,8 @@ void SurfaceContacts<Real>::share_loads(const LaneView<Real>& view) {
   for (Bearing& bearing : bearings_) bearing.depths = 0;
   for (const SurfaceTouch<Real>& touch : touches_) {
     const Real load = load_of(touch);
-    for (int i = 0; i < touch.nodes; ++i) loads_[touch.node[i]] += load * std::abs(touch.weight[i]);
+    for (int i = touch.first_share; i < touch.last_share; ++i)
+      loads_[shares_[i].node] += load * std::abs(shares_[i].weight);
     if (bearings_.empty()) continue;
     bearings_[touch.body].depths += double(load);
     if (touch.against >= 0) bearings_[touch.against].depths += double(load);
@@ -576,11 +814,11 @@ void SurfaceContacts<Real>::respond(const LaneView<Real>& view, const SurfaceTou
   const Real load = load_of(touch);
   const int side[2] = {touch.body, touch.against};
   Real relative[3] = {0, 0, 0}, inverse_mass = 0;  // of what is not rigid
-  for (int i = 0; i < touch.nodes; ++i) {
-    const int node = touch.node[i];
-    for (int c = 0; c < 3; ++c) relative[c] += touch.weight[i] * view.v[view.state.at(node, c)];
-    if (side[i / 4] >= 0 && !is_rigid(side[i / 4]))
-      inverse_mass += std::abs(touch.weight[i]) * (loads_[node] / load) * tables_.inverse_mass[node];
+  for (int i = touch.first_share; i < touch.last_share; ++i) {
+    const auto [node, weight] = shares_[i];
+    for (int c = 0; c < 3; ++c) relative[c] += weight * view.v[view.state.at(node, c)];
+    if (!is_rigid(side[i < touch.first_against ? 0 : 1]))
+      inverse_mass += std::abs(weight) * (loads_[node] / load) * tables_.inverse_mass[node];
   }
   bool any_rigid = false;
   for (const int body : side) any_rigid |= body >= 0 && is_rigid(body);
@@ -597,9 +835,11 @@ void SurfaceContacts<Real>::respond(const LaneView<Real>& view, const SurfaceTou
   if (!penalty_force(Real(surface_beta), touch.depth, touch.normal, relative, mass_along, step_,
                      tables_.pair_friction[touch.body * bodies_ + other], force))
     return;
-  for (int i = 0; i < touch.nodes; ++i)
-    if (tables_.inverse_mass[touch.node[i]] > 0)
-      for (int c = 0; c < 3; ++c) view.f[view.force.at(touch.node[i], c)] += touch.weight[i] * force[c];
+  for (int i = touch.first_share; i < touch.last_share; ++i) {
+    const auto [node, weight] = shares_[i];
+    if (tables_.inverse_mass[node] > 0)
+      for (int c = 0; c < 3; ++c) view.f[view.force.at(node, c)] += weight * force[c];
+  }
   if (told_)
     told_->push_back({touch.body,
                       touch.against,

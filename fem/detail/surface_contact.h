@@ -19,11 +19,10 @@ namespace limber::fem::detail {
 // positions.
 template <class Real>
 struct SurfaceTouch {
-  int body, against;                // whose sample, in whose cage; against −1: a wall
-  int sample, tet;                  // of the world's; tet −1: a wall
-  int nodes;                        // 8, of a wall 4
-  int node[8];                      // of the sample's tet, then of the tet it is in
-  Real weight[8];                   // of the sample's place, then minus those of the place in the tet
+  int body, against;  // whose sample, in whose cage; against −1: a wall
+  int sample, tet;    // of the world's; tet −1: a wall
+  // Of shares(): those of the nodes that move the sample, then minus those that move the place it is at.
+  int first_share, first_against, last_share;
   Real place[3], depth, normal[3];  // depth > 0, along the unit normal, out of `against`
 };
 
@@ -37,9 +36,14 @@ class SurfaceContacts {
   // From now on add_forces also appends to this list, unless null.
   void tell(std::vector<Exerted<Real>>* list) { told_ = list; }
   // How near two bodies' boxes must be for contact.
-  Real offset(int a, int b) const { return std::max(surface_.offset[a * bodies_ + b], Real(0)); }
+  Real offset(int a, int b) const {
+    return std::max(surface_.offset[a * bodies_ + b], Real(0)) + surface_.bodies[a].bulge +
+           surface_.bodies[b].bulge;
+  }
   // Of all bodies, as add_forces finds them; valid until the next call.
   const std::vector<SurfaceTouch<Real>>& find(int lane, const LaneView<Real>& view);
+  using Share = typename SurfaceTables<Real>::Share;
+  const std::vector<Share>& shares() const { return shares_; }
 
  private:
   using Tables = SurfaceTables<Real>;
@@ -68,6 +72,30 @@ class SurfaceContacts {
     Real lower[3], upper[3];
   };
 
+  struct Slopes {
+    Place column[3];  // of a node's deformation gradient
+  };
+
+  // How Phong Deformation moves the places of a tet: by wᵢ wⱼ times this of each edge, by `most` at most.
+  struct Bends {
+    Place of_edge[6];  // 01 02 03 12 13 23
+    Real most;
+  };
+  const Bends& bends_of(const LaneView<Real>&, int tet);
+  static Place bend(const Bends&, const Real weight[4]);
+  const Slopes& slopes_at(const LaneView<Real>&, int node);
+  // How far a surface is, negative below it, along its unit normal.
+  struct Surface {
+    Real distance, normal[3];
+    bool set(Real at_rest, const Real gradient[3]) {
+      const Real steepness = std::sqrt(dot(gradient, gradient));
+      distance = at_rest / steepness;
+      for (int c = 0; c < 3; ++c) normal[c] = gradient[c] / steepness;
+      return steepness > Real(1e-3);
+    }
+  };
+  bool find_surface(const LaneView<Real>&, int body, int tet, const Real weight[4], Surface&);
+  bool find_bent_surface(const LaneView<Real>&, int body, int tet, const Place&, Real weight[4], Surface&);
   const Place& node_place(const LaneView<Real>&, int node);
   const Place& sample_place(const LaneView<Real>&, int sample);
   void find_core(const LaneView<Real>&, int tet);
@@ -84,8 +112,12 @@ class SurfaceContacts {
   void find_pair(int lane, const LaneView<Real>&, std::size_t pair);
   void find_in(const LaneView<Real>&, int from, int into, Real reach, Real travel, Near&);
   bool measure(const LaneView<Real>&, int from, int into, int sample, int tet, const Real weight[4]);
-  bool weights_in(const LaneView<Real>&, int tet, const Real place[3], Real weight[4]);
+  Real bulge_of(const LaneView<Real>&, int body, int tet);
+  Real sample_bulge(const LaneView<Real>&, int body, int sample);
+  bool near_core(const LaneView<Real>&, int tet, const Real place[3], const Real weight[4], Real out);
+  bool barycentric(const LaneView<Real>&, int tet, const Real place[3], Real weight[4]);
   void find_walls(int lane, const LaneView<Real>&, int body);
+  void share_sample(int body, int sample, SurfaceTouch<Real>&);
   void share_loads(const LaneView<Real>&);
   void respond(const LaneView<Real>&, const SurfaceTouch<Real>&);
   Real load_of(const SurfaceTouch<Real>&) const;
@@ -96,7 +128,7 @@ class SurfaceContacts {
   const detail::Tables<Real>& tables_;
   const Tables& surface_;
   const Kernels<Real>& kernels_;
-  int bodies_, world_nodes_, first_sample_row_, first_sample_stamp_;
+  int bodies_, world_nodes_, first_sample_row_, first_sample_stamp_, first_slopes_stamp_, first_bends_stamp_;
   std::vector<Exerted<Real>>* told_ = nullptr;
   Real step_;
   std::vector<std::pair<int, int>> pairs_;  // a body with itself, or a < b
@@ -104,9 +136,13 @@ class SurfaceContacts {
   // [lane × bodies + body], of its wall_nodes: travel before which they cannot be beyond a wall.
   std::vector<std::vector<Real>> walls_asleep_until_;
   std::vector<SurfaceTouch<Real>> touches_;
+  std::vector<Share> shares_;
+  std::vector<Real> spread_;  // a node: 0
   // Rows: the world's nodes, four corners of each core, the samples; those are of this call whose stamp is.
   std::vector<Place> places_;
-  std::vector<unsigned> stamps_;  // a node, a tet's core, a sample
+  std::vector<Slopes> slopes_;    // a node; empty without phong bodies
+  std::vector<Bends> bends_;      // a tet; empty without phong bodies
+  std::vector<unsigned> stamps_;  // a node, a tet's core, a sample, a node's slopes, a tet's bends
   unsigned stamp_ = 0;
   std::vector<int> awake_;
   std::vector<Real> distance_;

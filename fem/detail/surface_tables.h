@@ -31,13 +31,36 @@ struct SurfaceTables {
   };
   struct Body {
     Field field;
+    bool phong;
+    // Phong Deformation moves surfaces away from where linear deformation has them, in each tet by a bend.
+    // What it moves farther than `bulge`, metres, may be missed; no tet's bend grows by more than
+    // `bend_factor` times what nodes move against their mean. Both 0 without it.
+    Real bulge, bend_factor;
     Real reach_factor;  // no corner of a core moves farther than this times the body's fastest node
     std::vector<int> sampled_tets, cored_tets;  // world tets, ascending
     // Nodes of the tets with a sample that walls can push, ascending, and of each those tets.
     std::vector<int> wall_nodes, first_tet_of_wall_node, tets_of_wall_nodes;
   };
-  std::vector<Sample> samples;   // ascending by tet
-  std::vector<Real> weights[4];  // of the samples, in columns
+  struct Slope {  // a share of a node's deformation gradient: place × gradient, 1/m
+    int node;
+    Real gradient[3];
+  };
+  std::vector<Slope> slopes;
+  std::vector<int> first_slope;  // (nodes + 1); of nodes of phong bodies
+  struct Share {
+    int node;
+    Real weight;
+  };
+  // Appends the shares of which the place at rest Σ weight × rest place is where Phong Deformation moves it,
+  // times `sign`: wᵢ, and of all nodes round i ½ wᵢ (X − Xᵢ)·g. `scratch` (nodes) holds zeros, before and
+  // after.
+  void spread(const Real* rest, const int node[4], const Real weight[4], Real sign,
+              std::vector<Real>& scratch, std::vector<Share>& out) const;
+  std::vector<Share> shares;     // of samples of phong bodies: where they are, by all nodes that move them
+  std::vector<int> first_share;  // (samples + 1)
+  std::vector<Real> weight_gradients;  // (9 a tet) of the weights of nodes 1 … 3; empty without phong bodies
+  std::vector<Sample> samples;         // ascending by tet
+  std::vector<Real> weights[4];        // of the samples, in columns
   // (tets) Of the samples of a tet, those from here on hang on nodes that never move alone: no wall pushes
   // them.
   std::vector<int> first_held_sample;

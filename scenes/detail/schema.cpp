@@ -100,10 +100,10 @@ constexpr Key all_keys[] = {
      Type::choice,
      {},
      0,
-     usual_deformation == Deformation::phong ? "\"phong\"" : "\"linear\"",
-     "how the fine surface follows its cage in films, exports and reports: linear in each tet, or bent "
-     "smoothly by Phong "
-     "Deformation (docs/binding.md)",
+     "\"linear\"",
+     "how the fine surface follows its cage, where it is touched as in films, exports and reports: linear in "
+     "each tet, or bent smoothly by Phong Deformation (docs/binding.md), which costs two to four times the "
+     "planning where contact is on surfaces",
      "linear, phong",
      ""},
     {"bodies[].self_contact",

@@ -78,7 +78,7 @@ struct Truth {
     const Points nodes = fem::body_positions(world, planned.plan.trajectory.frames[std::size_t(frame)], b);
     Points p;
     if (planned.scene.bodies[std::size_t(b)].deformation == scenes::Deformation::phong)
-      ffd::deform_phong(body.binding, body.cage, ffd::node_gradients(body.cage), nodes, p);
+      ffd::deform_phong(body.binding, body.cage, node_gradients(body.cage), nodes, p);
     else
       ffd::deform(body.binding, body.cage.tets, nodes, p);
     return p;

@@ -83,10 +83,10 @@ TEST_F(Report, PackedMotionUnpacksToTheSurfacesOfAllFrames) {
       const Points places = fem::body_positions(world, frames[f], int(b));
       Points wanted;
       if (phong)
-        ffd::deform_phong(body.binding, body.cage, ffd::node_gradients(body.cage), places, wanted);
+        ffd::deform_phong(body.binding, body.cage, node_gradients(body.cage), places, wanted);
       else
         ffd::deform(body.binding, body.cage.tets, places, wanted);
-      const ffd::Gradients gradients = ffd::node_deformation_gradients(ffd::node_gradients(body.cage), now);
+      const ffd::Gradients gradients = ffd::node_deformation_gradients(node_gradients(body.cage), now);
       double worst = 0;
       for (Eigen::Index v = 0; v < vertices; ++v) {
         Eigen::Matrix4d corners, ends;

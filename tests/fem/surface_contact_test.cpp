@@ -24,12 +24,13 @@ using testing::rounded_box_surface;
 using testing::shape_of;
 
 // Balls of radius 0.4 in cubes of edge 1, whose cages overlap by far when the balls touch.
-WorldSpec two_balls(double spacing_m = 0.03, double friction = 0.2) {
+WorldSpec two_balls(double spacing_m = 0.03, double friction = 0.2, bool phong = false) {
   WorldSpec spec;
   for (const double x : {0.0, 0.81}) {
     BodySpec body{x == 0 ? "one" : "other", cube({x, 0, 0}, 1, 3), {}, {}, BodyKind::deformable};
     body.material.friction = friction;
     body.shape = shape_of(body.cage, ball_surface({x, 0, 0}, 0.4), 0.02, spacing_m);
+    body.phong = phong;
     spec.bodies.push_back(std::move(body));
   }
   spec.bounds_m = {Vec3::Constant(-20), Vec3::Constant(20)};
@@ -38,13 +39,15 @@ WorldSpec two_balls(double spacing_m = 0.03, double friction = 0.2) {
   return spec;
 }
 
-WorldSpec barriers_with_bevels() {
+WorldSpec barriers_with_bevels(bool phong) {
   Material material;
   material.poisson_ratio = 0.48;
   WorldSpec spec = testing::barriers(1, material);
-  for (BodySpec& body : spec.bodies)
+  for (BodySpec& body : spec.bodies) {
     body.shape =
         shape_of(body.cage, rounded_box_surface(bounding_box(body.cage.positions), 0.08), 0.03, 0.06);
+    body.phong = phong;
+  }
   spec.contact_offset_m = 0.005;
   return spec;
 }
@@ -60,10 +63,15 @@ double deepest(const std::vector<detail::SurfaceTouch<float>>& touches) {
   return double(depth);
 }
 
+// Of surfaces that their cages move linearly, and by Phong Deformation.
+class SurfaceContact : public ::testing::TestWithParam<bool> {};
+INSTANTIATE_TEST_SUITE_P(Moved, SurfaceContact, ::testing::Bool(),
+                         [](const auto& moved) { return moved.param ? "ByPhongDeformation" : "Linearly"; });
+
 // Moved towards one another, or with everything stretched along the line of their centres by an affine map,
 // the depth is that of the two balls, or ellipsoids, on that line.
-TEST(SurfaceContact, DepthIsThatOfTheSurfacesThroughAffineMaps) {
-  const World world = build_world(two_balls());
+TEST_P(SurfaceContact, DepthIsThatOfTheSurfacesThroughAffineMaps) {
+  const World world = build_world(two_balls(0.03, 0.2, GetParam()));
   EXPECT_TRUE(touches_of(*std::make_unique<Lane>(world)).empty());
   for (const double stretch : {0.6, 1.0, 1.5})
     for (const double depth : {0.004, 0.012, 0.025}) {
@@ -83,11 +91,14 @@ TEST(SurfaceContact, DepthIsThatOfTheSurfacesThroughAffineMaps) {
     }
 }
 
-TEST(SurfaceContact, ForcesKeepMomentumAndAngularMomentum) {
-  const World world = build_world(two_balls());
+TEST_P(SurfaceContact, ForcesKeepMomentumAndAngularMomentum) {
+  const World world = build_world(two_balls(0.03, 0.2, GetParam()));
   Lane lane(world);
   Rng rng(11, 0);
-  lane.move(1, [&](const Vec3f& p) { return Vec3f(p - 0.04f * Vec3f::UnitX()); });
+  for (const int body : {0, 1})  // bent, so that places are not where linear deformation has them
+    lane.move(body, [&](const Vec3f& p) {
+      return Vec3f(p.x() - 0.04f * float(body), p.y() + 0.2f * p.x() * p.x(), p.z() - 0.15f * p.y() * p.x());
+    });
   for (float& v : lane.v) v = float(rng.uniform(-0.3, 0.3));
   detail::SurfaceContacts<float> contacts(world, detail::kernels<float>(detail::best_isa(), 1), 1);
   contacts.add_forces(0, lane.view());
@@ -102,9 +113,118 @@ TEST(SurfaceContact, ForcesKeepMomentumAndAngularMomentum) {
   EXPECT_LT(torque.norm(), 1e-5 * all);
 }
 
+// Where Phong Deformation moves a place at rest, in double and from its formula.
+class PhongMap {
+ public:
+  PhongMap(const TetMesh& rest, const Points& now)
+      : rest_(rest), now_(now), f_(std::size_t(rest.positions.rows())) {
+    std::vector<double> volumes(f_.size(), 0.0);
+    for (Eigen::Matrix3d& f : f_) f.setZero();
+    for (Eigen::Index t = 0; t < rest.tets.rows(); ++t) {
+      const double volume = edges(rest.positions, t).determinant();
+      for (int i = 0; i < 4; ++i) {
+        const std::size_t node = std::size_t(rest.tets(t, i));
+        f_[node] += volume * edges(now, t) * edges(rest.positions, t).inverse(), volumes[node] += volume;
+      }
+    }
+    for (std::size_t n = 0; n < f_.size(); ++n) f_[n] /= volumes[n];
+  }
+  Vec3 operator()(const Vec3& x) const {
+    Eigen::Index best = 0;
+    Eigen::Vector4d w = weights(x, 0);
+    for (Eigen::Index t = 1; t < rest_.tets.rows(); ++t)
+      if (const Eigen::Vector4d other = weights(x, t); other.minCoeff() > w.minCoeff()) best = t, w = other;
+    Vec3 sum = Vec3::Zero();
+    for (int i = 0; i < 4; ++i) {
+      const int n = rest_.tets(best, i);
+      const Vec3 now = now_.row(n), rest = rest_.positions.row(n);
+      sum += w[i] * (now + 0.5 * f_[std::size_t(n)] * (x - rest));
+    }
+    return sum;
+  }
+
+ private:
+  Eigen::Matrix3d edges(const Points& x, Eigen::Index t) const {
+    Eigen::Matrix3d e;
+    for (int i = 0; i < 3; ++i) e.col(i) = x.row(rest_.tets(t, i + 1)) - x.row(rest_.tets(t, 0));
+    return e;
+  }
+  Eigen::Vector4d weights(const Vec3& x, Eigen::Index t) const {
+    Eigen::Vector4d w;
+    w.tail<3>() = edges(rest_.positions, t).inverse() * (x - Vec3(rest_.positions.row(rest_.tets(t, 0))));
+    w[0] = 1 - w.tail<3>().sum();
+    return w;
+  }
+  const TetMesh& rest_;
+  const Points& now_;
+  std::vector<Eigen::Matrix3d> f_;
+};
+
+// A ball is pressed into a plate that is bent to a parabola, over the middle of a cell, where Phong
+// Deformation has the plate 0.02 m above the chord. Depths are those of the nearest of many places of the
+// true surface.
+TEST(SurfaceContacts, PhongSurfacesTouchWhereTheyAre) {
+  WorldSpec spec;
+  const auto plate_surface = rounded_box_surface({{0, 0, 0}, {3, 1, 0.5}}, 0.06);
+  BodySpec plate{
+      "plate", testing::leaning_grid({0, 0, 0}, {3, 1, 0.5}, 6, 2, 2), {}, {}, BodyKind::deformable};
+  plate.shape = shape_of(plate.cage, plate_surface, 0.02, 0.04), plate.phong = true;
+  BodySpec ball{"ball", cube({1.75, 0.5, 1.2}, 0.8, 3), {}, {}, BodyKind::deformable};
+  ball.shape = shape_of(ball.cage, ball_surface({1.75, 0.5, 1.2}, 0.3), 0.02, 0.03), ball.phong = true;
+  spec.bodies = {ball, plate};
+  spec.bounds_m = {Vec3::Constant(-20), Vec3::Constant(20)};
+  spec.walls = false;
+  spec.contact_offset_m = 0.005;
+  const World world = build_world(spec);
+  const auto dense = shape_of(plate.cage, plate_surface, 0.1, 0.011);
+  for (const double depth : {0.0, 0.01, 0.03}) {
+    SCOPED_TRACE(depth);
+    Lane lane(world);
+    lane.move(1, [](const Vec3f& p) {
+      return Vec3f(p.x(), p.y(), p.z() - 0.35f * (p.x() - 1.75f) * (p.x() - 1.75f));
+    });
+    lane.move(0, [&](const Vec3f& p) { return Vec3f(p - float(0.4 + depth) * Vec3f::UnitZ()); });
+    Points now(world.bodies[1].node_count(), 3);
+    for (int n = 0; n < now.rows(); ++n) now.row(n) = lane.node(world.bodies[1].first_node + n);
+    const PhongMap seen(world.bodies[1].cage, now);
+    std::vector<Vec3> places, normals;
+    for (Eigen::Index k = 0; k < dense->samples.positions_m.rows(); ++k) {
+      const Vec3 x = dense->samples.positions_m.row(k);
+      if ((seen(x) - Vec3(1.75, 0.5, 0.5)).norm() > 0.3) continue;
+      Eigen::Matrix3d jacobian;
+      Vec3 gradient;
+      constexpr double h = 1e-4;
+      for (int c = 0; c < 3; ++c) {
+        jacobian.col(c) = (seen(x + h * Vec3::Unit(c)) - seen(x - h * Vec3::Unit(c))) / (2 * h);
+        gradient[c] = (plate_surface(x + h * Vec3::Unit(c)) - plate_surface(x - h * Vec3::Unit(c))) / (2 * h);
+      }
+      places.push_back(seen(x)), normals.push_back((jacobian.transpose().inverse() * gradient).normalized());
+    }
+    const auto touches = touches_of(lane);
+    double deepest = 0, worst = 0;
+    int of_ball = 0;
+    for (const auto& touch : touches) {
+      if (touch.body != 0) continue;
+      ++of_ball;
+      const Vec3 place = Eigen::Map<const Vec3f>(touch.place).cast<double>();
+      EXPECT_NEAR((place - Vec3(1.75, 0.5, 0.8 - depth)).norm(), 0.3,
+                  0.004);  // on the ball, moved as a whole
+      std::size_t nearest = 0;
+      for (std::size_t k = 1; k < places.size(); ++k)
+        if ((places[k] - place).norm() < (places[nearest] - place).norm()) nearest = k;
+      const double expected = 0.005 - normals[nearest].dot(place - places[nearest]);
+      worst = std::max(worst, std::abs(double(touch.depth) - expected));
+      deepest = std::max(deepest, double(touch.depth));
+    }
+    EXPECT_GT(of_ball, 2);
+    EXPECT_NEAR(deepest, depth + 0.005, 0.1 * depth + 0.002);
+    EXPECT_LT(worst, 0.1 * depth + 0.002);
+  }
+}
+
 // A cube pressed onto the floor by gravity sinks by g h²/β at most, whatever the number of its samples: they
 // share the stiffness.
-TEST(SurfaceContact, TheNumberOfSamplesDoesNotChangeTheStiffness) {
+TEST(SurfaceContacts, TheNumberOfSamplesDoesNotChangeTheStiffness) {
   std::map<double, double> sunk;
   for (const double spacing : {0.13, 0.06, 0.03}) {
     WorldSpec spec = testing::alone({"cube", cube({0, 0, 0.51}, 1, 2), {}, {}, BodyKind::deformable});
@@ -134,8 +254,8 @@ TEST(SurfaceContact, TheNumberOfSamplesDoesNotChangeTheStiffness) {
 }
 
 // Nothing blows up, however many samples touch: cubes thrown at one another, face on face and edge on face.
-TEST(SurfaceContact, ThrownBodiesComeApartWithTheirMomentumAndNoMoreEnergy) {
-  const World world = build_world(two_balls(0.02, 0));
+TEST_P(SurfaceContact, ThrownBodiesComeApartWithTheirMomentumAndNoMoreEnergy) {
+  const World world = build_world(two_balls(0.02, 0, GetParam()));
   for (const double speed : {1.0, 4.0, 8.0}) {
     SCOPED_TRACE(speed);
     State state = rest_state(world);
@@ -152,8 +272,8 @@ TEST(SurfaceContact, ThrownBodiesComeApartWithTheirMomentumAndNoMoreEnergy) {
   }
 }
 
-TEST(SurfaceContact, TheAgeOfListsChangesNothing) {
-  const World world = build_world(barriers_with_bevels());
+TEST_P(SurfaceContact, TheAgeOfListsChangesNothing) {
+  const World world = build_world(barriers_with_bevels(GetParam()));
   Batch batch(world, 1);
   const auto run = [&](State state, Control control, int calls) {
     control.steps /= calls;
@@ -181,8 +301,8 @@ TEST(SurfaceContact, TheAgeOfListsChangesNothing) {
   EXPECT_GT(touched, 5);
 }
 
-TEST(SurfaceContact, SameBitsForAnyLanesNeighboursAndInstructionSet) {
-  const World world = build_world(barriers_with_bevels());
+TEST_P(SurfaceContact, SameBitsForAnyLanesNeighboursAndInstructionSet) {
+  const World world = build_world(barriers_with_bevels(GetParam()));
   Control press;
   press.manipulation = Manipulation::body;
   press.force_n = {900, 0, -100};
@@ -225,7 +345,7 @@ TEST(SurfaceContact, SameBitsForAnyLanesNeighboursAndInstructionSet) {
 }
 
 // A bar of 0.2 × 0.4 in the form of a U, whose arms swing at one another.
-TEST(SurfaceContact, ABodyTouchesItself) {
+TEST(SurfaceContacts, ABodyTouchesItself) {
   constexpr double arm = 1.6, radius = 0.25;
   constexpr double length = 2 * arm + M_PI * radius;
   TetMesh cage = testing::grid({0, -0.13, -0.23}, {length, 0.26, 0.46}, 26, 2, 2);
@@ -277,7 +397,7 @@ TEST(SurfaceContact, ABodyTouchesItself) {
   }
 }
 
-TEST(SurfaceContact, RefusesSurfacesThatOverlapAtTheStart) {
+TEST(SurfaceContacts, RefusesSurfacesThatOverlapAtTheStart) {
   WorldSpec spec = two_balls();
   spec.bodies[1].cage.positions.col(0).array() -= 0.03;
   auto moved = std::make_shared<ContactShape>(*spec.bodies[1].shape);

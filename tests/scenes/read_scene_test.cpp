@@ -115,7 +115,7 @@ TEST(ReadScene, ReadsPartsAndRigidRobots) {
 TEST(ReadScene, ReadsHowSurfacesFollowTheirCages) {
   const Scene s = read_scene(
       replaced(good, "role = \"obstacle\"\n", "role = \"obstacle\"\ndeformation = \"phong\"\n"), "s.toml");
-  EXPECT_EQ(s.bodies[0].deformation, usual_deformation);
+  EXPECT_EQ(s.bodies[0].deformation, Deformation::linear);
   EXPECT_EQ(s.bodies[1].deformation, Deformation::phong);
   EXPECT_EQ(read_scene(s.text, "s.toml", {"bodies.gate.deformation=linear"}).bodies[1].deformation,
             Deformation::linear);
