@@ -384,7 +384,8 @@ void set_contact(const scenes::Scene& scene, const std::vector<PreparedBody>& pr
 
 }  // namespace
 
-fem::World build_world(const scenes::Scene& scene, const std::vector<PreparedBody>& prepared) {
+fem::World build_world(const scenes::Scene& scene, const std::vector<PreparedBody>& prepared,
+                       const std::vector<float>& start_positions) {
   fem::WorldSpec spec;
   for (std::size_t b = 0; b < prepared.size(); ++b) {
     const scenes::BodySpec& body = scene.bodies[b];
@@ -414,6 +415,8 @@ fem::World build_world(const scenes::Scene& scene, const std::vector<PreparedBod
   spec.rest_speed_m_s = scene.rest_speed_m_s;
   if (scene.goal.shape) spec.goal_shape_m = goal_shape(scene, prepared[std::size_t(scene.robot)]);
   spec.max_dt_s = scene.max_dt_s.value_or(0);
+  spec.part_overlaps = scene.part_overlaps;
+  spec.start_positions = start_positions;
   try {
     return fem::build_world(spec);
   } catch (const InputError& error) {
