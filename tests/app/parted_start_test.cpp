@@ -57,17 +57,19 @@ TEST_F(PartedStart_slow, IsPartedToldAndVerified) {
   EXPECT_GT(parted.at("steps").get<int>(), 0);
 
   // All begins there: the tree, the path, the first frame, the goal test, the search's map.
-  const PlanFolder folder = read_plan_folder(out());
-  const std::vector<PreparedBody> bodies = read_bodies_of(folder, out());
-  const fem::World world = build_world(folder.scene, bodies), known = world_of(folder, bodies);
-  const FemSystem system(world, goal_rules_of(folder.scene)), same(known, goal_rules_of(folder.scene));
+  const PlanFolder planned_folder = read_plan_folder(out());
+  const std::vector<PreparedBody> bodies = read_bodies_of(planned_folder, out());
+  const fem::World world = build_world(planned_folder.scene, bodies),
+                   known = world_of(planned_folder, bodies);
+  const FemSystem system(world, goal_rules_of(planned_folder.scene)),
+      same(known, goal_rules_of(planned_folder.scene));
   EXPECT_EQ(known.parting.steps, 0);
   EXPECT_EQ(same.hash(), system.hash());
   const State start = fem::start_state(world);
   EXPECT_NE(start, fem::rest_state(world));
   EXPECT_EQ(system.start(), start);
-  EXPECT_EQ(State(folder.plan.tree.states[0]), start);
-  EXPECT_EQ(folder.plan.trajectory.frames[0], start);
+  EXPECT_EQ(State(planned_folder.plan.tree.states[0]), start);
+  EXPECT_EQ(planned_folder.plan.trajectory.frames[0], start);
   EXPECT_NEAR(system.robot_center(start).x(), 1.5265, 0.002);
 
   const Result verified = limber_program({"verify", out()});
@@ -88,9 +90,9 @@ TEST_F(PartedStart_slow, IsPartedToldAndVerified) {
 
 // What was marked at rest is marked where it has gone: as many cells, about the parted place.
 TEST_F(PartedStart_slow, TheSearchLooksWhereBodiesWereParted) {
-  const scenes::Scene scene = scenes::read_scene(overlapping, "scene");
-  const std::vector<PreparedBody> bodies = prepare_bodies(scene, {}, folder);
-  const fem::World world = build_world(scene, bodies);
+  const scenes::Scene read = scenes::read_scene(overlapping, "scene");
+  const std::vector<PreparedBody> bodies = prepare_bodies(read, {}, out());
+  const fem::World world = build_world(read, bodies);
   const plan::Workspace w = workspace_of(world);
   Vec3 sum = Vec3::Zero();
   int count = 0;
