@@ -70,7 +70,9 @@ TEST_F(PartedStart_slow, IsPartedToldAndVerified) {
   EXPECT_EQ(system.start(), start);
   EXPECT_EQ(State(planned_folder.plan.tree.states[0]), start);
   EXPECT_EQ(planned_folder.plan.trajectory.frames[0], start);
-  EXPECT_NEAR(system.robot_center(start).x(), 1.5265, 0.002);
+  const double half_m = (pair.at("depth_m").get<double>() + pair.at("gap_m").get<double>()) / 2;
+  EXPECT_NEAR((system.robot_center(start) - system.robot_center(fem::rest_state(world))).x(), half_m,
+              0.1 * half_m);
 
   const Result verified = limber_program({"verify", out()});
   EXPECT_EQ(verified.code, exit_done) << verified.out;
@@ -79,7 +81,7 @@ TEST_F(PartedStart_slow, IsPartedToldAndVerified) {
 
   // The same bytes again, by another number of threads; and what is up to date is not planned again.
   const Result again =
-      limber_program({"--threads", "3", "plan", scene(overlapping), "-o", out("again"), "--json"});
+      limber_program({"plan", scene(overlapping), "-o", out("again"), "--json", "--threads", "3"});
   ASSERT_EQ(again.code, exit_done) << again.err;
   EXPECT_EQ(again.json().at("tree_hash"), planned.json().at("tree_hash"));
   EXPECT_EQ(again.json().at("parted"), parted);
