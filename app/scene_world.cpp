@@ -371,12 +371,14 @@ void set_contact(const scenes::Scene& scene, const std::vector<PreparedBody>& pr
       std::all_of(scene.bodies.begin(), scene.bodies.end(),
                   [](const scenes::BodySpec& body) { return body.contact == scenes::Contact::cage; });
   for (std::size_t b = 0; b < prepared.size(); ++b) {
+    throw_if_stopped();
     const scenes::BodySpec& body = scene.bodies[b];
     const bool on_surface = body.contact == scenes::Contact::surface && prepared[b].contact.usable;
     if (!all_cages)
       spec.bodies[b].shape = std::make_shared<const ContactShape>(
           on_surface ? prepared[b].contact : shape_of_cage(prepared[b].cage));
-    spec.bodies[b].self_contact = body.self_contact.value_or(on_surface && can_reach_itself(prepared[b]));
+    spec.bodies[b].self_contact =
+        body.self_contact ? *body.self_contact : on_surface && can_reach_itself(prepared[b]);
   }
   const Box robot = bounding_box(prepared[std::size_t(scene.robot)].surface.positions);
   spec.contact_offset_m = scene.contact_offset_m.value_or(usual_contact_offset * robot.size().maxCoeff());
