@@ -21,6 +21,9 @@ std::uint64_t hash_of(const fem::World& world) {
   hasher.matrix(world.goal_shape_m);
   hasher.matrix(world.gravity_m_s2).value(world.dt_s).value(world.contact_dt_s).value(world.rest_speed_m_s);
   for (const double offset : world.surfaces64.offset) hasher.value(offset);
+  if (!world.part_overlaps) hasher.text("overlaps are refused");
+  if (!world.parting.pairs.empty())
+    for (const float x : world.start_positions) hasher.value(x);
   for (const fem::Body& body : world.bodies) {
     const fem::Material& m = body.material;
     hasher.value(limber::hash_of(body.cage))
@@ -181,7 +184,7 @@ FemSystem::FemSystem(const fem::World& world, const GoalRules& goal, std::uint64
   hash_ = hasher.digest();
 }
 
-State FemSystem::start() const { return fem::rest_state(world_); }
+State FemSystem::start() const { return fem::start_state(world_); }
 Vec3 FemSystem::robot_center(const State& state) const {
   return fem::center_of_mass_m(world_, state, world_.robot);
 }

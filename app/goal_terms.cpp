@@ -12,7 +12,7 @@ GoalTerm place_term(const scenes::Goal& goal, const fem::World& world, const Sta
   Vec3 shift = Vec3::Zero();
   if (goal.moves_with >= 0)
     shift = fem::center_of_mass_m(world, state, goal.moves_with) -
-            fem::center_of_mass_m(world, fem::rest_state(world), goal.moves_with);
+            fem::center_of_mass_m(world, fem::start_state(world), goal.moves_with);
   const Vec3 center = fem::center_of_mass_m(world, state, world.robot) - shift, aim = goal.center_of_mass_m;
   const std::string moved = goal.moves_with >= 0 ? ", moved along" : "";
   if (goal.box_m) {

@@ -87,6 +87,40 @@ std::string text_of_legs(const Json& legs) {
   return text + "\n";
 }
 
+// What was done where bodies overlap at the start.
+Json json_of(const fem::Parting& parting, const fem::World& world, const MotionFigures& figures) {
+  const auto name = [&](int body) { return world.bodies[std::size_t(body)].name; };
+  Json json{{"pairs", Json::array()}, {"largest_move_m", Json::object()}, {"steps", parting.steps}};
+  for (const fem::Parting::Pair& pair : parting.pairs)
+    json["pairs"].push_back({{"bodies", {name(pair.body), name(pair.other)}},
+                             {"depth_m", pair.depth_m},
+                             {"gap_m", pair.gap_m},
+                             {"moved_m", {pair.moved_m[0], pair.moved_m[1]}}});
+  const auto largest = std::max_element(parting.largest_move_m.begin(), parting.largest_move_m.end());
+  for (std::size_t b = 0; b < world.bodies.size(); ++b)
+    if (world.bodies[b].moving) json["largest_move_m"][name(int(b))] = parting.largest_move_m[b];
+  json["largest_move_of_robot_size"] = *largest / figures.robot_surface_size_m;
+  return json;
+}
+
+std::string text_of_parting(const Json& s) {
+  std::string text;
+  const Json& parted = s.at("parted");
+  const auto mm = [](const Json& m) { return 1e3 * m.get<double>(); };
+  for (const Json& pair : parted.at("pairs"))
+    text += fmt::format(
+        "  start        {} and {} overlapped by {:.3g} mm: parted by {:.3g} and {:.3g} mm, {:.2g} mm apart "
+        "now\n",
+        pair.at("bodies").at(0).get<std::string>(), pair.at("bodies").at(1).get<std::string>(),
+        mm(pair.at("depth_m")), mm(pair.at("moved_m").at(0)), mm(pair.at("moved_m").at(1)),
+        mm(pair.at("gap_m")));
+  return text + fmt::format(
+                    "               in {} steps, {:.2f} CPU s; no node was moved by more than {:.2f} % of "
+                    "the robot's size\n",
+                    parted.at("steps").get<int>(), s.at("dynamics").at("parting_cpu_s").get<double>(),
+                    100 * parted.at("largest_move_of_robot_size").get<double>());
+}
+
 std::string text_of(const Json& s, const std::string& extra, const fs::path& file) {
   std::string volumes;
   for (const auto& [name, percent] : s.at("largest_volume_change_percent").items())
@@ -94,7 +128,7 @@ std::string text_of(const Json& s, const std::string& extra, const fs::path& fil
   const Json &t = s.at("statistics"), &d = s.at("dynamics");
   return fmt::format(
       "{}\n"
-      "{}"
+      "{}{}"
       "  search       {} iterations, {} nodes, {} diverged, {} rejected; {:.2f} CPU s, {:.2f} s\n"
       "  memory       {:.1f} kB a node, {:.1f} where nothing is shared with the parent\n"
       "  dynamics     contact {:.2f} × the force step; a lane takes {:.1f} µs to load, {:.1f} µs to store\n"
@@ -109,13 +143,14 @@ std::string text_of(const Json& s, const std::string& extra, const fs::path& fil
       "{}"
       "  hashes       tree {}, trajectory {}\n"
       "  file         {}\n",
-      s.at("explanation").get<std::string>(), s.contains("legs") ? text_of_legs(s.at("legs")) : "",
-      t.at("iterations").get<std::int64_t>(), s.at("nodes").get<int>(), t.at("diverged").get<std::int64_t>(),
-      t.at("rejected").get<std::int64_t>(), t.at("cpu_s").get<double>(), t.at("wall_s").get<double>(),
-      1e-3 * s.at("node_bytes").get<double>(), 1e-3 * s.at("node_bytes_unshared").get<double>(),
-      d.at("contact_of_force_step").get<double>(), d.at("load_us").get<double>(),
-      d.at("store_us").get<double>(), s.at("motion_s").get<double>(), s.at("frames").get<int>(),
-      1e3 * s.at("dt_s").get<double>(), volumes, s.at("deepest_penetration_m").get<double>(),
+      s.at("explanation").get<std::string>(), s.contains("parted") ? text_of_parting(s) : "",
+      s.contains("legs") ? text_of_legs(s.at("legs")) : "", t.at("iterations").get<std::int64_t>(),
+      s.at("nodes").get<int>(), t.at("diverged").get<std::int64_t>(), t.at("rejected").get<std::int64_t>(),
+      t.at("cpu_s").get<double>(), t.at("wall_s").get<double>(), 1e-3 * s.at("node_bytes").get<double>(),
+      1e-3 * s.at("node_bytes_unshared").get<double>(), d.at("contact_of_force_step").get<double>(),
+      d.at("load_us").get<double>(), d.at("store_us").get<double>(), s.at("motion_s").get<double>(),
+      s.at("frames").get<int>(), 1e3 * s.at("dt_s").get<double>(), volumes,
+      s.at("deepest_penetration_m").get<double>(),
       100 * s.at("deepest_penetration_of_robot_size").get<double>(),
       s.at("penetration_between").get<std::string>(),
       100 * s.at("deepest_overlap_of_robot_size").get<double>(), s.at("overlap_between").get<std::string>(),
@@ -169,6 +204,7 @@ Json facts_of(const plan::Plan& plan, const fem::World& world, const FemSystem& 
             {"largest_volume_change_percent", volumes},
             {"tree_hash", hex(plan::hash_of(plan.tree))},
             {"trajectory_hash", hex(plan::hash_of(plan.trajectory))}};
+  if (!world.parting.pairs.empty()) json["parted"] = json_of(world.parting, world, figures);
   if (!plan.settings.via.empty()) json["legs"] = legs_of(plan);
   json.update(json_of(figures));
   if (plan.solved()) return json;
@@ -308,6 +344,7 @@ Outcome keep_plan(const fs::path& folder, const scenes::Scene& scene, const std:
   const MotionFigures figures = measure_motion(world, bodies, plan.trajectory);
   Json summary = facts_of(plan, world, system, figures);
   summary["dynamics"] = json_of(system.cost());
+  if (!world.parting.pairs.empty()) summary["dynamics"]["parting_cpu_s"] = world.parting.cpu_s;
   if (!extra.is_null()) summary.update(extra);
   remove_what_shows_another_plan(folder, summary);
   write_plan_folder(folder, plan, scene, bodies, summary);
@@ -321,8 +358,8 @@ bool plan_is_up_to_date(const PlanOptions& options, const scenes::Scene& scene) 
   if (!fs::exists(options.out / "plan.npz")) return false;
   try {
     const std::vector<PreparedBody> bodies = prepare_bodies(scene, options.scene.data, options.out);
-    const fem::World world = build_world(scene, bodies);
     const PlanFolder folder = read_plan_folder(options.out);
+    const fem::World world = build_world(scene, bodies, State(folder.plan.tree.states[0]).positions);
     const plan::Settings settings = settings_of(scene, options);
     return folder.plan.system_hash == FemSystem(world, goal_rules_of(scene)).hash() &&
            plan::first_difference(folder.plan.settings, settings).empty() && finished(folder.plan) &&

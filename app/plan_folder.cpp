@@ -92,6 +92,10 @@ void require_of_world(const plan::Plan& plan, const fem::World& world, const fs:
   plan::require_frame_times(plan.trajectory, world.dt_s, file);
 }
 
+fem::World world_of(const PlanFolder& planned, const std::vector<PreparedBody>& bodies) {
+  return build_world(planned.scene, bodies, State(planned.plan.tree.states[0]).positions);
+}
+
 std::vector<PreparedBody> read_bodies_of(const PlanFolder& planned, const fs::path& folder) {
   std::vector<PreparedBody> bodies = read_bodies(planned.scene, folder);
   for (std::size_t b = 0; b < bodies.size(); ++b) {
@@ -101,7 +105,7 @@ std::vector<PreparedBody> read_bodies_of(const PlanFolder& planned, const fs::pa
           fmt::format("{}: the cage has changed since the plan was made; plan anew with limber plan",
                       body_folder(folder, planned.scene.bodies[b]).string()));
   }
-  require_of_world(planned.plan, build_world(planned.scene, bodies), folder);
+  require_of_world(planned.plan, world_of(planned, bodies), folder);
   return bodies;
 }
 

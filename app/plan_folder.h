@@ -46,6 +46,9 @@ PlanFolder read_plan_folder(const fs::path& folder);
 // would reach beyond its nodes, or replay without end.
 void require_of_world(const plan::Plan&, const fem::World&, const fs::path& folder);
 
+// The world of its scene, begun as the plan begins: bodies that overlap there are not parted once more.
+fem::World world_of(const PlanFolder&, const std::vector<PreparedBody>&);
+
 // The bodies that the plan was made with. Throws InputError when one has changed since, or the plan is not of
 // their world.
 std::vector<PreparedBody> read_bodies_of(const PlanFolder&, const fs::path& folder);

@@ -140,7 +140,7 @@ Outcome render(const RenderOptions& options) {
   const scenes::Scene& scene = planned.scene;
   const std::vector<PreparedBody> bodies = read_bodies_of(planned, options.folder);
   const std::vector<SurfaceMesh> scenery = read_scenery(scene, options.folder);
-  const fem::World world = build_world(scene, bodies);
+  const fem::World world = world_of(planned, bodies);
   const scenes::FilmSpec& film = scene.film;
   const auto size =
       options.size.empty() ? std::pair(film.width_px, film.height_px) : parse_size(options.size);
@@ -229,7 +229,7 @@ namespace {
 // The same plan under a scene that differs in what it looks like alone.
 void film_otherwise(const fs::path& folder, const PlanFolder& planned, const scenes::Scene& scene) {
   const std::vector<PreparedBody> bodies = read_bodies_of(planned, folder);
-  const fem::World world = build_world(scene, bodies);
+  const fem::World world = build_world(scene, bodies, State(planned.plan.tree.states[0]).positions);
   write_plan_folder(folder, planned.plan, scene, bodies, planned.summary);
   const MotionFigures figures = measure_motion(world, planned.plan.trajectory);
   for (const auto& [name, bytes] : pictures_of(scene, world, planned.plan, figures))

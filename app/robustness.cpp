@@ -94,7 +94,7 @@ bool reaches_all_via(const plan::Plan& plan, const FemSystem& system, const plan
 std::vector<Fate> replay(const plan::Plan& plan, const plan::Reference& reference,
                          const RobustOptions& options, const scenes::Scene& scene,
                          const std::vector<PreparedBody>& bodies, int world_number, int first, int last) {
-  const fem::World world = build_world(scene, bodies);
+  const fem::World world = build_world(scene, bodies, State(plan.tree.states[0]).positions);
   const FemSystem system(world, goal_rules_of(scene));
   const std::vector<Control> controls = plan::in_steps_of(system.dt_s(), reference.controls, reference.dt_s);
   std::vector<plan::Course> courses;
@@ -152,7 +152,7 @@ Outcome robust(const RobustOptions& options) {
                     "limber plan --resume",
                     options.folder.string()));
   const std::vector<PreparedBody> bodies = read_bodies_of(planned, options.folder);
-  const fem::World world = build_world(planned.scene, bodies);
+  const fem::World world = world_of(planned, bodies);
   const FemSystem system(world, goal_rules_of(planned.scene));
   const plan::Reference reference = plan::reference_of(system, planned.plan.trajectory);
   const Vec3 planned_end = system.robot_center(planned.plan.trajectory.end);

@@ -371,13 +371,15 @@ void set_contact(const scenes::Scene& scene, const std::vector<PreparedBody>& pr
       std::all_of(scene.bodies.begin(), scene.bodies.end(),
                   [](const scenes::BodySpec& body) { return body.contact == scenes::Contact::cage; });
   for (std::size_t b = 0; b < prepared.size(); ++b) {
+    throw_if_stopped();
     const scenes::BodySpec& body = scene.bodies[b];
     const bool on_surface = body.contact == scenes::Contact::surface && prepared[b].contact.usable;
     spec.bodies[b].phong = !all_cages && body.deformation == scenes::Deformation::phong;
     if (!all_cages)
       spec.bodies[b].shape = std::make_shared<const ContactShape>(
           on_surface ? prepared[b].contact : shape_of_cage(prepared[b].cage));
-    spec.bodies[b].self_contact = body.self_contact.value_or(on_surface && can_reach_itself(prepared[b]));
+    spec.bodies[b].self_contact =
+        body.self_contact ? *body.self_contact : on_surface && can_reach_itself(prepared[b]);
   }
   const Box robot = bounding_box(prepared[std::size_t(scene.robot)].surface.positions);
   spec.contact_offset_m = scene.contact_offset_m.value_or(usual_contact_offset * robot.size().maxCoeff());
@@ -385,7 +387,8 @@ void set_contact(const scenes::Scene& scene, const std::vector<PreparedBody>& pr
 
 }  // namespace
 
-fem::World build_world(const scenes::Scene& scene, const std::vector<PreparedBody>& prepared) {
+fem::World build_world(const scenes::Scene& scene, const std::vector<PreparedBody>& prepared,
+                       const std::vector<float>& start_positions) {
   fem::WorldSpec spec;
   for (std::size_t b = 0; b < prepared.size(); ++b) {
     const scenes::BodySpec& body = scene.bodies[b];
@@ -415,6 +418,8 @@ fem::World build_world(const scenes::Scene& scene, const std::vector<PreparedBod
   spec.rest_speed_m_s = scene.rest_speed_m_s;
   if (scene.goal.shape) spec.goal_shape_m = goal_shape(scene, prepared[std::size_t(scene.robot)]);
   spec.max_dt_s = scene.max_dt_s.value_or(0);
+  spec.part_overlaps = scene.part_overlaps;
+  spec.start_positions = start_positions;
   try {
     return fem::build_world(spec);
   } catch (const InputError& error) {

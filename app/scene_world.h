@@ -39,6 +39,8 @@ std::vector<PreparedBody> read_bodies(const scenes::Scene&, const fs::path& work
 
 GoalRules goal_rules_of(const scenes::Scene&);
 
-fem::World build_world(const scenes::Scene&, const std::vector<PreparedBody>&);
+// start_positions as fem::WorldSpec has them.
+fem::World build_world(const scenes::Scene&, const std::vector<PreparedBody>&,
+                       const std::vector<float>& start_positions = {});
 
 }  // namespace limber::app

@@ -27,11 +27,11 @@ struct View {
 };
 
 // Filled, all triangles turned the same way, so that they add up to the silhouette.
-std::string silhouette(const View& view, const fem::Body& body) {
+std::string silhouette(const View& view, const fem::Body& body, const Points& places) {
   std::string path;
   for (int t = 0; t < body.surface.rows(); ++t) {
     Vec3 p[3];
-    for (int i = 0; i < 3; ++i) p[i] = body.cage.positions.row(body.surface(t, i)).transpose();
+    for (int i = 0; i < 3; ++i) p[i] = places.row(body.surface(t, i)).transpose();
     const double area = (view.x(p[1]) - view.x(p[0])) * (view.y(p[2]) - view.y(p[0])) -
                         (view.x(p[2]) - view.x(p[0])) * (view.y(p[1]) - view.y(p[0]));
     if (area == 0) continue;
@@ -48,6 +48,7 @@ std::string color_of(const Vec3& srgb) {
 void draw(const View& view, const scenes::Scene& scene, const fem::World& world, const plan::Plan& plan,
           std::string& svg) {
   const plan::Tree& tree = plan.tree;
+  const State start = fem::start_state(world);
   const auto center = [&](int node) { return Vec3(tree.centers[node].cast<double>()); };
   svg += fmt::format(
       "<rect x=\"{:.1f}\" y=\"{:.1f}\" width=\"{:.1f}\" height=\"{:.1f}\" fill=\"#fff\" stroke=\"#888\"/>\n",
@@ -55,8 +56,8 @@ void draw(const View& view, const scenes::Scene& scene, const fem::World& world,
   for (std::size_t b = 0; b < world.bodies.size(); ++b) {
     const bool robot = int(b) == world.robot;
     svg += fmt::format("<path class=\"body\" d=\"{}\" fill=\"{}\" fill-opacity=\"{}\"/>\n",
-                       silhouette(view, world.bodies[b]), color_of(scene.bodies[b].color_srgb),
-                       robot ? 0.25 : 0.45);
+                       silhouette(view, world.bodies[b], fem::body_positions(world, start, int(b))),
+                       color_of(scene.bodies[b].color_srgb), robot ? 0.25 : 0.45);
   }
   for (const plan::Via& via : plan.settings.via)
     svg += fmt::format(

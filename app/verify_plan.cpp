@@ -123,6 +123,23 @@ void check_goals(const PlanFolder& planned, const fem::World& world, const Repla
             plan.solved() ? "it says so" : plan::explain(plan));
 }
 
+// Where bodies overlap, `world` has parted them anew.
+void check_start(const plan::Plan& plan, const fem::World& world, Promises& table) {
+  const fem::Parting& parting = world.parting;
+  if (parting.pairs.empty()) return;
+  const auto deepest =
+      std::max_element(parting.pairs.begin(), parting.pairs.end(),
+                       [](const auto& one, const auto& other) { return one.depth_m < other.depth_m; });
+  double least = std::numeric_limits<double>::infinity();
+  for (const fem::Parting::Pair& pair : parting.pairs) least = std::min(least, pair.gap_m);
+  const State start = plan.tree.states[0];
+  table.row(
+      "bodies that overlap at the start are parted again: the same start", start == fem::start_state(world),
+      fmt::format("{} pairs, up to {:.2f} mm deep ({} and {}), now {:.2f} mm apart or more; {} steps",
+                  parting.pairs.size(), 1e3 * deepest->depth_m, world.bodies[std::size_t(deepest->body)].name,
+                  world.bodies[std::size_t(deepest->other)].name, 1e3 * least, parting.steps));
+}
+
 // The path, the way through the tree and the replay are one.
 void check_path(const plan::Plan& plan, const plan::Settings& settings, const Replay& replay,
                 Promises& table) {
@@ -364,6 +381,8 @@ void check_plan(const PlanFolder& planned, const std::vector<PreparedBody>& bodi
   const std::string other = first_difference(plan::json_of(settings), plan::json_of(plan.settings));
   table.row("the plan's settings are the scene's", other.empty(), other.empty() ? "" : other + " is not");
   table.row("the plan is of this world", plan.system_hash == system.hash(), hex(system.hash()));
+
+  check_start(plan, world, table);
 
   const Replay replay(system, plan, settings);
   const plan::Course& course = replay.course();

@@ -12,10 +12,14 @@ namespace {
 constexpr double cells_a_radius = 4;
 constexpr int most_cells = 200000;
 
-void mark_tet(const TetMesh& cage, int t, plan::Workspace::Cell kind, plan::Workspace& w) {
+// The cells whose middles are in the tet; where a field is given, only those that were inside its surface
+// while the tet was at rest.
+void mark_tet(const Points& places, const TetMesh& rest, int t, const DistanceField* field,
+              plan::Workspace::Cell kind, plan::Workspace& w) {
   Vec3 corner[4];
   Box box;
-  for (int i = 0; i < 4; ++i) box.include(corner[i] = cage.positions.row(cage.tets(t, i)).transpose());
+  for (int i = 0; i < 4; ++i) box.include(corner[i] = places.row(rest.tets(t, i)).transpose());
+  const double volume = signed_volume(corner[0], corner[1], corner[2], corner[3]);
   Eigen::Vector3i first, last;
   for (int i = 0; i < 3; ++i) {
     first[i] = std::max(0, int(std::ceil((box.lower[i] - w.box.lower[i]) / w.cell_m - 0.5)));
@@ -26,11 +30,15 @@ void mark_tet(const TetMesh& cage, int t, plan::Workspace::Cell kind, plan::Work
       for (int x = first.x(); x <= last.x(); ++x) {
         const Vec3 p = w.box.lower + w.cell_m * Vec3(x + 0.5, y + 0.5, z + 0.5);
         bool inside = true;
+        Vec3 at_rest = Vec3::Zero();
         for (int i = 0; i < 4 && inside; ++i) {
           Vec3 with[4] = {corner[0], corner[1], corner[2], corner[3]};
           with[i] = p;
-          inside = signed_volume(with[0], with[1], with[2], with[3]) >= 0;
+          const double part = signed_volume(with[0], with[1], with[2], with[3]);
+          inside = part >= 0;
+          at_rest += part / volume * rest.positions.row(rest.tets(t, i)).transpose();
         }
+        if (inside && field) inside = field->at(at_rest) < 0;
         if (inside) w.what[std::size_t((z * w.cells.y() + y) * w.cells.x() + x)] = kind;
       }
 }
@@ -60,12 +68,19 @@ plan::Workspace workspace_of(const fem::World& world) {
   w.cell_m = std::max(w.robot_radius_m / cells_a_radius, std::cbrt(size.prod() / most_cells));
   for (int i = 0; i < 3; ++i) w.cells[i] = std::max(1, int(std::ceil(size[i] / w.cell_m - 1e-9)));
   w.what.assign(std::size_t(w.cells.prod()), plan::Workspace::open);
+  const State start = fem::start_state(world);
   for (int b = 0; b < int(world.bodies.size()); ++b) {
     const fem::Body& body = world.bodies[std::size_t(b)];
     if (b == world.robot) continue;
     const auto kind = body.kind == fem::BodyKind::deformable ? plan::Workspace::soft : plan::Workspace::rigid;
-    if (body.shape) mark_surface(body.shape->field, kind, w);
-    for (int t = 0; t < body.cage.tets.rows() && !body.shape; ++t) mark_tet(body.cage, t, kind, w);
+    const bool at_rest = !body.moving || world.parting.pairs.empty();
+    if (body.shape && at_rest) {
+      mark_surface(body.shape->field, kind, w);
+      continue;
+    }
+    const Points places = fem::body_positions(world, start, b);
+    for (int t = 0; t < body.cage.tets.rows(); ++t)
+      mark_tet(places, body.cage, t, body.shape ? &body.shape->field : nullptr, kind, w);
   }
   return w;
 }

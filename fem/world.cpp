@@ -16,6 +16,7 @@
 #include "fem/detail/make_surface_tables.h"
 #include "fem/detail/overlap.h"
 #include "fem/detail/spring_weights.h"
+#include "fem/detail/start.h"
 #include "fem/detail/timestep.h"
 
 namespace limber::fem {
@@ -562,6 +563,7 @@ World build_world(const WorldSpec& spec) {
   world.walls = spec.walls;
   world.gravity_m_s2 = spec.gravity_m_s2;
   world.rest_speed_m_s = spec.rest_speed_m_s;
+  world.part_overlaps = spec.part_overlaps;
   for (const BodySpec& body : spec.bodies) world.bodies.push_back(make_body(body));
   if (!world.bodies[spec.robot].moving)
     throw InputError(
@@ -603,6 +605,7 @@ World build_world(const WorldSpec& spec) {
   choose_step(spec.max_dt_s, world);
   detail::make_surface_tables(spec.contact_offset_m, world);
   check_places(world);
+  detail::set_start(spec, world);
   return world;
 }
 
@@ -619,6 +622,12 @@ State rest_state(const World& world) {
   state.positions.assign(world.tables.rest_positions.begin(),
                          world.tables.rest_positions.begin() + 3 * world.moving_nodes);
   state.velocities.assign(std::size_t(3 * world.moving_nodes), 0.f);
+  return state;
+}
+
+State start_state(const World& world) {
+  State state = rest_state(world);
+  state.positions = world.start_positions;
   return state;
 }
 

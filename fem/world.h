@@ -69,6 +69,9 @@ struct WorldSpec {
   // nothing would move.
   double rest_speed_m_s = 0;
   double contact_offset_m = 0;  // ≥ 0: fine surfaces that near push each other
+  bool part_overlaps = true;    // fine surfaces that overlap where bodies start are parted, else refused
+  // World::start_positions of a world of this spec, which spares it the parting; empty: not known.
+  std::vector<float> start_positions = {};
 };
 
 // The rest cage and what follows from it and the material; constant.
@@ -97,6 +100,20 @@ struct Body {
   int node_count() const { return int(cage.positions.rows()); }
 };
 
+// What was done to bodies whose fine surfaces overlap where they start. Method: docs/contact.md.
+struct Parting {
+  struct Pair {
+    int body, other;    // body < other
+    double depth_m;     // how deep they were in one another
+    double gap_m;       // now; as far as the offset asked for
+    double moved_m[2];  // where they were deepest: how far out of the other one's way each went
+  };
+  std::vector<Pair> pairs;             // ascending; empty: nothing was parted
+  std::vector<double> largest_move_m;  // [body] of its nodes, from their places at rest; empty as `pairs`
+  int steps = 0;                       // that it took; 0 where start_positions were given
+  double cpu_s = 0;                    // likewise
+};
+
 // Constant while stepping; threads share it. Nodes and tets are numbered body after body, moving bodies
 // first.
 struct World {
@@ -118,13 +135,17 @@ struct World {
   detail::SurfaceTables<float> surfaces;  // without bodies where contact is between the cages
   detail::SurfaceTables<double> surfaces64;
   bool touches_on_surfaces() const { return !surfaces.bodies.empty(); }
+  std::vector<float> start_positions;  // (3 × moving_nodes) rest shapes and places, unless they were parted
+  Parting parting;
+  bool part_overlaps;                            // as asked for
   std::vector<detail::RigidTable> rigid_tables;  // a body; empty unless it is rigid
 };
 
 // Throws InputError naming body and element: a cage that is not valid, a node in no tet, a fixed node that
 // does not exist or belongs to a rigid body, a material out of range, a robot that is missing or cannot move,
-// a body outside the bounds, two bodies that overlap at the start (and how deep), coordinates too large for
-// float32, a step too small to be of use.
+// a body outside the bounds, two bodies that overlap at the start (and how deep) and are not parted,
+// coordinates too large for float32, a step too small to be of use, start_positions of another number. Throws
+// Interrupted after a stop signal.
 World build_world(const WorldSpec&);
 
 // How deep two cages are in one another, as build_world measures it at the start.
@@ -137,5 +158,7 @@ CageOverlap cage_overlap(const TetMesh& one, const TetMesh& two);
 
 // All moving bodies in their rest shapes and places, at rest.
 State rest_state(const World&);
+// Where all begins: the same, or as bodies that overlap there were parted.
+State start_state(const World&);
 
 }  // namespace limber::fem

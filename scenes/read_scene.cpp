@@ -745,6 +745,7 @@ Scene read_scene(const std::string& toml, const std::string& name_for_messages,
   scene.rest_speed_m_s = number(world, "rest_speed_m_s");
   scene.gravity_m_s2 = vector(world, "gravity_m_s2");
   scene.contact_offset_m = maybe_number(world, "contact_offset_m");
+  scene.part_overlaps = flag(world, "part_overlaps");
   scene.max_dt_s = maybe_number(world, "max_dt_s");
   read_bodies(root, scene);
   scene.via = read_via(root, scene);

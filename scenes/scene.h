@@ -214,6 +214,7 @@ struct Scene {
   Vec3 gravity_m_s2 = Vec3::Zero();
   double rest_speed_m_s = 0;
   std::optional<double> contact_offset_m;  // surfaces that near push each other
+  bool part_overlaps = true;               // surfaces that overlap at the start are parted, else refused
   std::optional<double> max_dt_s;          // only ever lowers the automatic time step
   std::vector<BodySpec> bodies;
   int robot = -1;        // index of the one body whose role is robot

@@ -208,30 +208,6 @@ SurfaceTables<float> single_precision(const Tables64& t) {
   return out;
 }
 
-// How far the surfaces of two bodies are apart at the start, up to the offset asked for; negative: how deep.
-std::vector<double> gaps_at_rest(const World& world, double offset_m) {
-  const std::size_t bodies = world.bodies.size();
-  std::vector<double> gaps(bodies * bodies, offset_m);
-  const auto& x = world.tables64.rest_positions;
-  const std::vector<double> still(x.size(), 0.0), travel(bodies, 0.0);
-  std::vector<double> forces(x.size(), 0.0), lower, upper;
-  for (const Body& body : world.bodies) {
-    const Box box = bounding_box(body.cage.positions);
-    lower.insert(lower.end(), box.lower.data(), box.lower.data() + 3);
-    upper.insert(upper.end(), box.upper.data(), box.upper.data() + 3);
-  }
-  constexpr Layout rows{3, 1};
-  SurfaceContacts<double> contacts(world, kernels<double>(best_isa(), 1), 1);
-  for (const auto& touch : contacts.find(0, {x.data(), still.data(), forces.data(), rows, rows, 1,
-                                             lower.data(), upper.data(), travel.data(), travel.data()})) {
-    if (touch.against < 0) continue;
-    const std::size_t one = std::size_t(touch.body), other = std::size_t(touch.against);
-    for (double* gap : {&gaps[one * bodies + other], &gaps[other * bodies + one]})
-      *gap = std::min(*gap, offset_m - touch.depth);
-  }
-  return gaps;
-}
-
 }  // namespace
 
 void make_surface_tables(double offset_m, World& world) {
@@ -260,16 +236,6 @@ void make_surface_tables(double offset_m, World& world) {
   const std::size_t bodies = world.bodies.size();
   tables.wall_slack = 0.05 * offset_m;
   tables.offset.assign(bodies * bodies, offset_m);
-  tables.offset = gaps_at_rest(world, offset_m);
-  for (std::size_t a = 0; a < bodies; ++a)
-    for (std::size_t b = a; b < bodies; ++b)
-      if (const double gap = tables.offset[a * bodies + b]; gap < -offset_m)
-        throw InputError(
-            a == b ? fmt::format("body {} overlaps itself at the start, {:.3g} m deep; mend the model, or "
-                                 "switch its self_contact off",
-                                 world.bodies[a].name, -gap)
-                   : fmt::format("bodies {} and {} overlap at the start, {:.3g} m deep; move them apart",
-                                 world.bodies[a].name, world.bodies[b].name, -gap));
   world.surfaces = single_precision(tables);
 }
 

@@ -44,6 +44,16 @@ constexpr Key all_keys[] = {
      "bodies at the start where that is less",
      "",
      ""},
+    {"world.part_overlaps",
+     Type::boolean,
+     {},
+     0,
+     "true",
+     "fine surfaces that overlap by more than contact_offset_m at the start are parted before the plan "
+     "begins "
+     "(docs/contact.md); false: such a scene is refused",
+     "",
+     ""},
     {"world.max_dt_s",
      Type::number,
      {0, 1, true},

@@ -168,6 +168,7 @@ const std::vector<Row> rows{
     {"world.gravity_m_s2", "world.gravity_m_s2=[0, 0, -1]", world},
     {"world.rest_speed_m_s", "world.rest_speed_m_s=0.01", world},
     {"world.contact_offset_m", "world.contact_offset_m=0.01", world},
+    {"world.part_overlaps", "world.part_overlaps=false", world},
     {"world.max_dt_s", "world.max_dt_s=0.0001", world},
     {"bodies[].kind", "bodies.cart.kind=rigid", world},
     {"bodies[].contact", "bodies.cart.contact=cage", world},

@@ -58,6 +58,19 @@ max_force_n = 100
 frames_per_second = 5
 )";
 
+// The same with a soft ball on the block, 0.04 m deep in it.
+std::string overlapping_scene() {
+  std::string text = scene_text;
+  return text.insert(text.find("[[bodies]]\nname = \"post\""), R"([[bodies]]
+name = "pebble"
+role = "free"
+model = { sphere = { diameter_m = 0.4, triangle_m = 0.06 } }
+cage = { tets = 48 }
+material = { youngs_modulus_pa = 5e3, poisson_ratio = 0.45, density_kg_m3 = 100 }
+pose = { position_m = [2, 1.55, 0.74] }
+)");
+}
+
 // A work folder in memory, to be changed and written so that it fits together again.
 struct Mutant {
   explicit Mutant(const fs::path& at) : folder(at), planned(read_plan_folder(at)) {
@@ -665,11 +678,55 @@ List of_files() {
   return list;
 }
 
+// Of a start at which bodies were parted.
+List of_a_parted_start() {
+  List list;
+  const std::string start = "bodies that overlap at the start are parted again: the same start",
+                    claims = "what the plan tells of itself";
+  const auto begin_otherwise = [&](std::string what, std::function<void(State&)> change) {
+    list.push_back({std::move(what), start, [change = std::move(change)](Mutant& m) {
+                      change_state(m.planned.plan, 0, change);
+                      change(m.planned.plan.trajectory.frames[0]);
+                      m.write_plan();
+                    }});
+  };
+  begin_otherwise("a node of the start", [](State& s) { s.positions[7] += 1e-4f; });
+  begin_otherwise("the last node of the start", [](State& s) { s.positions.back() -= 1e-4f; });
+  begin_otherwise("a speed at the start", [](State& s) { s.velocities[7] = 1e-3f; });
+  list.push_back({"nothing parted", start, [](Mutant& m) {
+                    const State rest = fem::rest_state(build_world(m.planned.scene, m.bodies));
+                    change_state(m.planned.plan, 0, [&](State& s) { s = rest; });
+                    m.planned.plan.trajectory.frames[0] = rest;
+                    m.write_plan();
+                  }});
+  const auto tell = [&](std::string what, std::function<void(Json&)> change) {
+    list.push_back({std::move(what), claims, [change = std::move(change)](Mutant& m) {
+                      change(m.planned.summary);
+                      m.write_summary();
+                    }});
+  };
+  tell("how deep bodies were", [](Json& s) { s["parted"]["pairs"][0]["depth_m"] = 0.01; });
+  tell("how far they are apart", [](Json& s) { s["parted"]["pairs"][0]["gap_m"] = 0.01; });
+  tell("how far each went", [](Json& s) { s["parted"]["pairs"][0]["moved_m"][1] = 0.0; });
+  tell("which bodies overlapped", [](Json& s) { s["parted"]["pairs"][0]["bodies"][0] = "ball"; });
+  tell("a pair less", [](Json& s) { s["parted"]["pairs"].clear(); });
+  tell("how far nodes were moved", [](Json& s) { s["parted"]["largest_move_m"]["pebble"] = 0.0; });
+  tell("how far that is for the robot", [](Json& s) { s["parted"]["largest_move_of_robot_size"] = 1e-4; });
+  tell("how many steps it took", [](Json& s) { s["parted"]["steps"] = 1; });
+  tell("nothing of a parting", [](Json& s) { s.erase("parted"); });
+  list.push_back({"a scene that parts nothing", "overlap at the start", [](Mutant& m) {
+                    m.planned.scene.sets.push_back("world.part_overlaps=false");
+                    m.write_summary();
+                  }});
+  return list;
+}
+
 class Mutations_slow : public testing::Test {
  protected:
-  static void SetUpTestSuite() {
+  static void SetUpTestSuite() { plan(scene_text); }
+  static void plan(const std::string& text) {
     shared_ = new TemporaryFolder;
-    std::ofstream(shared_->path() / "scene.toml") << scene_text;
+    std::ofstream(shared_->path() / "scene.toml") << text;
     planned_ = limber_program({"plan", (shared_->path() / "scene.toml").string(), "-o", good().string()});
   }
   static void TearDownTestSuite() { delete shared_; }
@@ -727,6 +784,18 @@ TEST_F(Mutations_slow, OfReports) {
   expect_named(of_reports(read_json(good() / "bodies" / "ball" / "report.json")));
 }
 TEST_F(Mutations_slow, OfFiles) { expect_named(of_files()); }
+
+class PartedMutations_slow : public Mutations_slow {
+ protected:
+  static void SetUpTestSuite() { plan(overlapping_scene()); }
+};
+TEST_F(PartedMutations_slow, OfTheStart) {
+  const Result good_one = limber_program({"verify", good().string()});
+  EXPECT_EQ(good_one.code, exit_done) << good_one.out << good_one.err;
+  EXPECT_NE(good_one.out.find("kept    bodies that overlap at the start are parted again"), std::string::npos)
+      << good_one.out;
+  expect_named(of_a_parted_start());
+}
 
 }  // namespace
 }  // namespace limber::app

@@ -404,6 +404,7 @@ TEST(SurfaceContacts, RefusesSurfacesThatOverlapAtTheStart) {
   moved->field.lower_m.x() -= 0.03;
   moved->samples.positions_m.col(0).array() -= 0.03;
   spec.bodies[1].shape = moved;
+  spec.part_overlaps = false;
   try {
     build_world(spec);
     FAIL();

@@ -654,7 +654,7 @@ std::string all_of(const Scene& s) {
   const auto b = [&](const Box& x) { return v(x.lower) + v(x.upper); };
   std::string t = fmt::format("{} {} {} {} {} {} {}\n", s.name, s.description, b(s.bounds_m), s.walls,
                               v(s.gravity_m_s2), s.rest_speed_m_s, s.max_dt_s.value_or(-1));
-  t += fmt::format("{}\n", s.contact_offset_m.value_or(-1));
+  t += fmt::format("{} {}\n", s.contact_offset_m.value_or(-1), s.part_overlaps);
   for (const BodySpec& body : s.bodies) {
     const MaterialSpec& m = body.material;
     t += fmt::format("{} {} {} {} {} | {} {} {} {} {} | {} {} {} {} {} {} {} | {} {} {} {} | {}", body.name,
