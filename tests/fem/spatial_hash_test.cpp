@@ -97,6 +97,7 @@ Pairs by_lists(detail::Contacts<float>& contacts, const Scene& scene, int from) 
                                           1,
                                           lower.data(),
                                           upper.data(),
+                                          travel.data(),
                                           travel.data()},
                                          0, 1)) {
     const auto& point = world.topology.points[touch.point];
