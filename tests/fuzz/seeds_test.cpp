@@ -2,8 +2,11 @@
 // anything but an answer.
 #include <gtest/gtest.h>
 
+#include <cstdlib>
+
 #include "core/error.h"
 #include "core/random.h"
+#include "tests/fuzz/folder.h"
 #include "tests/fuzz/targets.h"
 
 namespace limber::fuzz {
@@ -57,6 +60,29 @@ TEST(Seeds, NoChangedByteEscapesAsAnythingButInputError) {
         } catch (const InputError&) {
         }
       }
+}
+
+// Bytes drawn blindly reach far where they are read as edits.
+TEST(Seeds, NoScriptOfEditsEscapesAsAnythingButInputError) {
+  const char* const more = std::getenv("LIMBER_FUZZ_SCRIPTS");
+  const int scripts = more ? std::atoi(more) : 60;
+  Rng rng(20260112, 1);
+  std::vector<Target> all = targets();
+  all.push_back({"folder_changed", meet_changed_folder, {}});
+  for (const Target& target : all) {
+    if (!target.name.ends_with("_changed")) continue;
+    for (int trial = 0; trial < scripts; ++trial) {
+      std::string script(std::size_t(4 + rng.below(60)), '\0');
+      for (char& byte : script) byte = char(rng.below(256));
+      SCOPED_TRACE(fmt::format("{}, script {}", target.name, trial));
+      try {
+        target.read(script);
+      } catch (const InputError&) {
+      } catch (const std::exception& error) {
+        ADD_FAILURE() << error.what();
+      }
+    }
+  }
 }
 
 }  // namespace
