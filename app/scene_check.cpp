@@ -9,6 +9,7 @@
 #include "app/plan_folder.h"
 #include "app/start.h"
 #include "core/error.h"
+#include "core/lock.h"
 #include "core/log.h"
 #include "core/mesh_files.h"
 #include "core/progress.h"
@@ -267,6 +268,8 @@ class Check {
     std::optional<Start> start;
     try {
       if (options_.work) {
+        make_folder(*options_.work);
+        const FolderLock lock(*options_.work, FolderLock::alone);
         prepare_bodies(scene_, options_.scene.data, *options_.work);
         start = prepared_start(scene_, *options_.work);
       } else {

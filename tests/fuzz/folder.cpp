@@ -11,6 +11,7 @@
 #include "core/log.h"
 #include "core/mesh_files.h"
 #include "core/progress.h"
+#include "core/words.h"
 #include "ffd/binding_file.h"
 #include "meshing/contact_shape.h"
 #include "plan/plan_file.h"
@@ -163,7 +164,7 @@ void change_folder(Script& script) {
       break;
     case 2:
       for (const std::string& set : scene_edits({"robot", "block", "sign"}, script))
-        planned.given["sets"].push_back(set);
+        if (is_utf8(set)) planned.given["sets"].push_back(set);
       break;
     case 3:
       edit(planned.given, script);
