@@ -108,6 +108,7 @@ TEST_F(Strangers, ATextWhereANumberBelongsIsRefused) {
            {"certificate is a whole number", [](Json& j) { j["certificate"] = 7; }},
            {"cpu_seconds.cage is a list", [](Json& j) { j["cpu_seconds"]["cage"] = Json::array(); }},
            {"shells.count is a number", [](Json& j) { j["shells"]["count"] = 1e300; }},
+           {"contact.samples is nothing", [](Json& j) { j["contact"]["samples"] = nullptr; }},
            {"model is missing", [](Json& j) { j.erase("model"); }}}) {
     edited(report, change);
     for (const std::vector<std::string>& command : {std::vector<std::string>{"verify", out()},
