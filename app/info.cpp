@@ -61,7 +61,14 @@ Json info_of_model(const fs::path& path) {
 // What a person needs to choose a part by its shell: where it is, how large, which colour in the pictures.
 Json info_of_shells(const PreparedBody& body, const std::vector<ConvexShell>& shells) {
   std::vector<int> tets(shells.size(), 0);
-  for (const int shell : body.shell_from_tet) ++tets.at(std::size_t(shell));
+  for (std::size_t t = 0; t < body.shell_from_tet.size(); ++t) {
+    const int shell = body.shell_from_tet[t];
+    if (shell < 0 || shell >= int(shells.size()))
+      throw InputError(fmt::format(
+          "cage.msh: tet {} is of shell {}, and shells.obj has {}; make the body anew with limber prepare", t,
+          shell, shells.size()));
+    ++tets[std::size_t(shell)];
+  }
   Json list = Json::array();
   for (std::size_t s = 0; s < shells.size(); ++s) {
     const Box box = bounding_box(shells[s].vertices);

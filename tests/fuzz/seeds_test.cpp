@@ -62,6 +62,22 @@ TEST(Seeds, NoChangedByteEscapesAsAnythingButInputError) {
       }
 }
 
+std::string bytes_of(std::string_view hex) {
+  std::string bytes;
+  for (std::size_t i = 0; i + 1 < hex.size(); i += 2)
+    bytes += char(std::stoi(std::string(hex.substr(i, 2)), nullptr, 16));
+  return bytes;
+}
+
+// What once came out as a defect of limber: a report whose contact is none, a tet of a shell that is none.
+TEST(Seeds, ChangedFoldersThatOnceEscapedAreRefused) {
+  for (const char* script : {"987e3acf7b755c82492b6025bc2b3c5c11bef90514f702a6dbdb8daabedfc75bf436d4f2770e"
+                             "622e3e31b65c125e52b67882b2fd520fe37e48d43009e4",
+                             "20973fbb1046905ad1f2a72c83a2e2afa7e878f5238e2c7773ea9c35b9d2d5405ae91f394687"
+                             "6ae7b954f0797795"})
+    EXPECT_THROW(meet_changed_folder(bytes_of(script)), InputError) << script;
+}
+
 // Bytes drawn blindly reach far where they are read as edits.
 TEST(Seeds, NoScriptOfEditsEscapesAsAnythingButInputError) {
   const char* const more = std::getenv("LIMBER_FUZZ_SCRIPTS");
