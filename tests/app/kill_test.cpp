@@ -85,7 +85,8 @@ bool is_whole(const std::string& name, const std::string& bytes, const Files& be
   if (fs::path(name).filename() != "manifest.json" || !after.contains(name)) return is(before) || is(after);
   const Json then = Json::parse(before.contains(name) ? before.at(name) : "{}"),
              end = Json::parse(after.at(name));
-  for (const auto& [stage, entry] : Json::parse(bytes).items())
+  const Json now = Json::parse(bytes);
+  for (const auto& [stage, entry] : now.items())
     if (entry != then.value(stage, Json()) && entry != end.value(stage, Json())) return false;
   return true;
 }
