@@ -16,6 +16,7 @@
 #include "core/error.h"
 #include "core/hash.h"
 #include "core/json_shape.h"
+#include "core/json_text.h"
 #include "core/log.h"
 #include "core/progress.h"
 #include "core/temporary_files.h"
@@ -181,7 +182,7 @@ void run_all(const BenchOptions& options, const std::vector<std::string>& preset
         const plan::Plan plan = plan::plan(*setup.system, settings);
         if (plan.ending == plan::Ending::stopped) throw_if_stopped();
         const Json record = record_of(setup, plan, identity);
-        write_file(file, record.dump() + "\n");
+        write_file(file, text_of(record) + "\n");
         log::info("{}: {} after {} iterations, {:.2f} CPU s", label, plan.solved() ? "solved" : "not solved",
                   plan.statistics.iterations, plan.statistics.cpu_s);
       } catch (const InternalError&) {
@@ -247,7 +248,7 @@ Outcome bench(const BenchOptions& options) {
   if (!options.out.empty() && options.chunk.empty()) {
     make_folder(options.out);
     std::string lines;
-    for (const Json& record : records) lines += record.dump() + "\n";
+    for (const Json& record : records) lines += text_of(record) + "\n";
     write_file(options.out / "runs.jsonl", lines);
     report["runs"] = (options.out / "runs.jsonl").string();
     text += fmt::format("{} runs in {}\n", records.size(), (options.out / "runs.jsonl").string());

@@ -5,6 +5,7 @@
 
 #include "app/bench.h"
 #include "core/error.h"
+#include "core/json_text.h"
 #include "core/version.h"
 
 namespace limber::app {
@@ -270,7 +271,7 @@ std::string ompl_log(const RunRecords& records, const std::string& date) {
     for (const auto& [key, value] : settings.items()) {
       std::string words = key.substr(1);
       std::replace(words.begin(), words.end(), '/', '.');
-      text += fmt::format("{} = {}\n", words, value.dump());
+      text += fmt::format("{} = {}\n", words, text_of(value));
     }
     static constexpr const char* properties[] = {"seed INTEGER",
                                                  "status ENUM",

@@ -86,6 +86,13 @@ const Json& example_of_report() {
                               {"nonmanifold_vertices", -1},
                               {"surface_hash", ""},
                               {"cage_hash", ""}}},
+                            {"contact",
+                             {{"usable", true},
+                              {"samples", -1},
+                              {"cells", -1},
+                              {"memory_mb", 0.5},
+                              {"error_p99_m", 0.5},
+                              {"error_max_m", 0.5}}},
                             {"cpu_seconds", Json::object()},
                             {"peak_memory_mb", 0.5},
                             {"files", Json::object()}};

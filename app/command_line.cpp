@@ -9,6 +9,7 @@
 #include "app/shot.h"
 #include "core/error.h"
 #include "core/events.h"
+#include "core/json_text.h"
 #include "core/log.h"
 #include "core/progress.h"
 #include "core/threads.h"
@@ -206,7 +207,7 @@ void add_bench(CLI::App& command, BenchOptions& options) {
 }
 
 void print(const Outcome& outcome, bool json) {
-  const std::string text = json ? outcome.json.dump(2) + "\n" : outcome.text;
+  const std::string text = json ? text_of(outcome.json, 2) + "\n" : outcome.text;
   if (std::fwrite(text.data(), 1, text.size(), stdout) != text.size() || std::fflush(stdout) != 0)
     throw DiskError("stdout: writing the result failed");
 }
@@ -248,7 +249,7 @@ std::string misspelt(const CLI::App& program, int argc, const char* const* argv)
 int report_failure(int code, const std::string& what, bool json) {
   log::warn("limber: {}", what);
   events::tell({{"event", "end"}, {"exit_code", code}, {"error", what}});
-  if (json) fmt::print("{}\n", Json{{"error", what}, {"exit_code", code}}.dump(2));
+  if (json) fmt::print("{}\n", text_of(Json{{"error", what}, {"exit_code", code}}, 2));
   return code;
 }
 
@@ -344,7 +345,8 @@ int run_command_line(int argc, const char* const* argv) {
   plan_command.callback([&] { chosen = [&] { return plan(plan_options); }; });
 
   CLI::App& render_command = *program.add_subcommand("render", "path → frames, contact sheet, film");
-  render_command.add_option("DIR", render_options.folder, "work folder with a plan")->required();
+  render_command.add_option("DIR", render_options.folder, "work folder with a plan; with --still a scene")
+      ->required();
   add_render(render_command, render_options);
   render_command
       .add_option("--set", render_options.sets,
@@ -352,11 +354,36 @@ int run_command_line(int argc, const char* const* argv) {
                   "opacity, roughness, metallic, deformation)")
       ->type_name("KEY=VALUE")
       ->allow_extra_args(false);
+  bool still = false;
+  StillOptions still_options;
+  CLI::Option* const still_flag = render_command.add_flag(
+      "--still", still, "paint the start of a scene, a file or a name, before any plan: one PNG");
+  render_command
+      .add_option("-o,--out", still_options.out, "of --still: the picture; default: the scene's name.png")
+      ->type_name("FILE.png")
+      ->needs(still_flag);
+  render_command
+      .add_option("--data", still_options.scene.data,
+                  "of --still: a folder in which model files of the scene are looked for first")
+      ->type_name("DIR")
+      ->check(CLI::ExistingDirectory)
+      ->allow_extra_args(false)
+      ->needs(still_flag);
   render_command.add_flag("--resume", render_options.resume,
                           "keep frames that already show what they should");
   add_global(render_command, global), add_threads(render_command, global),
       add_progress(render_command, global);
-  render_command.callback([&] { chosen = [&] { return render(render_options); }; });
+  for (const char* of_a_film : {"--frames", "--chunk", "--passes", "--bits", "--as", "--video", "--resume"})
+    still_flag->excludes(of_a_film);
+  render_command.callback([&] {
+    chosen = [&] {
+      if (!still) return render(render_options);
+      still_options.scene.scene = render_options.folder.string();
+      still_options.scene.sets = render_options.sets;
+      still_options.camera = render_options.camera, still_options.size = render_options.size;
+      return render_still(still_options);
+    };
+  });
 
   ExportOptions export_options;
   CLI::App& export_command =
@@ -466,13 +493,14 @@ int run_command_line(int argc, const char* const* argv) {
 
   CLI::App& info_command = *program.add_subcommand("info", "what is in a file or folder");
   info_command
-      .add_option("PATH", folder, "a work folder, a prepared body, a model, a plan, a cage, a binding")
+      .add_option("PATH", folder,
+                  "a work folder, a prepared body, a model, a plan, a cage, a binding, a scene")
       ->required();
   add_global(info_command, global);
   info_command.callback([&] { chosen = [&] { return info(folder); }; });
 
   NewSceneOptions new_options;
-  CLI::App& scene_command = *program.add_subcommand("scene", "makes scene files");
+  CLI::App& scene_command = *program.add_subcommand("scene", "makes scene files, and checks them");
   scene_command.require_subcommand(1);
   CLI::App& new_command =
       *scene_command.add_subcommand("new", "a scene to begin with, from a folder of models in one frame");
@@ -524,6 +552,28 @@ int run_command_line(int argc, const char* const* argv) {
   add_global(new_command, global);
   new_command.callback([&] { chosen = [&] { return new_scene(new_options); }; });
 
+  SceneCheckOptions check_options;
+  CLI::App& check_command = *scene_command.add_subcommand(
+      "check", "loads a scene and its models, and says what can be said before it is planned");
+  add_scene(check_command, check_options.scene);
+  check_command.add_option("--preset", check_options.preset, "as of limber plan; default: the scene's")
+      ->check(CLI::IsMember({"paper", "fast"}));
+  check_command
+      .add_option("--work", check_options.work,
+                  "also prepare the bodies in this work folder (limber plan -o DIR finds them there), build "
+                  "their world, and try a search of at most 64 iterations and 10 s")
+      ->type_name("DIR");
+  check_command.add_option("-o,--still", check_options.still, "paint the start into this file")
+      ->type_name("FILE.png");
+  check_command.add_option("--camera", check_options.camera, "of the still, one of the scene's cameras")
+      ->capture_default_str();
+  check_command
+      .add_option("--size", check_options.size,
+                  "pixels of the still, 16x16 … 8192x8192; default: the scene's")
+      ->type_name("WxH");
+  add_global(check_command, global), add_threads(check_command, global);
+  check_command.callback([&] { chosen = [&] { return check_scene(check_options); }; });
+
   CLI::App& scenes_command = *program.add_subcommand("scenes", "the scenes that come with limber");
   add_global(scenes_command, global);
   scenes_command.callback([&] { chosen = [] { return list_scenes(); }; });
@@ -542,7 +592,7 @@ int run_command_line(int argc, const char* const* argv) {
     if (json)
       fmt::print(
           "{}\n",
-          Json{{"error", meant.empty() ? error.what() : meant}, {"exit_code", exit_bad_input}}.dump(2));
+          text_of(Json{{"error", meant.empty() ? error.what() : meant}, {"exit_code", exit_bad_input}}, 2));
     return exit_bad_input;
   }
 

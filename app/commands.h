@@ -82,6 +82,24 @@ struct RenderOptions {
 };
 Outcome render(const RenderOptions&);
 
+// The start of a scene, before any plan.
+struct StillOptions {
+  SceneOptions scene;
+  std::string camera = "main", size;  // as of RenderOptions
+  std::optional<fs::path> out;        // a PNG; default: the scene's name
+};
+Outcome render_still(const StillOptions&);
+
+struct SceneCheckOptions {
+  SceneOptions scene;
+  std::string preset;             // empty: the scene's
+  std::optional<fs::path> work;   // a work folder: bodies are prepared there, and a search is tried
+  std::optional<fs::path> still;  // a PNG of the start
+  std::string camera = "main", size;
+};
+// What can be said of a scene before it is planned; exit code 2 with all that is wrong where it cannot be.
+Outcome check_scene(const SceneCheckOptions&);
+
 inline const std::vector<std::string> motion_formats{"gltf", "pc2", "usd", "vtu"};
 struct ExportOptions {
   fs::path folder;
@@ -155,6 +173,7 @@ struct NewSceneOptions {
 Outcome new_scene(const NewSceneOptions&);
 
 Outcome info(const fs::path& path);
+Outcome info_of_scene(const fs::path& file);
 Outcome list_scenes();
 
 // Parses the arguments, runs the subcommand, prints, and answers the exit code. Throws nothing.

@@ -4,6 +4,7 @@
 #include "app/preview.h"
 #include "core/error.h"
 #include "core/hash.h"
+#include "core/json_text.h"
 #include "core/mesh_files.h"
 #include "core/npz.h"
 #include "meshing/quality.h"
@@ -17,7 +18,7 @@ namespace {
 Outcome outcome_of(Json json) {
   std::string text;
   for (const auto& [key, value] : json.items())
-    text += fmt::format("{:28} {}\n", key, value.is_string() ? value.get<std::string>() : value.dump());
+    text += fmt::format("{:28} {}\n", key, value.is_string() ? value.get<std::string>() : text_of(value));
   return {exit_done, std::move(json), text};
 }
 
@@ -60,7 +61,14 @@ Json info_of_model(const fs::path& path) {
 // What a person needs to choose a part by its shell: where it is, how large, which colour in the pictures.
 Json info_of_shells(const PreparedBody& body, const std::vector<ConvexShell>& shells) {
   std::vector<int> tets(shells.size(), 0);
-  for (const int shell : body.shell_from_tet) ++tets.at(std::size_t(shell));
+  for (std::size_t t = 0; t < body.shell_from_tet.size(); ++t) {
+    const int shell = body.shell_from_tet[t];
+    if (shell < 0 || shell >= int(shells.size()))
+      throw InputError(fmt::format(
+          "cage.msh: tet {} is of shell {}, and shells.obj has {}; make the body anew with limber prepare", t,
+          shell, shells.size()));
+    ++tets[std::size_t(shell)];
+  }
   Json list = Json::array();
   for (std::size_t s = 0; s < shells.size(); ++s) {
     const Box box = bounding_box(shells[s].vertices);
@@ -97,11 +105,14 @@ Outcome info_of_body(const fs::path& folder) {
 }  // namespace
 
 Outcome info(const fs::path& path) {
+  if (path.extension() == ".toml") return info_of_scene(path);
+  if (!fs::exists(path) && path.extension().empty()) return info_of_scene(scenes::find_scene(path.string()));
   if (fs::is_directory(path)) {
+    if (fs::exists(path / "scene.toml")) return info_of_scene(path / "scene.toml");
     if (fs::exists(path / "plan.npz")) return outcome_of(read_plan_folder(path).summary);
     if (fs::exists(path / "report.json")) return info_of_body(path);
-    throw InputError(
-        fmt::format("{}: holds neither plan.npz nor report.json; nothing here is limber's", path.string()));
+    throw InputError(fmt::format(
+        "{}: holds none of plan.npz, report.json, scene.toml; nothing here is limber's", path.string()));
   }
   const std::string extension = path.extension().string();
   if (extension == ".msh") return outcome_of(info_of_cage(read_msh(path)));

@@ -190,6 +190,7 @@ struct Shot::Painter::View {
 
   // What bodies hide of one another's sky, found between the cages.
   void occlude() {
+    if (!shot.output_.occlusion) return;
     std::vector<render::Occluder> occluders;
     for (std::size_t b = 0; b < hulls.size(); ++b)
       if (shot.scene_.bodies[b].opacity == 1) occluders.push_back({hulls[b], shot.world_.bodies[b].surface});

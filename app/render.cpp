@@ -94,11 +94,6 @@ std::vector<Failure> paint_all(const Shot& shot, const std::vector<int>& frames,
   return failures;
 }
 
-bool touched_at_surfaces(const scenes::Scene& scene) {
-  return std::any_of(scene.bodies.begin(), scene.bodies.end(),
-                     [](const scenes::BodySpec& body) { return body.contact == scenes::Contact::surface; });
-}
-
 // The plan's scene, filmed otherwise. What would change the motion is refused.
 scenes::Scene filmed_as(const scenes::Scene& planned, const std::vector<std::string>& sets) {
   for (const std::string& set : sets) {
@@ -106,7 +101,7 @@ scenes::Scene filmed_as(const scenes::Scene& planned, const std::vector<std::str
     const auto last = key.substr(key.rfind('.') + 1);
     const bool look = key.starts_with("bodies.") &&
                       (last == "color" || last == "opacity" || last == "roughness" || last == "metallic" ||
-                       (last == "deformation" && !touched_at_surfaces(planned)));
+                       (last == "deformation" && all_touched_at_cages(planned)));
     const bool film = key.starts_with("film.") && key != "film.speed" && key != "film.frames_per_second";
     if (!look && !film && !key.starts_with("camera.") && !key.starts_with("cameras."))
       throw InputError(fmt::format(

@@ -14,6 +14,7 @@
 #include "app/verify.h"
 #include "core/error.h"
 #include "core/hash.h"
+#include "core/json_text.h"
 #include "core/log.h"
 #include "core/version.h"
 #include "fem/observe.h"
@@ -310,7 +311,7 @@ void tree(const Findings& f, Page& page) {
 
 std::string short_of(const Json& value) {
   if (value.is_string()) return value.get<std::string>();
-  return value.is_number_float() ? fmt::format("{:.4g}", value.get<double>()) : value.dump();
+  return value.is_number_float() ? fmt::format("{:.4g}", value.get<double>()) : text_of(value);
 }
 
 // What numbers of a summary are called, and those within it one level down.

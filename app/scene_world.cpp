@@ -160,15 +160,19 @@ void keep_goal_cage(const scenes::Scene& scene, std::vector<fs::path> folders, c
     fs::remove(copy);
     return;
   }
-  folders.push_back(scene.folder);
-  const auto folder = std::find_if(folders.begin(), folders.end(),
-                                   [&](const fs::path& f) { return fs::exists(f / scene.goal.shape->cage); });
-  const fs::path file = (folder == folders.end() ? scene.folder : *folder) / scene.goal.shape->cage;
-  if (folder == folders.end() && fs::exists(copy)) return;
-  write_msh(copy, read_msh(file));
+  const std::optional<fs::path> file = find_goal_cage(scene, std::move(folders));
+  if (!file && fs::exists(copy)) return;
+  write_msh(copy, read_msh(file.value_or(scene.folder / scene.goal.shape->cage)));
 }
 
 }  // namespace
+
+std::optional<fs::path> find_goal_cage(const scenes::Scene& scene, std::vector<fs::path> folders) {
+  folders.push_back(scene.folder);
+  for (const fs::path& folder : folders)
+    if (const fs::path file = folder / scene.goal.shape->cage; fs::exists(file)) return file;
+  return std::nullopt;
+}
 
 std::vector<PreparedBody> prepare_bodies(const scenes::Scene& scene, const std::vector<fs::path>& data,
                                          const fs::path& work_folder) {
@@ -183,6 +187,17 @@ std::vector<PreparedBody> prepare_bodies(const scenes::Scene& scene, const std::
     prepare_scenery(scene, body, data, work_folder);
   }
   return read_bodies(scene, work_folder);
+}
+
+LoadedModel load_model(const scenes::Scene& scene, const scenes::BodySpec& body,
+                       const std::vector<fs::path>& data) {
+  const BodySource source = source_of(scene, body, data);
+  return {source.model, source.load(), source.made_cage()};
+}
+
+SurfaceMesh load_scenery(const scenes::Scene& scene, const scenes::BodySpec& body,
+                         const std::vector<fs::path>& data) {
+  return make_scenery(body, source_of_scenery(scene, body, data));
 }
 
 Json identity_of(const scenes::Scene& scene, const scenes::BodySpec& body,
@@ -367,9 +382,7 @@ bool can_reach_itself(const PreparedBody& body) {
 // Contact at the fine surfaces, unless all bodies are touched at their cages.
 void set_contact(const scenes::Scene& scene, const std::vector<PreparedBody>& prepared,
                  fem::WorldSpec& spec) {
-  const bool all_cages =
-      std::all_of(scene.bodies.begin(), scene.bodies.end(),
-                  [](const scenes::BodySpec& body) { return body.contact == scenes::Contact::cage; });
+  const bool all_cages = all_touched_at_cages(scene);
   for (std::size_t b = 0; b < prepared.size(); ++b) {
     throw_if_stopped();
     const scenes::BodySpec& body = scene.bodies[b];
@@ -381,11 +394,20 @@ void set_contact(const scenes::Scene& scene, const std::vector<PreparedBody>& pr
     spec.bodies[b].self_contact =
         body.self_contact ? *body.self_contact : on_surface && can_reach_itself(prepared[b]);
   }
-  const Box robot = bounding_box(prepared[std::size_t(scene.robot)].surface.positions);
-  spec.contact_offset_m = scene.contact_offset_m.value_or(usual_contact_offset * robot.size().maxCoeff());
+  spec.contact_offset_m =
+      contact_offset_m(scene, bounding_box(prepared[std::size_t(scene.robot)].surface.positions));
 }
 
 }  // namespace
+
+double contact_offset_m(const scenes::Scene& scene, const Box& robot) {
+  return scene.contact_offset_m.value_or(usual_contact_offset * robot.size().maxCoeff());
+}
+
+bool all_touched_at_cages(const scenes::Scene& scene) {
+  return std::all_of(scene.bodies.begin(), scene.bodies.end(),
+                     [](const scenes::BodySpec& body) { return body.contact == scenes::Contact::cage; });
+}
 
 fem::World build_world(const scenes::Scene& scene, const std::vector<PreparedBody>& prepared,
                        const std::vector<float>& start_positions) {

@@ -17,6 +17,23 @@ fs::path body_folder(const fs::path& work_folder, const scenes::BodySpec&);
 std::vector<PreparedBody> prepare_bodies(const scenes::Scene&, const std::vector<fs::path>& data,
                                          const fs::path& work_folder);
 
+// What prepare begins with. Throw InputError when the model is not found, or is none; scenery that is not
+// found is empty, with a warning.
+struct LoadedModel {
+  std::string from;                  // a file's name, or words for a made model
+  meshing::ImportedModel model;      // in world coordinates, where the scene puts it
+  std::optional<TetMesh> made_cage;  // that of a body in cells
+};
+LoadedModel load_model(const scenes::Scene&, const scenes::BodySpec&, const std::vector<fs::path>& data);
+SurfaceMesh load_scenery(const scenes::Scene&, const scenes::BodySpec&, const std::vector<fs::path>& data);
+
+// Where goal.shape.cage is, which the scene has; nothing where it is not found.
+std::optional<fs::path> find_goal_cage(const scenes::Scene&, std::vector<fs::path> data);
+
+// As build_world takes it where contact goes by surfaces: that far they push each other.
+double contact_offset_m(const scenes::Scene&, const Box& robot);
+bool all_touched_at_cages(const scenes::Scene&);
+
 // All that a body's files depend on, as its report has it under "input". Throws InputError when its model is
 // not found.
 Json identity_of(const scenes::Scene&, const scenes::BodySpec&, const std::vector<fs::path>& data);

@@ -311,6 +311,7 @@ std::uint64_t Shot::hash_of_look() const {
     hasher.value(int(flag));
   hasher.text(film.caption).value(int(film.color_by)).value(low_).value(high_).value(film.speed);
   hasher.value(film.frames_per_second).value(frames()).value(output_.bits);
+  if (!output_.occlusion) hasher.value(0);
   hasher.value(arrow_m_per_n_).matrix(way_m_).matrix(tree_m_);
   for (const auto& [first_frame, control] : pushes_)
     hasher.value(first_frame)

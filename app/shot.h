@@ -19,6 +19,7 @@ namespace limber::app {
 struct Output {
   int bits = 8;                     // a channel, 8 or 16
   std::vector<std::string> passes;  // of pass_names
+  bool occlusion = true;            // what cages hide of one another's sky; false where none are made yet
 };
 inline const std::vector<std::string> pass_names{"depth", "normal", "object", "scalar"};
 

@@ -9,6 +9,7 @@
 #include <mutex>
 
 #include "core/error.h"
+#include "core/json_text.h"
 #include "core/log.h"
 #include "core/progress.h"
 
@@ -46,7 +47,7 @@ bool wanted() { return file != nullptr; }
 void tell(const Json& event) {
   const std::lock_guard lock(mutex);
   if (!file) return;
-  const std::string line = event.dump(-1, ' ', false, Json::error_handler_t::replace) + "\n";
+  const std::string line = text_of(event) + "\n";
   if (std::fwrite(line.data(), 1, line.size(), file) == line.size() && std::fflush(file) == 0) return;
   if (file != stderr) log::warn("--progress: writing failed: {}", std::strerror(errno));
   file = nullptr;

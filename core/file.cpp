@@ -6,6 +6,8 @@
 
 #include <cerrno>
 #include <cstring>
+#include <mutex>
+#include <set>
 
 #include "core/error.h"
 #include "core/temporary_files.h"
@@ -48,6 +50,16 @@ fs::path destination(const fs::path& path) {
     throw DiskError(
         fmt::format("{}: is a device or a pipe; files are written whole, so name a file", path.string()));
   return fs::is_symlink(fs::symlink_status(path, error)) ? fs::canonical(path) : path;
+}
+
+// What killed processes left goes as soon as this one writes beside it: once for each folder.
+void remove_abandoned_beside(const fs::path& path) {
+  static std::mutex mutex;
+  static std::set<fs::path> done;
+  std::error_code error;
+  const fs::path folder = fs::absolute(path, error).parent_path();
+  const std::lock_guard lock(mutex);
+  if (done.insert(folder).second) remove_abandoned(folder);
 }
 
 }  // namespace
@@ -117,7 +129,9 @@ void FileWriter::commit() {
 }
 
 PendingFile::PendingFile(fs::path final_path)
-    : final_(destination(final_path)), temporary_(temporary_name(final_)) {}
+    : final_(destination(final_path)), temporary_(temporary_name(final_)) {
+  remove_abandoned_beside(final_);
+}
 
 PendingFile::~PendingFile() {
   if (committed_) return;

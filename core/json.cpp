@@ -1,6 +1,7 @@
 #include "core/json.h"
 
 #include "core/error.h"
+#include "core/json_text.h"
 
 namespace limber {
 
@@ -45,6 +46,9 @@ Json parse_json(const std::string& text, const std::string& what) {
 }
 
 Json read_json(const fs::path& path) { return parse_json(read_file(path, most_json_bytes), path.string()); }
-void write_json(const fs::path& path, const Json& json) { write_file(path, json.dump(2) + "\n"); }
+std::string text_of(const Json& json, int indent) {
+  return json.dump(indent, ' ', false, Json::error_handler_t::replace);
+}
+void write_json(const fs::path& path, const Json& json) { write_file(path, text_of(json, 2) + "\n"); }
 
 }  // namespace limber

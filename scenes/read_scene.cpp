@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/words.h"
 #include "scenes/detail/schema.h"
 #include "scenes/models.h"
+#include "scenes/problems.h"
 #include "scenes/scene.h"
 #include "scenes/shapes.h"
 
@@ -113,11 +115,14 @@ Node& element_of(Node& array, const std::string& name, const std::string& source
 }
 
 void edit(Node& root, const std::string& set) {
-  const std::string source = "--set " + set;
+  constexpr std::size_t longest_shown = 200;
+  const std::string source =
+      "--set " + (set.size() > longest_shown ? set.substr(0, longest_shown) + "..." : set);
   const auto equals = set.find('=');
   if (equals == set.npos || equals == 0)
     throw InputError(
         fmt::format("{}: there is no key=value; write for example --set planner.seed=7", source));
+  if (!is_utf8(set)) throw InputError(fmt::format("{}: is no UTF-8; write it so, as the scene is", source));
   std::vector<std::string> parts = split_path(std::string_view(set).substr(0, equals));
   if (constexpr std::size_t most_parts = 16; parts.size() > most_parts)
     throw InputError(
@@ -451,34 +456,40 @@ BodySpec read_body(const Node& table, const Box& bounds) {
   return body;
 }
 
-void read_bodies(const Node& root, Scene& scene) {
-  for (const Node& table : list(root, "bodies")) {
-    BodySpec body = read_body(table, scene.bounds_m);
-    for (const auto* bodies : {&scene.bodies, &scene.scenery})
-      for (const BodySpec& other : *bodies)
-        if (same_but_for_case(other.name, body.name))
-          complain(child(table, "name"),
-                   other.name == body.name
-                       ? fmt::format("two bodies are called \"{}\"; give each its own name", body.name)
-                       : fmt::format(
-                             "bodies are called \"{}\" and \"{}\", which is one folder on some disks; give "
-                             "them names that differ in more than capitals",
-                             other.name, body.name));
-    if (body.role == Role::scenery) {
-      scene.scenery.push_back(std::move(body));
-      continue;
-    }
-    if (body.role == Role::robot) {
-      if (scene.robot >= 0)
-        complain(child(table, "role"),
-                 fmt::format("two robots, {} and {}; exactly one body may have role = \"robot\"",
-                             scene.bodies[std::size_t(scene.robot)].name, body.name));
-      scene.robot = int(scene.bodies.size());
-    }
-    scene.bodies.push_back(std::move(body));
+void add_body(BodySpec body, const Node& table, Scene& scene) {
+  for (const auto* bodies : {&scene.bodies, &scene.scenery})
+    for (const BodySpec& other : *bodies)
+      if (same_but_for_case(other.name, body.name))
+        complain(child(table, "name"),
+                 other.name == body.name
+                     ? fmt::format("two bodies are called \"{}\"; give each its own name", body.name)
+                     : fmt::format("bodies are called \"{}\" and \"{}\", which is one folder on some disks; "
+                                   "give them names that differ in more than capitals",
+                                   other.name, body.name));
+  if (body.role == Role::scenery) {
+    scene.scenery.push_back(std::move(body));
+    return;
   }
-  if (scene.robot < 0)
-    complain(child(root, "bodies"), "there is no robot; give the body that is to move role = \"robot\"");
+  if (body.role == Role::robot) {
+    if (scene.robot >= 0)
+      complain(child(table, "role"),
+               fmt::format("two robots, {} and {}; exactly one body may have role = \"robot\"",
+                           scene.bodies[std::size_t(scene.robot)].name, body.name));
+    scene.robot = int(scene.bodies.size());
+  }
+  scene.bodies.push_back(std::move(body));
+}
+
+void read_bodies(const Node& root, Scene& scene, const Complaints& complaints) {
+  bool robot = false;  // also one that is complained of
+  for (const Node& table : list(root, "bodies")) {
+    robot |= read_role(text(table, "role")) == Role::robot;
+    complaints.during([&] { add_body(read_body(table, scene.bounds_m), table, scene); });
+  }
+  if (!robot)
+    complaints.during([&] {
+      complain(child(root, "bodies"), "there is no robot; give the body that is to move role = \"robot\"");
+    });
 }
 
 int body_called(const Node& node, const Scene& scene, const std::string& key) {
@@ -725,18 +736,22 @@ void fill_in_max_stretch(Scene& scene) {
 
 Vec3 axis_named(const std::string& name) { return (name[0] == '-' ? -1.0 : 1.0) * Vec3::Unit(name[1] - 'x'); }
 
-Scene read_scene(const std::string& toml, const std::string& name_for_messages,
-                 const std::vector<std::string>& sets) {
+namespace {
+
+// After a complaint goes on with what does not hang on what is complained of.
+Scene read(const std::string& toml, const std::string& name_for_messages,
+           const std::vector<std::string>& sets, const Complaints& complaints) {
   Node root = parse_document(toml, name_for_messages);
   if (root.table()->empty())
     throw InputError(
         fmt::format("{}:1:1: the scene is empty; start from one that comes with limber (`limber scenes` "
                     "lists them)",
                     name_for_messages));
-  for (const std::string& set : sets) edit(root, set);
-  check_and_complete(root);
-
+  for (const std::string& set : sets) complaints.during([&] { edit(root, set); });
+  check_and_complete(root, complaints);
   Scene scene;
+  if (complaints.any()) return scene;
+
   scene.name = text(root, "name");
   scene.description = text(root, "description");
   const Node& world = child(root, "world");
@@ -747,17 +762,35 @@ Scene read_scene(const std::string& toml, const std::string& name_for_messages,
   scene.contact_offset_m = maybe_number(world, "contact_offset_m");
   scene.part_overlaps = flag(world, "part_overlaps");
   scene.max_dt_s = maybe_number(world, "max_dt_s");
-  read_bodies(root, scene);
-  scene.via = read_via(root, scene);
-  scene.goal = read_goal(root, scene);
-  scene.planner = read_planner(child(root, "planner"));
+  read_bodies(root, scene, complaints);
+  const bool all_bodies = !complaints.any();  // else others may name one that was left out
+  if (all_bodies) {
+    complaints.during([&] { scene.via = read_via(root, scene); });
+    complaints.during([&] { scene.goal = read_goal(root, scene); });
+  }
+  complaints.during([&] { scene.planner = read_planner(child(root, "planner")); });
   if (scene.planner.preset == "paper") touch_cages(root, scene);
   fill_in_max_stretch(scene);
-  scene.cameras = read_cameras(root, scene);
-  scene.film = read_film(child(root, "film"));
+  if (all_bodies) complaints.during([&] { scene.cameras = read_cameras(root, scene); });
+  complaints.during([&] { scene.film = read_film(child(root, "film")); });
   scene.text = toml;
   scene.sets = sets;
   return scene;
+}
+
+}  // namespace
+
+Scene read_scene(const std::string& toml, const std::string& name_for_messages,
+                 const std::vector<std::string>& sets) {
+  return read(toml, name_for_messages, sets, Complaints());
+}
+
+std::vector<std::string> problems_of(const std::string& toml, const std::string& name_for_messages,
+                                     const std::vector<std::string>& sets) {
+  std::vector<std::string> problems;
+  const Complaints complaints(&problems);
+  complaints.during([&] { read(toml, name_for_messages, sets, complaints); });
+  return problems;
 }
 
 Scene read_scene_file(const fs::path& file, const std::vector<std::string>& sets) {

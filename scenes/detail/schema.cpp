@@ -780,7 +780,7 @@ std::vector<std::string> split_choices(std::string_view choices) {
   return made;
 }
 
-void check_table(Node& node, const std::string& path, const std::string& shown);
+void check_table(Node& node, const std::string& path, const std::string& shown, const Complaints&);
 
 void check_choice(const Key& key, const std::string& shown, const Node& node) {
   const std::string& text = checked_text(key, shown, node);
@@ -828,7 +828,7 @@ void check_boxes(const Key& key, const std::string& shown, const Node& node) {
     check_box(key, fmt::format("{}[{}]", shown, i), (*elements)[i]);
 }
 
-void check_fixed(const Key& key, const std::string& shown, Node& node) {
+void check_fixed(const Key& key, const std::string& shown, Node& node, const Complaints& complaints) {
   const auto is_walls = [](const Node& n) {
     const auto* text = std::get_if<std::string>(&n.value);
     return text && *text == "walls";
@@ -841,7 +841,7 @@ void check_fixed(const Key& key, const std::string& shown, Node& node) {
     if (is_walls(element)) continue;
     const std::string element_shown = fmt::format("{}[{}]", shown, i);
     if (!element.table()) complain_of_type(key, element_shown, element);
-    check_table(element, "bodies[].fixed[]", element_shown);
+    check_table(element, "bodies[].fixed[]", element_shown, complaints);
   }
 }
 
@@ -852,7 +852,7 @@ std::string shown_element(const std::string& shown, std::size_t i, const Node& e
   return text && !text->empty() ? fmt::format("{}.{}", shown, *text) : fmt::format("{}[{}]", shown, i);
 }
 
-void check_value(const Key& key, const std::string& shown, Node& node) {
+void check_value(const Key& key, const std::string& shown, Node& node, const Complaints& complaints) {
   switch (key.type) {
     case Type::text:
       checked_text(key, shown, node);
@@ -887,17 +887,19 @@ void check_value(const Key& key, const std::string& shown, Node& node) {
     case Type::color:
       return check_color(key, shown, node);
     case Type::fixed:
-      return check_fixed(key, shown, node);
+      return check_fixed(key, shown, node, complaints);
     case Type::table:
       if (!node.table()) complain_of_type(key, shown, node);
-      return check_table(node, std::string(key.path), shown);
+      return check_table(node, std::string(key.path), shown, complaints);
     case Type::tables: {
       auto* elements = std::get_if<Array>(&node.value);
       if (!elements) complain_of_type(key, shown, node);
       for (std::size_t i = 0; i < elements->size(); ++i) {
         Node& element = (*elements)[i];
-        if (!element.table()) complain_of_type(key, fmt::format("{}[{}]", shown, i), element);
-        check_table(element, std::string(key.path) + "[]", shown_element(shown, i, element));
+        complaints.during([&] {
+          if (!element.table()) complain_of_type(key, fmt::format("{}[{}]", shown, i), element);
+          check_table(element, std::string(key.path) + "[]", shown_element(shown, i, element), complaints);
+        });
       }
       return;
     }
@@ -917,26 +919,31 @@ Node fallback_of(const Key& key, const Node& parent) {
   return node;
 }
 
-void check_table(Node& node, const std::string& path, const std::string& shown) {
+void check_table(Node& node, const std::string& path, const std::string& shown,
+                 const Complaints& complaints) {
   const auto known = keys_in(path);
   const std::string prefix = shown.empty() ? "" : shown + ".";
   for (Entry& entry : std::get<Table>(node.value)) {
     const auto at =
         std::find_if(known.begin(), known.end(), [&](const Key* k) { return k->name() == entry.key; });
-    if (at == known.end())
-      complain(entry.where, fmt::format("unknown key \"{}\"{}; {}", entry.key,
-                                        shown.empty() ? std::string() : fmt::format(" in {}", shown),
-                                        suggestion(path, entry.key)));
-    check_value(**at, prefix + entry.key, entry.value);
+    complaints.during([&] {
+      if (at == known.end())
+        complain(entry.where, fmt::format("unknown key \"{}\"{}; {}", entry.key,
+                                          shown.empty() ? std::string() : fmt::format(" in {}", shown),
+                                          suggestion(path, entry.key)));
+      check_value(**at, prefix + entry.key, entry.value, complaints);
+    });
   }
   for (const Key* key : known) {
     if (node.find(key->name()) || key->fallback == may_lack) continue;
-    if (key->fallback == required)
-      complain(node.where, fmt::format("{} lacks \"{}\" ({}); add {}", shown.empty() ? "the scene" : shown,
-                                       key->name(), key->meaning, key->example()));
-    Entry added{std::string(key->name()), node.where, fallback_of(*key, node)};
-    check_value(*key, prefix + added.key, added.value);
-    std::get<Table>(node.value).push_back(std::move(added));
+    complaints.during([&] {
+      if (key->fallback == required)
+        complain(node.where, fmt::format("{} lacks \"{}\" ({}); add {}", shown.empty() ? "the scene" : shown,
+                                         key->name(), key->meaning, key->example()));
+      Entry added{std::string(key->name()), node.where, fallback_of(*key, node)};
+      check_value(*key, prefix + added.key, added.value, complaints);
+      std::get<Table>(node.value).push_back(std::move(added));
+    });
   }
 }
 
@@ -1079,6 +1086,6 @@ std::string suggestion(std::string_view parent_path, std::string_view unknown) {
   return fmt::format("known here: {}", fmt::join(names, ", "));
 }
 
-void check_and_complete(Node& root) { check_table(root, "", ""); }
+void check_and_complete(Node& root, const Complaints& complaints) { check_table(root, "", "", complaints); }
 
 }  // namespace limber::scenes

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "core/words.h"
+#include "scenes/detail/complaints.h"
 #include "scenes/detail/document.h"
 
 namespace limber::scenes {
@@ -70,9 +71,9 @@ std::vector<const Key*> keys_in(std::string_view path);
 // may stand there.
 std::string suggestion(std::string_view parent_path, std::string_view unknown);
 
-// Throws InputError at the first thing that is not as the table of keys says: unknown key, wrong type, out of
-// range, required key that lacks. Then puts in the defaults. After this every typed read by a path of the
-// table succeeds.
-void check_and_complete(Node& root);
+// Complains of what is not as the table of keys says: unknown key, wrong type, out of range, required key
+// that lacks. Puts in the defaults. After this, where there was no complaint, every typed read by a path of
+// the table succeeds.
+void check_and_complete(Node& root, const Complaints& = Complaints());
 
 }  // namespace limber::scenes

@@ -264,7 +264,7 @@ TEST_F(Program_slow, ABenchmarkStartedAgainRunsOnlyWhatIsMissing) {
   EXPECT_EQ(contents(fs::path(out()) / "runs"), after);
 }
 
-TEST_F(Program, ASignalEndsABenchmarkAndKeepsWhatIsFinished) {
+TEST_F(Program_slow, ASignalEndsABenchmarkAndKeepsWhatIsFinished) {
   ASSERT_EQ(limber_program(bench_of(scene(), out(), {"--chunk", "1/4"})).code, exit_done);
   request_stop(SIGTERM);
   const Result stopped = limber_program(bench_of(scene(), out()));
@@ -273,7 +273,7 @@ TEST_F(Program, ASignalEndsABenchmarkAndKeepsWhatIsFinished) {
   EXPECT_EQ(contents(fs::path(out()) / "runs").size(), 1u);
 }
 
-TEST_F(Program, ARunThatMeetsItsTimeLimitIsNotSolved) {
+TEST_F(Program_slow, ARunThatMeetsItsTimeLimitIsNotSolved) {
   const Result limited =
       limber_program({"bench", scene(), "-o", out(), "--seeds", "5,7", "--time-limit", "0s", "--json"});
   ASSERT_EQ(limited.code, exit_done) << limited.err;
@@ -283,7 +283,7 @@ TEST_F(Program, ARunThatMeetsItsTimeLimitIsNotSolved) {
   EXPECT_EQ(group.at("motion_s"), Json());
 }
 
-TEST_F(Program, BadBenchmarksAreRefusedWithAWayOut) {
+TEST_F(Program_slow, BadBenchmarksAreRefusedWithAWayOut) {
   ASSERT_EQ(limber_program(bench_of(scene(), out(), {"--chunk", "1/4"})).code, exit_done);
   const fs::path folder_of_runs = fs::path(out()) / "runs";
   fs::create_directories(out("empty"));

@@ -112,7 +112,7 @@ TEST_F(Program_slow, ObservablesOfAPathAgreeWithItsSummary) {
 
 // The same cube as one piece: every manipulation still makes sense, so a plan is found and keeps its
 // promises.
-TEST_F(Program, ARigidRobotIsPlannedAndVerified) {
+TEST_F(Program_slow, ARigidRobotIsPlannedAndVerified) {
   const std::vector<std::string> sets{"--set", "bodies.robot.kind=rigid", "--set",
                                       "bodies.robot.material={ density_kg_m3 = 100 }"};
   std::vector<std::string> plan{"plan", scene(), "-o", out(), "--json"};
@@ -191,7 +191,7 @@ TEST_F(Program_slow, TheSameSeedGivesTheSameBytesForAnyThreadCount) {
   EXPECT_NE(other.at("tree_hash"), results[0].at("tree_hash"));
 }
 
-TEST_F(Program, ASearchCutShortAndResumedEndsLikeAnUninterruptedOne) {
+TEST_F(Program_slow, ASearchCutShortAndResumedEndsLikeAnUninterruptedOne) {
   const Json whole = limber_program({"plan", scene(), "-o", out("whole"), "--json"}).json();
   const Result cut = limber_program({"plan", scene(), "-o", out("cut"), "--iterations", "2", "--json"});
   EXPECT_EQ(cut.code, exit_no_plan);
@@ -201,7 +201,7 @@ TEST_F(Program, ASearchCutShortAndResumedEndsLikeAnUninterruptedOne) {
   EXPECT_EQ(resumed.at("trajectory_hash"), whole.at("trajectory_hash"));
 }
 
-TEST_F(Program, ASignalKeepsThePlanSoFar) {
+TEST_F(Program_slow, ASignalKeepsThePlanSoFar) {
   limber_program({"plan", scene(), "-o", out(), "--iterations", "3"});  // prepares the bodies
   fs::remove(fs::path(out()) / "plan.npz");
   request_stop(SIGINT);
@@ -233,7 +233,7 @@ TEST_F(Program_slow, ResumePaintsOnlyFramesThatAreMissingOrDamaged) {
   EXPECT_EQ(contents(frames), good);
 }
 
-TEST_F(Program, BadScenesAreRefusedWithAPlaceAndAWayOut) {
+TEST_F(Program_slow, BadScenesAreRefusedWithAPlaceAndAWayOut) {
   struct Case {
     std::string text, place, words;
   };
@@ -295,7 +295,7 @@ TEST_F(Program, AnUnwritableFolderIsADiskError) {
 }
 
 // A limit on the size of a file makes write() fail in its middle, as a full disk does.
-TEST_F(Program, ADiskThatFillsUpLeavesNothingHalfWritten) {
+TEST_F(Program_slow, ADiskThatFillsUpLeavesNothingHalfWritten) {
   const std::string scene_file = scene();
   rlimit old{};
   getrlimit(RLIMIT_FSIZE, &old);
@@ -349,7 +349,7 @@ TEST_F(Program, PrepareReportsAndVerifyProvesAgain) {
 }
 
 // An open model has no exact parts, which shows after it was read.
-TEST_F(Program, ARefusedModelLeavesTheFolderAsItWas) {
+TEST_F(Program_slow, ARefusedModelLeavesTheFolderAsItWas) {
   const std::string model = (folder / "open.obj").string();
   std::ofstream(model) << "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\n";
   EXPECT_EQ(limber_program({"prepare", model, "-o", out("new"), "--exact"}).code, exit_bad_input);
@@ -360,7 +360,7 @@ TEST_F(Program, ARefusedModelLeavesTheFolderAsItWas) {
   EXPECT_EQ(contents(out()), before);
 }
 
-TEST_F(Program, ExportsAreWrittenAlsoOfABodyThatIsUpToDateAndGoWithIt) {
+TEST_F(Program_slow, ExportsAreWrittenAlsoOfABodyThatIsUpToDateAndGoWithIt) {
   const std::string model = (folder / "tetrahedron.obj").string();
   std::ofstream(model) << "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n";
   ASSERT_EQ(limber_program({"prepare", model, "-o", out(), "--tets", "100"}).code, exit_done);
@@ -385,7 +385,7 @@ TEST_F(Program, ExportsAreWrittenAlsoOfABodyThatIsUpToDateAndGoWithIt) {
   EXPECT_EQ(WEXITSTATUS(status), 0);
 }
 
-TEST_F(Program, PreviewPaintsTheSamePicturesEachTime) {
+TEST_F(Program_slow, PreviewPaintsTheSamePicturesEachTime) {
   const std::string model = (folder / "tetrahedron.obj").string();
   std::ofstream(model) << "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n";
   for (const char* name : {"one", "two"})

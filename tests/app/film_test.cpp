@@ -78,7 +78,7 @@ TEST_F(Filmed_slow, AFrameIsTheSameByItself) {
   EXPECT_FALSE(fs::exists(fs::path(out()) / "film.mp4"));
 }
 
-TEST_F(Filmed, PassesAgreeWithOneAnother) {
+TEST_F(Filmed_slow, PassesAgreeWithOneAnother) {
   frame_3({"--passes", "depth,normal,object,scalar", "--bits", "16", "--set", "film.color_by=volume"});
   const render::Raster16 depth = render::read_png_16(picture("0003.depth.png")),
                          normal = render::read_png_16(picture("0003.normal.png")),

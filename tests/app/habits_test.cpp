@@ -99,7 +99,7 @@ TEST_F(Habits, ThePictureOfTheTreeHasEveryEdgeAndThePathToTheGoal) {
 }
 
 // A rigid wall across the whole way forbids every plan, and the program says so and films the nearest state.
-TEST_F(Habits, ARigidWallIsFoundToForbidThePlanAndTheNearestIsFilmed) {
+TEST_F(Habits_slow, ARigidWallIsFoundToForbidThePlanAndTheNearestIsFilmed) {
   const std::string walled =
       scene(replaced("kind = \"deformable\"\nmodel = { box = { size_m = [0.4, 2, 0.9] } }",
                      "kind = \"rigid\"\nmodel = { box = { size_m = [0.4, 2, 2] } }"));
@@ -116,7 +116,7 @@ TEST_F(Habits, ARigidWallIsFoundToForbidThePlanAndTheNearestIsFilmed) {
 }
 
 // A robot whose volume must hardly change cannot be pushed at all, and the program says what refuses it.
-TEST_F(Habits, WhatRefusesMostPushesIsNamed) {
+TEST_F(Habits_slow, WhatRefusesMostPushesIsNamed) {
   const std::vector<std::string> words{"plan", scene(), "-o", out(), "--iterations", "30", "--json", "--set"};
   for (const auto& [most, named] : {std::pair("1e-6", true), {"1", false}}) {
     std::vector<std::string> limited = words;
@@ -130,7 +130,7 @@ TEST_F(Habits, WhatRefusesMostPushesIsNamed) {
 }
 
 // A soft block that fills the way stands in it: it is named, and geometry is not to blame.
-TEST_F(Habits, TheBodyThatBlocksIsNamed) {
+TEST_F(Habits_slow, TheBodyThatBlocksIsNamed) {
   const Result planned = limber_program(
       {"plan", scene(replaced("size_m = [0.4, 2, 0.9]", "size_m = [0.4, 2, 2]")), "-o", out(), "--iterations",
        "60", "--set", "bodies.block.pose.position_m=[2, 1, 1]", "--set", "planner.goal_bias=1", "--set",

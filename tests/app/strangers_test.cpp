@@ -13,7 +13,7 @@
 namespace limber::app {
 namespace {
 
-class Strangers : public Program {
+class Strangers_slow : public Program {
  protected:
   void SetUp() override {
     ASSERT_EQ(limber_program({"plan", scene(), "-o", out()}).code, exit_done);
@@ -43,7 +43,7 @@ class Strangers : public Program {
   plan::PlanFile good_;
 };
 
-TEST_F(Strangers, AControlAtANodeThatTheRobotLacksIsRefused) {
+TEST_F(Strangers_slow, AControlAtANodeThatTheRobotLacksIsRefused) {
   for (const int node : {-7, 27, 1 << 30}) {
     write([&](plan::Plan& p) {
       p.trajectory.controls[0].manipulation = Manipulation::control_point;
@@ -56,7 +56,7 @@ TEST_F(Strangers, AControlAtANodeThatTheRobotLacksIsRefused) {
 }
 
 // The whole file is of one piece, but of another world.
-TEST_F(Strangers, StatesOfOtherBodiesAreRefused) {
+TEST_F(Strangers_slow, StatesOfOtherBodiesAreRefused) {
   write([](plan::Plan& p) {
     const auto cut = [](State s) {
       s.positions.resize(30), s.velocities.resize(30);
@@ -73,7 +73,7 @@ TEST_F(Strangers, StatesOfOtherBodiesAreRefused) {
 }
 
 // 2³¹ − 1 steps in a path of three frames, all that can be added up being right.
-TEST_F(Strangers, APathThatHasFewerFramesThanItsReplayIsRefused) {
+TEST_F(Strangers_slow, APathThatHasFewerFramesThanItsReplayIsRefused) {
   write([](plan::Plan& p) {
     plan::Trajectory& t = p.trajectory;
     const std::int64_t more = std::numeric_limits<std::int32_t>::max() - t.controls.back().steps;
@@ -82,7 +82,7 @@ TEST_F(Strangers, APathThatHasFewerFramesThanItsReplayIsRefused) {
   expect_refused("lacks the frame at step");
 }
 
-TEST_F(Strangers, NumbersThatNoPlanHasAreRefused) {
+TEST_F(Strangers_slow, NumbersThatNoPlanHasAreRefused) {
   write([](plan::Plan& p) { p.trajectory.frames[1].positions[0] = std::numeric_limits<float>::quiet_NaN(); });
   expect_refused("frame_positions[1] holds nan");
   for (const double fps : {0.0, -1.0, 1e9, 1e-300}) {
@@ -94,7 +94,7 @@ TEST_F(Strangers, NumbersThatNoPlanHasAreRefused) {
 }
 
 // What is read of JSON has the kinds that were written.
-TEST_F(Strangers, ATextWhereANumberBelongsIsRefused) {
+TEST_F(Strangers_slow, ATextWhereANumberBelongsIsRefused) {
   const auto edited = [](const fs::path& path, const std::function<void(Json&)>& change) {
     Json json = read_json(path);
     change(json);
@@ -108,6 +108,7 @@ TEST_F(Strangers, ATextWhereANumberBelongsIsRefused) {
            {"certificate is a whole number", [](Json& j) { j["certificate"] = 7; }},
            {"cpu_seconds.cage is a list", [](Json& j) { j["cpu_seconds"]["cage"] = Json::array(); }},
            {"shells.count is a number", [](Json& j) { j["shells"]["count"] = 1e300; }},
+           {"contact.samples is nothing", [](Json& j) { j["contact"]["samples"] = nullptr; }},
            {"model is missing", [](Json& j) { j.erase("model"); }}}) {
     edited(report, change);
     for (const std::vector<std::string>& command : {std::vector<std::string>{"verify", out()},
@@ -132,7 +133,7 @@ TEST_F(Strangers, ATextWhereANumberBelongsIsRefused) {
   expect_refused("given.summary: dynamics is a text");
 }
 
-TEST_F(Strangers, PipesAreRefusedWhereverFilesAreRead) {
+TEST_F(Strangers_slow, PipesAreRefusedWhereverFilesAreRead) {
   fs::remove(file());
   ASSERT_EQ(mkfifo(file().c_str(), 0600), 0);
   EXPECT_EQ(limber_program({"verify", out()}).code, exit_bad_input);
@@ -150,7 +151,7 @@ TEST_F(Strangers, PipesAreRefusedWhereverFilesAreRead) {
 }
 
 // Frames are what takes long: what would keep the film from being made is told before.
-TEST_F(Strangers, WithoutFfmpegNoFrameIsPainted) {
+TEST_F(Strangers_slow, WithoutFfmpegNoFrameIsPainted) {
   const std::string path = std::getenv("PATH");
   ::setenv("PATH", out("nowhere").c_str(), 1);
   const Result rendered = limber_program({"render", out()}),
@@ -167,7 +168,7 @@ TEST_F(Strangers, WithoutFfmpegNoFrameIsPainted) {
 }
 
 // The one that came first has the folder; the kernel takes the lock from one that is killed.
-TEST_F(Strangers, TwoRunsInOneFolderDoNotMixAndAKilledOneLeavesNothingThatBlocks) {
+TEST_F(Strangers_slow, TwoRunsInOneFolderDoNotMixAndAKilledOneLeavesNothingThatBlocks) {
   int ready[2];
   ASSERT_EQ(::pipe(ready), 0);
   const pid_t child = ::fork();
@@ -198,7 +199,7 @@ TEST_F(Strangers, TwoRunsInOneFolderDoNotMixAndAKilledOneLeavesNothingThatBlocks
 }
 
 // Of a folder that may only be read.
-TEST_F(Strangers, AnExportToElsewhereNeedsNoPermissionToWriteBeside) {
+TEST_F(Strangers_slow, AnExportToElsewhereNeedsNoPermissionToWriteBeside) {
   fs::remove(fs::path(out()) / "manifest.json");
   for (const auto& entry : fs::recursive_directory_iterator(folder.path()))
     fs::permissions(entry.path(), fs::perms::all);
@@ -240,7 +241,7 @@ TEST_F(Program, AMistypedCommandOrOptionIsNamedWithWhatWasMeant) {
 }
 
 // Without a settle nobody has looked whether the robot rests.
-TEST_F(Program, RobustSaysOfNoRobotThatItRestsWhereNoneWasAskedTo) {
+TEST_F(Program_slow, RobustSaysOfNoRobotThatItRestsWhereNoneWasAskedTo) {
   const std::string moving = scene(replaced("max_force_n = 100", "max_force_n = 100\nsettle_time_s = 0"));
   ASSERT_EQ(limber_program({"plan", moving, "-o", out()}).code, exit_done);
   const Result result =

@@ -28,7 +28,7 @@ class ViaProgram : public Program {
 };
 using ViaProgram_slow = ViaProgram;  // stays out of the sanitizer runs
 
-TEST_F(ViaProgram, GoalsAreReachedInTheirOrderAndVerified) {
+TEST_F(ViaProgram_slow, GoalsAreReachedInTheirOrderAndVerified) {
   const std::string file = with_goals(out_and_back);
   const Result planned = limber_program({"plan", file, "-o", out(), "--preset", "fast", "--json"});
   ASSERT_EQ(planned.code, exit_done) << planned.err;

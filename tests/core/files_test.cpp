@@ -239,6 +239,16 @@ std::vector<fs::path> files_in(const fs::path& folder) {
   return files;
 }
 
+// Also of a command that writes one file and cleans up nothing.
+TEST(File, TheFirstWriteBesideRemovesWhatKilledProcessesLeft) {
+  const TemporaryFolder folder;
+  const Writer writer(folder / "0007.png");
+  writer.kill();
+  ASSERT_EQ(files_in(folder.path()).size(), 1u);
+  write_file(folder / "new.txt", "whole");
+  EXPECT_EQ(files_in(folder.path()), std::vector<fs::path>{folder / "new.txt"});
+}
+
 TEST(File, OnlyWhatKilledProcessesLeftIsRemoved) {
   const TemporaryFolder folder;
   const Writer writer(folder / "0007.png");

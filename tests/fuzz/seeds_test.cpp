@@ -2,8 +2,11 @@
 // anything but an answer.
 #include <gtest/gtest.h>
 
+#include <cstdlib>
+
 #include "core/error.h"
 #include "core/random.h"
+#include "tests/fuzz/folder.h"
 #include "tests/fuzz/targets.h"
 
 namespace limber::fuzz {
@@ -57,6 +60,45 @@ TEST(Seeds, NoChangedByteEscapesAsAnythingButInputError) {
         } catch (const InputError&) {
         }
       }
+}
+
+std::string bytes_of(std::string_view hex) {
+  std::string bytes;
+  for (std::size_t i = 0; i + 1 < hex.size(); i += 2)
+    bytes += char(std::stoi(std::string(hex.substr(i, 2)), nullptr, 16));
+  return bytes;
+}
+
+// What once came out as a defect of limber: a report whose contact is none, a tet of a shell that is none.
+TEST(Seeds, ChangedFoldersThatOnceEscapedAreRefused) {
+  for (const char* script : {"987e3acf7b755c82492b6025bc2b3c5c11bef90514f702a6dbdb8daabedfc75bf436d4f2770e"
+                             "622e3e31b65c125e52b67882b2fd520fe37e48d43009e4",
+                             "20973fbb1046905ad1f2a72c83a2e2afa7e878f5238e2c7773ea9c35b9d2d5405ae91f394687"
+                             "6ae7b954f0797795"})
+    EXPECT_THROW(meet_changed_folder(bytes_of(script)), InputError) << script;
+}
+
+// Bytes drawn blindly reach far where they are read as edits.
+TEST(Seeds, NoScriptOfEditsEscapesAsAnythingButInputError) {
+  const char* const more = std::getenv("LIMBER_FUZZ_SCRIPTS");
+  const int scripts = more ? std::atoi(more) : 60;
+  Rng rng(20260112, 1);
+  std::vector<Target> all = targets();
+  all.push_back({"folder_changed", meet_changed_folder, {}});
+  for (const Target& target : all) {
+    if (!target.name.ends_with("_changed")) continue;
+    for (int trial = 0; trial < scripts; ++trial) {
+      std::string script(std::size_t(4 + rng.below(60)), '\0');
+      for (char& byte : script) byte = char(rng.below(256));
+      SCOPED_TRACE(fmt::format("{}, script {}", target.name, trial));
+      try {
+        target.read(script);
+      } catch (const InputError&) {
+      } catch (const std::exception& error) {
+        ADD_FAILURE() << error.what();
+      }
+    }
+  }
 }
 
 }  // namespace

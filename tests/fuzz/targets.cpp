@@ -15,9 +15,12 @@
 #include "meshing/detail/polygon_soup.h"
 #include "meshing/import.h"
 #include "plan/plan_file.h"
+#include "scenes/models.h"
+#include "scenes/problems.h"
 #include "scenes/scene.h"
 #include "tests/core/deflated_zip.h"
 #include "tests/core/temporary_folder.h"
+#include "tests/fuzz/edits.h"
 
 namespace limber::fuzz {
 
@@ -285,6 +288,120 @@ std::vector<std::string> hostile_archives() {
           deflated_zip("a.npy", lies)};
 }
 
+// ── good files that a script changes where hashes and seals do not stop it: edits.h
+// ──────────────────────────
+
+const std::string no_edit(3, '\0');  // shorter than any
+
+void read_changed(const std::string& npz, std::string_view bytes, bool seal,
+                  const std::function<void(const fs::path&)>& read) {
+  Npz file = read_npz(file_of(npz, "good.npz"));
+  Script script(bytes);
+  edit(file, script);
+  if (seal) file.texts["hash.txt"] = hex(hash_of(file, "hash.txt")) + "\n";
+  write_npz(folder() / "changed.npz", file);
+  read(folder() / "changed.npz");
+}
+
+// What is read moves the surface, and that is as large as it was.
+void use(const ffd::Binding& binding) {
+  Points positions;
+  ffd::deform(binding, cage().tets, cage().positions, positions);
+  LIMBER_CHECK(positions.rows() == surface().positions.rows(), positions.rows());
+}
+
+void use(const ContactShape& shape) {
+  for (Eigen::Index s = 0; s < shape.samples.positions_m.rows(); ++s)
+    shape.field.at(shape.samples.positions_m.row(s));
+  shape.field.at({0.3, -1e30, 0.2});
+}
+
+void read_changed_plan(std::string_view bytes) {
+  Script script(bytes);
+  plan::Plan changed = small_plan();
+  edit(changed, script);
+  plan::write_plan(folder() / "changed.npz", changed, {});
+  const plan::Plan read = plan::read_plan(folder() / "changed.npz").plan;
+  plan::require_frame_times(read.trajectory, 0.1, "plan.npz");
+  plan::explain(read);
+}
+
+// Who asks for all complaints gets the one that reading throws first, and none where it throws none.
+scenes::Scene read_scene(const std::string& text, const std::vector<std::string>& sets = {}) {
+  const std::vector<std::string> problems = scenes::problems_of(text, "scene.toml", sets);
+  try {
+    scenes::Scene scene = scenes::read_scene(text, "scene.toml", sets);
+    LIMBER_CHECK(problems.empty(), problems.front());
+    return scene;
+  } catch (const InputError& error) {
+    LIMBER_CHECK(!problems.empty() && problems.front() == error.what(), error.what());
+    throw;
+  }
+}
+
+// A scene that is taken describes bodies that can be made: those that are made fast, are.
+bool is_small(const scenes::BodySpec& body) {
+  constexpr double cells = 30;
+  const auto few = [](const Vec3& size, double edge) { return size.maxCoeff() < cells * edge; };
+  if (const auto* box = std::get_if<scenes::BoxModel>(&body.model)) return few(box->size_m, box->triangle_m);
+  if (const auto* plate = std::get_if<scenes::PlateModel>(&body.model))
+    return few(plate->box.size_m, plate->box.triangle_m);
+  if (const auto* sphere = std::get_if<scenes::SphereModel>(&body.model))
+    return few(Vec3::Constant(sphere->diameter_m), sphere->triangle_m);
+  return false;
+}
+
+void read_changed_scene(std::string_view bytes) {
+  Script script(bytes);
+  const scenes::Scene scene = read_scene(scene_seed(), scene_edits({"ball", "plate"}, script));
+  for (const scenes::BodySpec& body : scene.bodies) {
+    if (!is_small(body)) continue;
+    const SurfaceMesh made = scenes::made_surface(body).value();
+    try {
+      validate(made, "made model");
+    } catch (const InputError& error) {
+      LIMBER_CHECK(false, error.what());
+    }
+  }
+}
+
+std::vector<Target> changed_targets(const std::string& binding_npz, const std::string& contact_npz,
+                                    const std::string& plan_npz) {
+  return {{"binding_changed",
+           [binding_npz](auto bytes) {
+             read_changed(binding_npz, bytes, false,
+                          [](const fs::path& p) { use(ffd::read_binding(p, surface(), cage())); });
+           },
+           {no_edit}},
+          {"contact_changed",
+           [contact_npz](auto bytes) {
+             read_changed(contact_npz, bytes, false,
+                          [](const fs::path& p) { use(read_contact_shape(p, surface(), cage())); });
+           },
+           {no_edit}},
+          {"plan_arrays_changed",
+           [plan_npz](auto bytes) {
+             read_changed(plan_npz, bytes, true,
+                          [](const fs::path& p) { plan::explain(plan::read_plan(p).plan); });
+           },
+           {no_edit}},
+          {"plan_changed", read_changed_plan, {no_edit}},
+          {"shells_changed",
+           [text = read_file(folder() / "shells.obj")](auto bytes) {
+             Script script(bytes);
+             read_obj_shells(file_of(edited(text, script), "changed.obj"));
+           },
+           {no_edit}},
+          {"cage_changed",
+           [text = read_file(folder() / "cage.msh")](auto bytes) {
+             Script script(bytes);
+             std::vector<int> label;
+             validate(read_msh(file_of(edited(text, script), "changed.msh"), &label), "changed.msh");
+           },
+           {no_edit}},
+          {"scene_changed", read_changed_scene, {no_edit}}};
+}
+
 std::vector<Target> made_targets() {
   const std::string npz = written("binding.npz", [](const fs::path& p) {
     ffd::Binding binding{Eigen::VectorXi::Zero(5), Weights::Zero(5, 4)};
@@ -305,7 +422,7 @@ std::vector<Target> made_targets() {
   const std::string report = written("report.json", [](const fs::path& p) {
     write_json(p, to_json(meshing::clean(surface(), {.count_self_intersections = false})));
   });
-  return {
+  std::vector<Target> all{
       {"obj", [](auto bytes) { meshing::detail::read_obj(bytes, "a.obj"); }, obj_seeds},
       {"off", [](auto bytes) { meshing::detail::read_off(bytes, "a.off"); }, off_seeds},
       {"ply", [](auto bytes) { meshing::detail::read_ply(bytes, "a.ply"); }, ply_seeds()},
@@ -341,10 +458,9 @@ std::vector<Target> made_targets() {
        [](auto bytes) { read_json(file_of(bytes, "a.json")).dump(); },
        {report},
        {nested(200000, "[", "]"), nested(200000, "{\"a\":", "}")}},
-      {"scene",
-       [](auto bytes) { scenes::read_scene(std::string(bytes), "scene.toml"); },
-       {scene_seed()},
-       hostile_scenes()}};
+      {"scene", [](auto bytes) { read_scene(std::string(bytes)); }, {scene_seed()}, hostile_scenes()}};
+  for (Target& target : changed_targets(npz, contact_npz, plan_npz)) all.push_back(std::move(target));
+  return all;
 }
 
 }  // namespace

@@ -226,7 +226,7 @@ TEST(TrianglePieces, CoverTheirTrianglesAndAreCloseToThem) {
 }
 
 // Meetings as clipping finds them, nearest points as of each triangle alone.
-TEST(SurfaceTree, OfNeedlesAnswersAsOfEachNeedleAlone) {
+TEST(SurfaceTree_slow, OfNeedlesAnswersAsOfEachNeedleAlone) {
   const SurfaceMesh rod = rod_of_needles(12, 1e-3);
   const SurfaceTree tree(rod.positions, rod.triangles);
   Rng rng(6, 0);

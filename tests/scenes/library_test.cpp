@@ -33,7 +33,7 @@ void put(const fs::path& file, const std::string& text) {
   write_file(file, text);
 }
 
-TEST(Library, ScenesThatComeWithLimberAreGood) {
+TEST(Library_slow, ScenesThatComeWithLimberAreGood) {
   for (const KnownScene& known : known_scenes()) {
     SCOPED_TRACE(known.name);
     const Scene scene = read_scene_file(known.file);
