@@ -172,7 +172,7 @@ const std::vector<Row> rows{
     {"world.max_dt_s", "world.max_dt_s=0.0001", world},
     {"bodies[].kind", "bodies.cart.kind=rigid", world},
     {"bodies[].contact", "bodies.cart.contact=cage", world},
-    {"bodies[].deformation", "bodies.cart.deformation=phong", film},
+    {"bodies[].deformation", "bodies.cart.deformation=phong", world | film},
     {"bodies[].self_contact", "bodies.cart.self_contact=true", world},
     {"bodies[].max_volume_change", "bodies.cart.max_volume_change=0.2", world},
     {"bodies[].max_stretch", "bodies.cart.max_stretch=3", world},
