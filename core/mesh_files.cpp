@@ -301,9 +301,14 @@ TetMesh read_msh(const fs::path& path, std::vector<int>* label) {
     const int tags = words.number<int>();
     for (int i = 0; i < tags; ++i) {
       const int tag = words.number<int>();
+      if (tag < 0) words.fail(fmt::format("element {} has the tag {}", t + 1, tag));
       if (label && i == 0) (*label)[std::size_t(t)] = tag - 1;
     }
-    for (int i = 0; i < 4; ++i) mesh.tets(t, i) = words.number<int>() - 1;
+    for (int i = 0; i < 4; ++i) {
+      const int node = words.number<int>();
+      if (node < 1) words.fail(fmt::format("element {} names node {}; they are counted from 1", t + 1, node));
+      mesh.tets(t, i) = node - 1;
+    }
   }
   if (words.word() != "$EndElements" || words.done())
     words.fail("the last line is not $EndElements; the file was cut short");

@@ -280,6 +280,16 @@ std::vector<std::string> hostile_plans() {
   return files;
 }
 
+std::vector<std::string> hostile_cages() {
+  std::vector<std::string> files{"root:x:0:0:root:/root:/bin/sh\n"};
+  for (const std::string element : {"4 2 -2147483648 1 1 2 3 4", "4 2 1 1 -2147483648 2 3 4"})
+    files.push_back(
+        "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n4\n1 0 0 0\n2 1 0 0\n3 0 1 0\n4 0 0 1\n"
+        "$EndNodes\n$Elements\n1\n1 " +
+        element + "\n$EndElements\n");
+  return files;
+}
+
 std::vector<std::string> hostile_archives() {
   const std::vector<float> zeros(20'000'000, 0.f);
   std::string lies = npy_file(NpyArray::of<float>(std::span(zeros).first(4), {4}));
@@ -447,7 +457,7 @@ std::vector<Target> made_targets() {
                 [](const fs::path& p) {
                   write_msh(p, cage(), {0, 7});
                 })},
-       {"root:x:0:0:root:/root:/bin/sh\n"}},
+       hostile_cages()},
       {"npz", [](auto bytes) { read_npz(file_of(bytes, "a.npz")); }, {npz, plan_npz}, hostile_archives()},
       {"binding", [](auto bytes) { ffd::read_binding(npz_of(bytes), surface(), cage()); }, {packed(npz)}},
       {"contact",
