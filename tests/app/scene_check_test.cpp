@@ -73,13 +73,17 @@ TEST_F(SceneCheck, OverlapsAndGapsAtTheStartAreThoseOfTheBoxes) {
   const auto placed = [&](double gap) {
     return with(fast(), "position_m = [0.6, 1, 1.3]", fmt::format("position_m = [{}, 1, 0.5]", 1.5 - gap));
   };
-  const Result deep = limber_program({"scene", "check", scene(placed(-0.1)), "--json"});
+  const std::string left = "world.part_overlaps=false";
+  const Json parted = limber_program({"scene", "check", scene(placed(-0.1)), "--json"}).json();
+  EXPECT_EQ(parted.at("overlaps")[0].at("parted"), true);
+  const Result deep = limber_program({"scene", "check", scene(placed(-0.1)), "--set", left, "--json"});
   EXPECT_EQ(deep.code, exit_bad_input);
   ASSERT_EQ(deep.json().at("overlaps").size(), 1u);
   const Json overlap = deep.json().at("overlaps")[0];
   EXPECT_NEAR(overlap.at("depth_m").get<double>(), 0.1, 0.001);
   EXPECT_NEAR(overlap.at("of_robot_size").get<double>(), 0.1 / 0.6, 0.002);
-  EXPECT_EQ(limber_program({"plan", scene(placed(-0.1)), "-o", out()}).code, exit_bad_input);
+  EXPECT_EQ(overlap.at("parted"), false);
+  EXPECT_EQ(limber_program({"plan", scene(placed(-0.1)), "--set", left, "-o", out()}).code, exit_bad_input);
 
   const Result near = limber_program({"scene", "check", scene(placed(0.001)), "--json"});
   EXPECT_EQ(near.code, exit_done) << near.out;

@@ -381,7 +381,7 @@ TEST(Contact, WallsGiveTheSameForcesInLanesAsOneByOne) {
           for (int c = 0; c < 3; ++c) expected[force.at(n, c) + l] = one.f[3 * n + c];
       }
       contacts.add_forces_of_walls({x.data(), v.data(), f.data(), state, force, lanes, lower.data(),
-                                    upper.data(), travel.data(), asleep.data()});
+                                    upper.data(), travel.data(), travel.data(), asleep.data()});
       EXPECT_EQ(std::memcmp(f.data(), expected.data(), f.size() * sizeof(float)), 0);
     }
 }
