@@ -75,7 +75,7 @@ double bulge_of(const Body& body, double skin_m) {
   return std::min(of_skin * skin_m, of_size * bounding_box(body.cage.positions).size().maxCoeff());
 }
 
-// Of ¼ ½ |(Fᵢ − Fⱼ) (Xⱼ − Xᵢ)|, the largest over the edges of tets, a node's movement by one.
+// Of Σ wᵢ wⱼ ½ |(Fᵢ − Fⱼ) (Xⱼ − Xᵢ)|, at most ⅜ of the largest of a tet's edges, when nodes move by one.
 double bend_factor_of(const Body& body, const Tables64& tables) {
   double most = 0;
   std::map<int, Vec3> difference;
@@ -94,7 +94,7 @@ double bend_factor_of(const Body& body, const Tables64& tables) {
         const Vec3 edge = body.cage.positions.row(ends[1]) - body.cage.positions.row(ends[0]);
         double sum = 0;
         for (const auto& [node, gradient] : difference) sum += std::abs(gradient.dot(edge));
-        most = std::max(most, 0.25 * 0.5 * sum);
+        most = std::max(most, 0.375 * 0.5 * sum);
       }
   return most;
 }

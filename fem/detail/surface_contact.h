@@ -76,7 +76,8 @@ class SurfaceContacts {
     Place column[3];  // of a node's deformation gradient
   };
 
-  // How Phong Deformation moves the places of a tet: by wᵢ wⱼ times this of each edge, by `most` at most.
+  // How Phong Deformation moves the places of a tet: by wᵢ wⱼ times this of each edge. And how far the middle
+  // of the edge that bends most.
   struct Bends {
     Place of_edge[6];  // 01 02 03 12 13 23
     Real most;

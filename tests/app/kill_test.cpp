@@ -7,6 +7,7 @@
 
 #include <chrono>
 #include <cmath>
+#include <cstdlib>
 #include <map>
 #include <numbers>
 #include <set>
@@ -19,7 +20,11 @@
 namespace limber::app {
 namespace {
 
-constexpr int kills = 20;
+// LIMBER_KILLS=N kills each as often.
+int kills() {
+  const char* given = std::getenv("LIMBER_KILLS");
+  return given ? std::atoi(given) : 8;
+}
 
 // What no two runs have in common, nor a run and the rest of one that was killed.
 bool is_cost(const std::string& key) {
@@ -143,7 +148,7 @@ class Killed : public Program {
     const Files whole = files_in(work);
     ASSERT_NE(whole, old);
     Rng rng(20261123, std::uint64_t(seed));
-    for (int kill = 0; kill < kills; ++kill) {
+    for (int kill = 0; kill < kills(); ++kill) {
       const double after = rng.uniform(0, 1.05) * seconds;
       SCOPED_TRACE(fmt::format("killed after {:.3f} of {:.3f} s", after, seconds));
       begin();
