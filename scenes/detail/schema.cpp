@@ -112,7 +112,7 @@ constexpr Key all_keys[] = {
      0,
      "\"linear\"",
      "how the fine surface follows its cage, where it is touched as in films, exports and reports: linear in "
-     "each tet, or bent smoothly by Phong Deformation (docs/binding.md), which costs two to four times the "
+     "each tet, or bent smoothly by Phong Deformation (docs/binding.md), which costs up to three times the "
      "planning where contact is on surfaces",
      "linear, phong",
      ""},
