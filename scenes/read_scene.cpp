@@ -414,7 +414,9 @@ BodySpec read_body(const Node& table, const Box& bounds) {
   if (table.find("contact"))
     body.contact = text(table, "contact") == "cage" ? Contact::cage : Contact::surface;
   if (table.find("self_contact")) body.self_contact = flag(table, "self_contact");
-  body.deformation = text(table, "deformation") == "phong" ? Deformation::phong : Deformation::linear;
+  const bool bends =
+      table.find("deformation") ? text(table, "deformation") == "phong" : body.kind == Kind::deformable;
+  body.deformation = bends ? Deformation::phong : Deformation::linear;
   body.max_volume_change = number(table, "max_volume_change");
   body.max_stretch = maybe_number(table, "max_stretch");
   body.model = read_model(child(table, "model"), what);
@@ -719,11 +721,14 @@ FilmSpec read_film(const Node& table) {
   return film;
 }
 
-// The paper's contact, where the scene does not say otherwise.
-void touch_cages(const Node& root, Scene& scene) {
+// The paper's contact and binding, where the scene does not say otherwise.
+void keep_to_the_paper(const Node& root, Scene& scene) {
   for (const Node& table : list(root, "bodies"))
-    for (BodySpec& body : scene.bodies)
-      if (body.name == text(table, "name") && !table.find("contact")) body.contact = Contact::cage;
+    for (BodySpec& body : scene.bodies) {
+      if (body.name != text(table, "name")) continue;
+      if (!table.find("contact")) body.contact = Contact::cage;
+      if (!table.find("deformation")) body.deformation = Deformation::linear;
+    }
 }
 
 void fill_in_max_stretch(Scene& scene) {
@@ -769,7 +774,7 @@ Scene read(const std::string& toml, const std::string& name_for_messages,
     complaints.during([&] { scene.goal = read_goal(root, scene); });
   }
   complaints.during([&] { scene.planner = read_planner(child(root, "planner")); });
-  if (scene.planner.preset == "paper") touch_cages(root, scene);
+  if (scene.planner.preset == "paper") keep_to_the_paper(root, scene);
   fill_in_max_stretch(scene);
   if (all_bodies) complaints.during([&] { scene.cameras = read_cameras(root, scene); });
   complaints.during([&] { scene.film = read_film(child(root, "film")); });

@@ -814,15 +814,21 @@ void SurfaceContacts<Real>::respond(const LaneView<Real>& view, const SurfaceTou
   const Real load = load_of(touch);
   const int side[2] = {touch.body, touch.against};
   Real relative[3] = {0, 0, 0}, inverse_mass = 0;  // of what is not rigid
+  Real borne[2] = {0, 0}, all[2] = {0, 0};         // of the force: by nodes that move
   for (int i = touch.first_share; i < touch.last_share; ++i) {
     const auto [node, weight] = shares_[i];
+    const int k = i < touch.first_against ? 0 : 1;
+    const Real size = std::abs(weight);
+    all[k] += size;
+    if (tables_.inverse_mass[node] > 0) borne[k] += size;
     for (int c = 0; c < 3; ++c) relative[c] += weight * view.v[view.state.at(node, c)];
-    if (!is_rigid(side[i < touch.first_against ? 0 : 1]))
-      inverse_mass += std::abs(weight) * (loads_[node] / load) * tables_.inverse_mass[node];
+    // A held node counts with its mass: without, one that moves would be thrown by what they do not bear.
+    if (!is_rigid(side[k]) && topology_.bodies[side[k]].moving)
+      inverse_mass += size * (loads_[node] / load) / tables_.node_mass[node];
   }
   bool any_rigid = false;
   for (const int body : side) any_rigid |= body >= 0 && is_rigid(body);
-  if (!any_rigid && !(inverse_mass > 0)) return;
+  if (!any_rigid && !(borne[0] + borne[1] > 0)) return;
   const auto mass_along = [&](const Real along[3]) {
     Real inverse = inverse_mass;
     for (const int body : side)
@@ -840,12 +846,14 @@ void SurfaceContacts<Real>::respond(const LaneView<Real>& view, const SurfaceTou
     if (tables_.inverse_mass[node] > 0)
       for (int c = 0; c < 3; ++c) view.f[view.force.at(node, c)] += weight * force[c];
   }
-  if (told_)
-    told_->push_back({touch.body,
-                      touch.against,
-                      {touch.place[0], touch.place[1], touch.place[2]},
-                      touch.depth,
-                      {force[0], force[1], force[2]}});
+  if (!told_) return;
+  // What is set against nodes that never move on both sides, or against a wall, is borne by none.
+  const Real share = touch.against < 0 ? borne[0] / all[0] : std::max(borne[0] / all[0], borne[1] / all[1]);
+  told_->push_back({touch.body,
+                    touch.against,
+                    {touch.place[0], touch.place[1], touch.place[2]},
+                    touch.depth,
+                    {share * force[0], share * force[1], share * force[2]}});
 }
 
 template struct SurfaceTables<float>;

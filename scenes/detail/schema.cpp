@@ -110,10 +110,11 @@ constexpr Key all_keys[] = {
      Type::choice,
      {},
      0,
-     "\"linear\"",
+     may_lack,
      "how the fine surface follows its cage, where it is touched as in films, exports and reports: linear in "
      "each tet, or bent smoothly by Phong Deformation (docs/binding.md), which costs up to three times the "
-     "planning where contact is on surfaces",
+     "planning where contact is on surfaces; else `\"phong\"`, and of what is rigid or with "
+     "`planner.preset = \"paper\"` `\"linear\"`",
      "linear, phong",
      ""},
     {"bodies[].self_contact",
@@ -455,9 +456,11 @@ constexpr Key all_keys[] = {
      Type::choice,
      {},
      0,
-     "\"paper\"",
-     "paper: the search of Rodriguez, Lien and Amato (ICRA 2006); fast: what we found to be better",
-     "paper, fast",
+     "\"fast\"",
+     "fast: what we found to be better; paper: the search of Rodriguez, Lien and Amato (ICRA 2006), which "
+     "has "
+     "bodies touch at their cages",
+     "fast, paper",
      ""},
     {"planner.seed", Type::integer, from_to(0, 0x1p53 - 1), 0, "1", "of all random numbers", "", ""},
     {"planner.iterations", Type::integer, from_to(1, 1e7), 0, "1000", "gives up after so many expansions", "",
@@ -909,7 +912,7 @@ void check_value(const Key& key, const std::string& shown, Node& node, const Com
 bool fast_preset(const Node& planner) {
   const Node* preset = planner.find("preset");
   const auto* text = preset ? std::get_if<std::string>(&preset->value) : nullptr;
-  return text && *text == "fast";
+  return !text || *text != "paper";
 }
 
 Node fallback_of(const Key& key, const Node& parent) {

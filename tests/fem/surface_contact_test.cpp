@@ -253,6 +253,39 @@ TEST(SurfaceContacts, TheNumberOfSamplesDoesNotChangeTheStiffness) {
   EXPECT_NEAR(sunk[0.03] / sunk[0.06], 1, 0.3);
 }
 
+// A block that is held below is pushed into a wall with its foot, up to 2 mm. Samples just above the held
+// nodes hang on them nearly alone; what they are set against must not fall to the others.
+TEST_P(SurfaceContact, NoNodeBearsWhatHeldOnesDo) {
+  WorldSpec spec = testing::alone({"block", cube({0, 0, 0.5}, 1, 3), {}, {}, BodyKind::deformable});
+  BodySpec& body = spec.bodies[0];
+  for (int n = 0; n < body.cage.positions.rows(); ++n)
+    if (body.cage.positions(n, 2) < 0.01) body.fixed_nodes.push_back(n);
+  body.shape = shape_of(body.cage, rounded_box_surface(bounding_box(body.cage.positions), 0.002), 0.02, 0.01);
+  body.phong = GetParam();
+  spec.bounds_m = {Vec3(-0.5, -5, -5), Vec3(5, 5, 5)};
+  spec.walls = true;
+  const World world = build_world(spec);
+  Lane lane(world);
+  lane.move(0, [](const Vec3f& p) { return Vec3f(p - 0.002f * (1 - p.z() / 0.05f) * Vec3f::UnitX()); });
+  detail::SurfaceContacts<float> contacts(world, detail::kernels<float>(detail::best_isa(), 1), 1);
+  std::vector<detail::Exerted<float>> told;
+  contacts.tell(&told);
+  contacts.add_forces(0, lane.view());
+  double heaviest = 0, told_in_all = 0, all = 0;
+  for (const double mass : world.bodies[0].node_mass_kg) heaviest = std::max(heaviest, mass);
+  const double most = detail::surface_beta * heaviest * 0.002 / (world.contact_dt_s * world.contact_dt_s);
+  for (int n = 0; n < world.nodes; ++n) {
+    EXPECT_LT(lane.f[3 * n], 1.1 * most) << n;
+    all += double(lane.f[3 * n]);
+  }
+  for (const auto& one : told) told_in_all += double(one.force[0]);
+  EXPECT_GT(all, 1);
+  EXPECT_LT(told_in_all, most);
+  if (!GetParam()) {  // whose weights are not negative
+    EXPECT_NEAR(told_in_all, all, 1e-4 * all);
+  }
+}
+
 // Nothing blows up, however many samples touch: cubes thrown at one another, face on face and edge on face.
 TEST_P(SurfaceContact, ThrownBodiesComeApartWithTheirMomentumAndNoMoreEnergy) {
   const World world = build_world(two_balls(0.02, 0, GetParam()));

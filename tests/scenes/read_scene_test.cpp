@@ -40,6 +40,7 @@ fixed = ["walls", { box_m = [[2, 0, 0], [4, 1, 1]] }]
 center_of_mass_m = [9, 1.5, 1.5]
 radius_m = 0.25
 [planner]
+preset = "paper"
 max_force_n = 500
 [camera]
 keyframes = [{ at = 0, eye_m = [0, -9, 1], target_m = [0, 0, 1] }, { at = 1, eye_m = [9, -9, 1], target_m = [9, 0, 1] }]
@@ -115,8 +116,14 @@ TEST(ReadScene, ReadsPartsAndRigidRobots) {
 TEST(ReadScene, ReadsHowSurfacesFollowTheirCages) {
   const Scene s = read_scene(
       replaced(good, "role = \"obstacle\"\n", "role = \"obstacle\"\ndeformation = \"phong\"\n"), "s.toml");
-  EXPECT_EQ(s.bodies[0].deformation, Deformation::linear);
+  EXPECT_EQ(s.bodies[0].deformation, Deformation::linear);  // the paper's
   EXPECT_EQ(s.bodies[1].deformation, Deformation::phong);
+  const Scene fast =
+      read_scene(replaced(good, "preset = \"paper\"\n", ""), "s.toml", {"bodies.gate.kind=rigid"});
+  EXPECT_EQ(fast.planner.preset, "fast");
+  EXPECT_EQ(fast.bodies[0].deformation, Deformation::phong);
+  EXPECT_EQ(fast.bodies[0].contact, Contact::surface);
+  EXPECT_EQ(fast.bodies[1].deformation, Deformation::linear);
   EXPECT_EQ(read_scene(s.text, "s.toml", {"bodies.gate.deformation=linear"}).bodies[1].deformation,
             Deformation::linear);
   EXPECT_THAT(complaint(good, {"bodies.gate.deformation=cubic"}), HasSubstr("\"linear\" or \"phong\""));
@@ -551,7 +558,7 @@ TEST(Keys, EveryKeyChangesTheScene) {
     if (key.path == "bodies[].cage.tets" || key.path == "bodies[].cage.mode" ||
         key.path == "bodies[].cage.shells")
       sets = {tets_robot};
-    if (key.path == "bodies[].contact") sets = {"planner.preset=fast"};
+    if (key.path == "bodies[].contact" || key.path == "planner.preset") sets = {"planner.preset=fast"};
     if (key.path == "planner.guidance") sets = {"planner.lag=3"};
     if (key.path == "planner.stop_in_goal" || key.path == "planner.end_hopeless")
       sets = {"planner.look_s=0.2"};
