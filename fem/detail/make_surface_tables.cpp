@@ -99,8 +99,7 @@ double bend_factor_of(const Body& body, const Tables64& tables) {
   return most;
 }
 
-void append(const Body& body, double offset_m, const Topology& topology, Tables64& tables,
-            Tables64::Body& out) {
+void append(const Body& body, const Topology& topology, Tables64& tables, Tables64::Body& out) {
   const ContactShape& shape = *body.shape;
   const int tets = int(body.cage.tets.rows());
   LIMBER_CHECK(shape.least_weight.rows() == tets, shape.least_weight.rows(), tets);
@@ -114,7 +113,7 @@ void append(const Body& body, double offset_m, const Topology& topology, Tables6
   for (int t = 0; t < tets; ++t) {
     const int tet = body.first_tet + t;
     const Tables64::Core& core = tables.cores.emplace_back(
-        core_of(body.cage.positions, body.cage.tets, t, shape.least_weight, 2 * offset_m));
+        core_of(body.cage.positions, body.cage.tets, t, shape.least_weight, tables.core_reach));
     if (core.scale > 0) {
       out.cored_tets.push_back(tet);
       out.reach_factor = std::max(out.reach_factor, reach_factor(core));
@@ -182,7 +181,7 @@ SurfaceTables<float> single_precision(const Tables64& t) {
   }
   for (int i = 0; i < 4; ++i) out.weights[i].assign(t.weights[i].begin(), t.weights[i].end());
   out.first_sample = t.first_sample, out.first_held_sample = t.first_held_sample;
-  out.wall_slack = float(t.wall_slack);
+  out.core_reach = float(t.core_reach), out.wall_slack = float(t.wall_slack);
   for (const auto& c : t.cores) {
     auto& copy = out.cores.emplace_back();
     std::copy_n(c.least, 4, copy.least), copy.scale = float(c.scale);
@@ -217,6 +216,7 @@ void make_surface_tables(double offset_m, World& world) {
   if (with_shape == 0) return;
   LIMBER_CHECK(offset_m >= 0, offset_m);
   Tables64& tables = world.surfaces64;
+  tables.core_reach = 2 * offset_m, tables.wall_slack = 0.05 * offset_m;
   tables.bodies.resize(world.bodies.size());
   tables.tets_round_node.resize(std::size_t(world.nodes));
   append_slopes(world, tables);
@@ -228,13 +228,12 @@ void make_surface_tables(double offset_m, World& world) {
   for (const bool moving : {true, false})  // in the order of the world's tets
     for (std::size_t b = 0; b < world.bodies.size(); ++b) {
       if (world.bodies[b].moving != moving) continue;
-      append(world.bodies[b], offset_m, world.topology, tables, tables.bodies[b]);
+      append(world.bodies[b], world.topology, tables, tables.bodies[b]);
       if (world.bodies[b].self_contact) append_tets_round_nodes(world.bodies[b], tables);
     }
   tables.first_sample.push_back(int(tables.samples.size()));
   append_shares(world, tables);
   const std::size_t bodies = world.bodies.size();
-  tables.wall_slack = 0.05 * offset_m;
   tables.offset.assign(bodies * bodies, offset_m);
   world.surfaces = single_precision(tables);
 }

@@ -591,17 +591,18 @@ bool SurfaceContacts<Real>::find_surface(const LaneView<Real>& view, int body, i
 
 // The same of a surface that Phong Deformation moves. The place at rest is found by Newton's method, from
 // that of linear deformation, whose weights are given, with the gradients of nodes as the Jacobian; `weight`
-// becomes that of the place found, which may lie outside of the tet.
+// becomes that of the place found.
 template <class Real>
 bool SurfaceContacts<Real>::find_bent_surface(const LaneView<Real>& view, int body, int tet,
                                               const Place& place, Real weight[4], Surface& found) {
-  constexpr int steps = 2;
+  constexpr int usual_steps = 2, most_steps = 6;
   constexpr Real thin = Real(1e-2);
   const int* node = topology_.tets[tet].node;
   const Real* weight_gradient = &surface_.weight_gradients[9 * std::size_t(tet)];
   const Bends& bends = bends_of(view, tet);
+  const Real exact = surface_.wall_slack + Real(1e-3) * tables_.skin[body];
   Place row[3];  // of the inverse of the deformation gradient
-  for (int step = 0; step < steps; ++step) {
+  for (int step = 0;; ++step) {
     Place column[3], off;
     for (Place& c : column) c.row = Row{};
     off.row = place.row - bend(bends, weight).row;
@@ -614,8 +615,11 @@ bool SurfaceContacts<Real>::find_bent_surface(const LaneView<Real>& view, int bo
       cross(column[(c + 1) % 3].at, column[(c + 2) % 3].at, row[c].at), row[c].at[3] = 0;
     const Real volume = dot(row[0].at, column[0].at);
     if (!(volume > thin)) return false;
+    for (int c = 0; c < 3; ++c) row[c].row *= 1 / volume;
+    if (step >= usual_steps && dot(off.at, off.at) <= exact * exact) break;
+    if (step == most_steps) return false;
     Real way[3];
-    for (int c = 0; c < 3; ++c) row[c].row *= 1 / volume, way[c] = dot(row[c].at, off.at);
+    for (int c = 0; c < 3; ++c) way[c] = dot(row[c].at, off.at);
     for (int i = 0; i < 3; ++i) {
       const Real more = dot(weight_gradient + 3 * i, way);
       weight[i + 1] += more, weight[0] -= more;
@@ -629,6 +633,23 @@ bool SurfaceContacts<Real>::find_bent_surface(const LaneView<Real>& view, int bo
   for (int i = 0; i < 3; ++i)
     for (int c = 0; c < 3; ++c) now[c] += gradient[i] * row[i].at[c];
   return found.set(distance, now);
+}
+
+// Whether a place at rest lies in the box of a tet, or no farther out than `slack`. Cores have long corners:
+// where tets fold away from one another these reach through air.
+template <class Real>
+bool SurfaceContacts<Real>::is_beside(int tet, const Real weight[4], Real slack) const {
+  const int* node = topology_.tets[tet].node;
+  const Real* rest = tables_.rest_positions.data();
+  for (int c = 0; c < 3; ++c) {
+    Real at = 0, lower = rest[3 * node[0] + c], upper = lower;
+    for (int i = 0; i < 4; ++i) {
+      const Real x = rest[3 * node[i] + c];
+      at += weight[i] * x, lower = std::min(lower, x), upper = std::max(upper, x);
+    }
+    if (!(at >= lower - slack && at <= upper + slack)) return false;
+  }
+  return true;
 }
 
 // Appends a touch where the surface is nearer than the offset, or above.
@@ -671,6 +692,12 @@ bool SurfaceContacts<Real>::measure(const LaneView<Real>& view, int from, int in
   SurfaceTouch<Real> touch;
   touch.depth = apart - surface.distance;
   if (!(touch.depth > 0)) return false;
+  Real slack = surface_.core_reach;
+  if (into_bends) {
+    const Place way = bend(bends_of(view, tet), against);
+    slack += std::sqrt(dot(way.at, way.at));
+  }
+  if (!is_beside(tet, against, slack)) return false;
   touch.body = from, touch.against = into, touch.sample = sample, touch.tet = tet;
   share_sample(from, sample, touch);
   if (into_bends)

@@ -116,6 +116,7 @@ class SurfaceContacts {
   Real bulge_of(const LaneView<Real>&, int body, int tet);
   Real sample_bulge(const LaneView<Real>&, int body, int sample);
   bool near_core(const LaneView<Real>&, int tet, const Real place[3], const Real weight[4], Real out);
+  bool is_beside(int tet, const Real weight[4], Real slack) const;
   bool barycentric(const LaneView<Real>&, int tet, const Real place[3], Real weight[4]);
   void find_walls(int lane, const LaneView<Real>&, int body);
   void share_sample(int body, int sample, SurfaceTouch<Real>&);

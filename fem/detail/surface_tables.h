@@ -67,6 +67,7 @@ struct SurfaceTables {
   std::vector<int> first_sample;  // (tets + 1) of the world's tets
   std::vector<Core> cores;        // (tets)
   std::vector<Body> bodies;
+  Real core_reach;  // metres: so far do cores reach over what can be inside
   Real wall_slack;  // metres: what is less far beyond a wall is where rounding put it
   // [body a × bodies + body b] metres: surfaces that near are in contact. On the diagonal: a body with
   // itself.

@@ -222,6 +222,54 @@ TEST(SurfaceContacts, PhongSurfacesTouchWhereTheyAre) {
   }
 }
 
+// Beside a plate that is folded by 70°, a ball is touched only where the plate is: tets that fold away from
+// one another do not reach through the air between them.
+TEST(SurfaceContacts, FoldsTouchNothingInTheAir) {
+  constexpr double offset = 0.005, spacing = 0.01, angle = 70 * M_PI / 180;
+  WorldSpec spec;
+  const auto plate_surface = rounded_box_surface({{0, 0, 0}, {2, 0.6, 0.3}}, 0.02);
+  BodySpec plate{
+      "plate", testing::leaning_grid({0, 0, 0}, {2, 0.6, 0.3}, 4, 2, 2), {}, {}, BodyKind::deformable};
+  plate.shape = shape_of(plate.cage, plate_surface, 0.01, 0.03);
+  BodySpec ball{"ball", cube({1, 0.3, 0.7}, 0.6, 3), {}, {}, BodyKind::deformable};
+  ball.shape = shape_of(ball.cage, ball_surface({1, 0.3, 0.7}, 0.2), 0.02, 0.015);
+  spec.bodies = {ball, plate};
+  spec.bounds_m = {Vec3::Constant(-20), Vec3::Constant(20)};
+  spec.walls = false;
+  spec.contact_offset_m = offset;
+  const World world = build_world(spec);
+  const SurfaceSamples dense = shape_of(plate.cage, plate_surface, 0.1, spacing)->samples;
+  int touched = 0;
+  for (const double across : {-0.15, -0.1, -0.05, 0.0, 0.05})
+    for (const double above : {0.19, 0.2, 0.205, 0.22, 0.24}) {
+      SCOPED_TRACE(fmt::format("{} across, {} above", across, above));
+      Lane lane(world);
+      lane.move(1, [&](const Vec3f& p) {  // downwards beyond the middle, about its upper edge
+        if (p.x() <= 1.01f) return p;
+        const float s = float(std::sin(angle)), c = float(std::cos(angle)), x = p.x() - 1, z = p.z() - 0.3f;
+        return Vec3f(1 + c * x + s * z, p.y(), 0.3f - s * x + c * z);
+      });
+      lane.move(0, [&](const Vec3f& p) { return Vec3f(p + Vec3f(float(across), 0, float(above) - 0.4f)); });
+      std::vector<Vec3> places;
+      for (Eigen::Index k = 0; k < dense.positions_m.rows(); ++k) {
+        const auto& tet =
+            world.topology.tets[std::size_t(world.bodies[1].first_tet + dense.tet_from_sample[k])];
+        Vec3 place = Vec3::Zero();
+        for (int i = 0; i < 4; ++i) place += dense.weights(k, i) * lane.node(tet.node[i]);
+        places.push_back(place);
+      }
+      for (const auto& touch : touches_of(lane)) {
+        if (touch.body != 0) continue;
+        ++touched;
+        const Vec3 place = Eigen::Map<const Vec3f>(touch.place).cast<double>();
+        double nearest = 1;
+        for (const Vec3& p : places) nearest = std::min(nearest, (p - place).norm());
+        EXPECT_LT(nearest, touch.depth + 2 * offset + spacing);
+      }
+    }
+  EXPECT_GT(touched, 20);
+}
+
 // A cube pressed onto the floor by gravity sinks by g h²/β at most, whatever the number of its samples: they
 // share the stiffness.
 TEST(SurfaceContacts, TheNumberOfSamplesDoesNotChangeTheStiffness) {
