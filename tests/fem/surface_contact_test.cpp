@@ -91,6 +91,62 @@ TEST_P(SurfaceContact, DepthIsThatOfTheSurfacesThroughAffineMaps) {
     }
 }
 
+// A small ball is pressed into an ellipsoid, a ball that is drawn out and sheared, from twelve sides. Depths
+// of its samples are those below the tangent plane at the nearest of many places of the ellipsoid.
+TEST_P(SurfaceContact, DepthsInAnEllipsoidAreThoseOfBruteForce) {
+  constexpr double radius = 0.4, small_radius = 0.12, offset = 1e-4;
+  const Vec3 beside(0.65, 0, 0);
+  WorldSpec spec;
+  BodySpec big{"big", cube({0, 0, 0}, 1, 4), {}, {}, BodyKind::deformable};
+  big.shape = shape_of(big.cage, ball_surface({0, 0, 0}, radius), 1.0 / 64, 0.02), big.phong = GetParam();
+  BodySpec small{"small", cube(beside, 0.28, 2), {}, {}, BodyKind::deformable};
+  small.shape = shape_of(small.cage, ball_surface(beside, small_radius), 0.01, 0.008),
+  small.phong = GetParam();
+  spec.bodies = {big, small};
+  spec.bounds_m = {Vec3::Constant(-20), Vec3::Constant(20)};
+  spec.walls = false;
+  spec.contact_offset_m = offset;
+  const World world = build_world(spec);
+  std::vector<Vec3> directions;
+  for (int i = 0; i < 20000; ++i) {
+    const double z = 1 - (2 * i + 1.0) / 20000, turn = i * 2.399963229728653, r = std::sqrt(1 - z * z);
+    directions.emplace_back(r * std::cos(turn), r * std::sin(turn), z);
+  }
+  for (const double stretch : {0.55, 0.75, 1.0, 1.5}) {
+    Eigen::Matrix3d map = Vec3(stretch, 1 / std::sqrt(stretch), 1 / std::sqrt(stretch)).asDiagonal();
+    map(1, 0) = 0.1;
+    const Eigen::Matrix3d normal_map = map.inverse().transpose();
+    std::vector<double> errors;
+    Rng rng(3, 0);
+    for (int k = 0; k < 12; ++k) {
+      const Vec3 direction = rng.direction(), normal = (normal_map * direction).normalized();
+      const Vec3 moved = map * (radius * direction) + (small_radius - 0.007 - 0.0015 * k) * normal - beside;
+      Lane lane(world);
+      lane.move(0, [&](const Vec3f& p) { return Vec3f(map.cast<float>() * p); });
+      lane.move(1, [&](const Vec3f& p) { return Vec3f(p + moved.cast<float>()); });
+      for (const auto& touch : touches_of(lane)) {
+        if (touch.body != 1) continue;
+        const Vec3 place = Eigen::Map<const Vec3f>(touch.place).cast<double>();
+        std::size_t nearest = 0;
+        double least = 1;
+        for (std::size_t i = 0; i < directions.size(); ++i)
+          if (const double d = (map * (radius * directions[i]) - place).squaredNorm(); d < least)
+            least = d, nearest = i;
+        const Vec3& n = directions[nearest];
+        const double depth = (map * (radius * n) - place).dot((normal_map * n).normalized());
+        if (depth > 0.002) errors.push_back(std::abs(double(touch.depth) - offset - depth) / depth);
+      }
+    }
+    std::sort(errors.begin(), errors.end());
+    SCOPED_TRACE(fmt::format("stretch {}: {} samples, median {:.1f} %, 90 in 100 below {:.1f} %", stretch,
+                             errors.size(), 100 * errors[errors.size() / 2],
+                             100 * errors[errors.size() * 9 / 10]));
+    ASSERT_GT(errors.size(), 500U);
+    EXPECT_LT(errors[errors.size() / 2], 0.025);
+    EXPECT_LT(errors[errors.size() * 9 / 10], 0.1);
+  }
+}
+
 TEST_P(SurfaceContact, ForcesKeepMomentumAndAngularMomentum) {
   const World world = build_world(two_balls(0.03, 0.2, GetParam()));
   Lane lane(world);
