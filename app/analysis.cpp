@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/progress.h"
 #include "core/threads.h"
 #include "render/plot.h"
 #include "render/png_file.h"
@@ -55,6 +56,7 @@ MotionFigures measure_motion(const fem::World& world, const plan::Trajectory& pa
   MotionFigures figures;
   figures.frames.resize(path.frames.size());
   parallel_for(int(path.frames.size()), [&](int f) {
+    if (nothing_to_keep()) throw_if_stopped();
     figures.frames[std::size_t(f)] = measure_frame(world, path.frames[std::size_t(f)]);
   });
 

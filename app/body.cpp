@@ -102,6 +102,7 @@ const Json& example_of_report() {
 void require_report(const Json& report, const fs::path& file) {
   constexpr const char* remedy = "limber did not write that";
   require_like(report, example_of_report(), Keys::all, file.string(), remedy);
+  require_like(report, {{"shells", {{"vertices_uncovered", -1}}}}, Keys::those_there, file.string(), remedy);
   for (const auto& [stage, any] : report.at("cpu_seconds").items())
     require_like(report, {{"cpu_seconds", {{stage, 0.5}}}}, Keys::all, file.string(), remedy);
 }

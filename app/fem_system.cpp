@@ -45,6 +45,9 @@ std::uint64_t hash_of(const fem::World& world) {
 
 }  // namespace
 
+// A hundredth of a second to some tenths, in the largest worlds.
+constexpr std::int64_t steps_between_questions = 8;
+
 class FemSystem::Propagator final : public plan::Propagator {
  public:
   explicit Propagator(const FemSystem& system) : system_(system) {}
@@ -97,9 +100,12 @@ class FemSystem::Propagator final : public plan::Propagator {
         if (in_lane[lane]) {
           shown[lane] = supply.next_shown(now(lane));
           steps = std::min({steps, look_every - taken(batch, *in_lane[lane], lane) % std::int64_t(look_every),
-                            shown[lane] - now(lane)});
+                            shown[lane] - now(lane), std::int64_t(batch.steps_left(int(lane)))});
         }
-      batch.advance(int(steps));
+      for (std::int64_t done = 0; done < steps;) {
+        done += batch.advance(int(std::min(steps - done, steps_between_questions)));
+        if (!supply.wanted()) return give_back(batch, in_lane, supply);
+      }
       for (std::size_t lane = 0; lane < in_lane.size(); ++lane) {
         if (!in_lane[lane]) continue;
         plan::Rollout& rollout = *in_lane[lane];
@@ -121,6 +127,15 @@ class FemSystem::Propagator final : public plan::Propagator {
         if (!in_lane[lane] && (in_lane[lane] = supply.next())) load(lane);
         any = any || in_lane[lane];
       }
+    }
+  }
+
+  static void give_back(fem::Batch& batch, const std::vector<plan::Rollout*>& in_lane, plan::Supply& supply) {
+    for (std::size_t lane = 0; lane < in_lane.size(); ++lane) {
+      if (!in_lane[lane]) continue;
+      batch.stop(int(lane));
+      in_lane[lane]->ok = false;
+      supply.done(*in_lane[lane]);
     }
   }
 

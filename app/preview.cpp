@@ -243,8 +243,11 @@ Vec3 shell_color(std::size_t i) {
   return color;
 }
 
-void write_previews(const PreparedBody& body, const std::vector<ConvexShell>& shells,
-                    const fs::path& folder) {
+void write_previews(PreparedBody body, std::vector<ConvexShell> shells, const fs::path& folder) {
+  // What is drawn is drawn in float32, which far from the origin is too coarse.
+  const Eigen::RowVector3d middle = bounding_box(body.surface.positions).center().transpose();
+  body.surface.positions.rowwise() -= middle, body.cage.positions.rowwise() -= middle;
+  for (ConvexShell& shell : shells) shell.vertices.rowwise() -= middle;
   Progress progress("preview", std::size(preview_files));
   for (std::size_t i = 0; i < std::size(preview_files); ++i) {
     throw_if_stopped();

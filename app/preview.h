@@ -15,7 +15,7 @@ inline constexpr const char* preview_files[] = {"preview-shells.png", "preview-c
 // sRGB, 0 … 1: the colour in which preview-shells.png and preview-cage.png show shell i.
 Vec3 shell_color(std::size_t i);
 
-// Writes preview_files into the folder.
-void write_previews(const PreparedBody&, const std::vector<ConvexShell>&, const fs::path& folder);
+// Writes preview_files into the folder; they do not show where the model lies.
+void write_previews(PreparedBody, std::vector<ConvexShell>, const fs::path& folder);
 
 }  // namespace limber::app

@@ -104,10 +104,7 @@ std::vector<Fate> replay(const plan::Plan& plan, const plan::Reference& referenc
     course.controls = with_other_forces(controls, options, Rng(options.seed, std::uint64_t(i)));
   }
   plan::run(system, plan.settings, courses,
-            {.settle = plan::CourseOptions::anywhere,
-             .keep_frames = true,
-             .ask_acceptable = false,
-             .stoppable = true});
+            {.settle = plan::CourseOptions::anywhere, .keep_frames = true, .ask_acceptable = false});
   const std::vector<int> before_legs = plan::controls_before_legs(plan);
   std::vector<Fate> fates;
   for (plan::Course& course : courses) {
@@ -145,6 +142,7 @@ Json json_of(const Fate& f) {
 }  // namespace
 
 Outcome robust(const RobustOptions& options) {
+  const NothingToKeep nothing_to_keep;
   const PlanFolder planned = read_plan_folder(options.folder);
   if (!planned.plan.solved())
     throw InputError(

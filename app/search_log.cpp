@@ -29,7 +29,7 @@ SearchLog::SearchLog(fs::path path, std::int64_t keep_up_to) : path_(std::move(p
     const Json json = parse_json(line, path_.string());
     if (!json.is_object() || !json.contains("iteration") || !json.at("iteration").is_number())
       throw InputError(fmt::format("{}: is not a file of --stats; name another", path_.string()));
-    if (json.at("iteration").get<std::int64_t>() <= keep_up_to) lines_ += line + "\n";
+    if (json.at("iteration").get<double>() <= double(keep_up_to)) lines_ += line + "\n";
   }
   write_file(path_, lines_);  // a place that cannot be written is told before the search
 }

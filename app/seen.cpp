@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "app/motion_files.h"
+#include "core/progress.h"
 #include "core/threads.h"
 #include "fem/observe.h"
 #include "meshing/surface_overlap.h"
@@ -124,13 +125,16 @@ std::vector<SeenFrame> measure_seen(const fem::World& world, const std::vector<P
                                     const std::vector<State>& frames) {
   const Surfaces surfaces(world, bodies);
   std::vector<Pressing> pressing(frames.size());
-  parallel_for(int(frames.size()),
-               [&](int f) { pressing[std::size_t(f)] = pressing_in(world, frames[std::size_t(f)]); });
+  parallel_for(int(frames.size()), [&](int f) {
+    if (nothing_to_keep()) throw_if_stopped();
+    pressing[std::size_t(f)] = pressing_in(world, frames[std::size_t(f)]);
+  });
   double largest_n = 0;
   for (const Pressing& of_frame : pressing)
     for (const auto& [side, press] : of_frame) largest_n = std::max(largest_n, press.force_n);
   std::vector<SeenFrame> seen(frames.size());
   parallel_for(int(frames.size()), [&](int f) {
+    if (nothing_to_keep()) throw_if_stopped();
     const std::size_t i = std::size_t(f);
     seen[i] = surfaces.measure(frames[i], pressing[i], pressing_share * largest_n);
   });

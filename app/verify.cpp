@@ -6,6 +6,7 @@
 #include "app/verify_body.h"
 #include "app/verify_plan.h"
 #include "core/error.h"
+#include "core/progress.h"
 
 namespace limber::app {
 
@@ -38,6 +39,7 @@ Outcome outcome_of(const Promises& table, const Json& motion) {
 Outcome verify_plan(const fs::path& folder, const PlanFolder& planned,
                     const std::vector<PreparedBody>& bodies, const fem::World& world,
                     MotionFigures& figures) {
+  const NothingToKeep nothing_to_keep;
   Promises table;
   for (std::size_t b = 0; b < bodies.size(); ++b) {
     const scenes::BodySpec& body = planned.scene.bodies[b];

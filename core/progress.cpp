@@ -19,6 +19,7 @@ namespace {
 
 bool enabled = true;
 std::atomic<int> arrived_signal{0};
+std::atomic<int> with_nothing_to_keep{0};
 
 double seconds_now() {
   return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
@@ -88,6 +89,10 @@ void request_stop(int number) { arrived_signal = number; }
 void throw_if_stopped() {
   if (const int number = stop_signal()) throw Interrupted(number);
 }
+
+NothingToKeep::NothingToKeep() { ++with_nothing_to_keep; }
+NothingToKeep::~NothingToKeep() { --with_nothing_to_keep; }
+bool nothing_to_keep() { return with_nothing_to_keep > 0; }
 
 double cpu_seconds() {
   rusage usage{}, children{};

@@ -27,6 +27,16 @@ int stop_signal();        // 0, or the number of the signal that arrived
 void request_stop(int);   // for tests
 void throw_if_stopped();  // throws Interrupted
 
+// While one lives, a stop signal ends by Interrupted what would else be finished first, to be kept.
+class NothingToKeep {
+ public:
+  NothingToKeep();
+  ~NothingToKeep();
+  NothingToKeep(const NothingToKeep&) = delete;
+  NothingToKeep& operator=(const NothingToKeep&) = delete;
+};
+bool nothing_to_keep();
+
 // Seconds of CPU time used by this process and by those it has waited for, and its own peak memory.
 double cpu_seconds();
 double peak_memory_mb();

@@ -5,6 +5,7 @@
 #include "core/error.h"
 #include "core/hash.h"
 #include "core/json.h"
+#include "core/json_shape.h"
 #include "core/npz.h"
 
 namespace limber::ffd {
@@ -42,9 +43,17 @@ void write_binding(const fs::path& path, const Binding& binding, const SurfaceMe
 Binding read_binding(const fs::path& path, const SurfaceMesh& surface, const TetMesh& cage) {
   const Npz file = read_npz(path);
   const Json meta = parse_json(file.text("meta.json"), path.string() + ": meta.json");
+  const Eigen::Index vertices = surface.positions.rows();
   Binding binding;
   try {
     require(meta.at("format") == "limber binding 1", path, "it is not of this version's format");
+    require_like(meta,
+                 {{"surface_hash", ""},
+                  {"cage_hash", ""},
+                  {"outside", -1},
+                  {"farthest_outside_vertex", -1},
+                  {"max_outside_distance_m", 0.5}},
+                 Keys::all, path.string() + ": meta.json", "renew it with `limber prepare`");
     require_hash(meta, "surface", hash_of(surface), path);
     require_hash(meta, "cage", hash_of(cage), path);
     meta.at("outside").get_to(binding.outside);
@@ -53,8 +62,13 @@ Binding read_binding(const fs::path& path, const SurfaceMesh& surface, const Tet
   } catch (const Json::exception& trouble) {
     require(false, path, std::string("meta.json: ") + trouble.what());
   }
+  require(binding.outside >= 0 && binding.outside <= vertices, path,
+          fmt::format("{} vertices outside are none or more than there are", binding.outside));
+  require(binding.farthest_outside_vertex >= -1 && binding.farthest_outside_vertex < vertices, path,
+          fmt::format("farthest_outside_vertex is {}, which is none", binding.farthest_outside_vertex));
+  require(std::isfinite(binding.max_outside_distance_m) && binding.max_outside_distance_m >= 0, path,
+          fmt::format("max_outside_distance_m is {}", binding.max_outside_distance_m));
   const NpyArray &tets = file.array("tet_from_vertex"), &weights = file.array("weights");
-  const Eigen::Index vertices = surface.positions.rows();
   require(tets.shape == std::vector<std::int64_t>{vertices}, path,
           "tet_from_vertex has another length than the surface");
   require(weights.shape == std::vector<std::int64_t>{vertices, 4}, path,

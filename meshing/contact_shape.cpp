@@ -167,7 +167,8 @@ class LeastWeights {
       };
       from[axis] = cell(box.lower[axis]), to[axis] = cell(box.upper[axis]);
     }
-    for (int k = from[2]; k <= to[2]; ++k)
+    for (int k = from[2]; k <= to[2]; ++k) {
+      throw_if_stopped();
       for (int j = from[1]; j <= to[1]; ++j)
         for (int i = from[0]; i <= to[0]; ++i) {
           const std::size_t row = std::size_t(field.nodes[0]), slice = row * std::size_t(field.nodes[1]);
@@ -177,6 +178,7 @@ class LeastWeights {
                  double(at[slice + 1]), double(at[slice + row]), double(at[slice + row + 1])},
                 2);
         }
+    }
   }
   Weights4 bound() const { return least_; }
 

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "core/error.h"
+#include "core/progress.h"
 #include "meshing/detail/orientation.h"
 
 namespace limber::meshing {
@@ -54,6 +55,7 @@ std::vector<Face> hull_faces(const std::vector<Vec3>& points) {
   std::vector<Face> kept;
   std::vector<std::array<int, 2>> sides;
   for (int p : order) {
+    throw_if_stopped();
     kept.clear(), sides.clear();
     for (const Face& f : faces) {
       if (detail::orientation(at(f[0]), at(f[1]), at(f[2]), at(p)) <= 0) {

@@ -6,7 +6,7 @@
 namespace limber::meshing {
 
 // Only extreme points become vertices, in the order of their rows. Flat faces are triangulated.
-// Throws InputError when the points lie in one plane.
+// Throws InputError when the points lie in one plane, Interrupted once a stop signal has come.
 ConvexShell convex_hull(const Points&);
 
 }  // namespace limber::meshing

@@ -113,6 +113,35 @@ bool triangles_meet(const Tri& a, const Tri& b) {
   return CGAL::do_intersect(triangle, Kernel::Segment_3(exact(sorted[0]), exact(sorted[2])));
 }
 
+void widen(Box& box, double by) { box.lower.array() -= by, box.upper.array() += by; }
+
+double largest_coordinate(const Box& box) {
+  return box.lower.cwiseAbs().cwiseMax(box.upper.cwiseAbs()).maxCoeff();
+}
+
+template <std::size_t N>
+std::array<Vec3, N> along(const detail::Axes& axes, std::array<Vec3, N> corners) {
+  for (Vec3& p : corners) p = axes.along(p);
+  return corners;
+}
+
+// Of corners along the axes.
+template <std::size_t N>
+Box box_of(const std::array<Vec3, N>& corners, const detail::Axes& axes) {
+  Box box = box_of(corners);
+  widen(box, axes.rounding(largest_coordinate(box)));
+  return box;
+}
+
+std::vector<detail::TrianglePiece> pieces_along(const detail::Axes& axes, const Points& positions,
+                                                const Triangles& triangles) {
+  const Points turned = axes.along(positions);
+  std::vector<detail::TrianglePiece> pieces = detail::pieces_of(turned, triangles);
+  const double rounding = axes.rounding(largest_coordinate(bounding_box(turned)));
+  for (detail::TrianglePiece& piece : pieces) widen(piece.box, rounding);
+  return pieces;
+}
+
 std::vector<Box> boxes_of(const std::vector<detail::TrianglePiece>& pieces) {
   std::vector<Box> boxes;
   for (const detail::TrianglePiece& piece : pieces) boxes.push_back(piece.box);
@@ -123,15 +152,18 @@ Tri corners(const Points& positions, const Triangles& triangles, int f) {
   return {positions.row(triangles(f, 0)), positions.row(triangles(f, 1)), positions.row(triangles(f, 2))};
 }
 
-// Rejects boxes that lie beyond one of the tet's faces; a rounding margin keeps it from rejecting too much.
+// Rejects boxes along the axes that lie beyond one of the tet's faces; a rounding margin keeps it from
+// rejecting too much.
 struct TetRejects {
   Box box;
   std::array<Vec3, 4> normal;      // outwards
   std::array<double, 4> farthest;  // n·x of the face, plus the margin
 
-  explicit TetRejects(const Tet& t) : box(box_of(t)) {
+  TetRejects(const detail::Axes& axes, const Tet& tet) {
+    const Tet t = along(axes, tet);
+    box = box_of(t, axes);
     static constexpr int face[4][3] = {{1, 3, 2}, {0, 2, 3}, {0, 3, 1}, {0, 1, 2}};
-    const double size = box.lower.cwiseAbs().cwiseMax(box.upper.cwiseAbs()).maxCoeff();
+    const double size = largest_coordinate(box);
     for (int i = 0; i < 4; ++i) {
       const Vec3& a = t[face[i][0]];
       Vec3 n = (t[face[i][1]] - a).cross(t[face[i][2]] - a);
@@ -194,13 +226,14 @@ bool tet_holds(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& d, const
 SurfaceTree::SurfaceTree(const Points& positions, const Triangles& triangles)
     : positions_(positions),
       triangles_(triangles),
-      pieces_(detail::pieces_of(positions, triangles)),
+      axes_(positions, triangles),
+      pieces_(pieces_along(axes_, positions, triangles)),
       tree_(boxes_of(pieces_)) {}
 
 bool SurfaceTree::meets_triangle(const Vec3& a, const Vec3& b, const Vec3& c) const {
   throw_if_stopped();
   const Tri query{a, b, c};
-  const Box box = box_of(query);
+  const Box box = box_of(along(axes_, query), axes_);
   return tree_.any([&](const Box& other) { return disjoint(box, other); },
                    [&](int p) {
                      return !disjoint(box, pieces_[p].box) &&
@@ -211,7 +244,7 @@ bool SurfaceTree::meets_triangle(const Vec3& a, const Vec3& b, const Vec3& c) co
 bool SurfaceTree::meets_tet(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& d) const {
   throw_if_stopped();
   const Tet query{a, b, c, d};
-  const TetRejects rejects(query);
+  const TetRejects rejects(axes_, query);
   const auto meets = [&](int f) { return !proved_disjoint(query, corners(positions_, triangles_, f)); };
   if (pieces_.size() == std::size_t(triangles_.rows()))
     return tree_.any(rejects, [&](int f) { return !rejects(pieces_[f].box) && meets(f); });
@@ -226,7 +259,7 @@ std::vector<int> SurfaceTree::triangles_meeting_tet(const Vec3& a, const Vec3& b
                                                     const Vec3& d) const {
   throw_if_stopped();
   const Tet query{a, b, c, d};
-  const TetRejects rejects(query);
+  const TetRejects rejects(axes_, query);
   Asked asked;
   std::vector<int> found;
   tree_.any(rejects, [&](int p) {
@@ -251,7 +284,7 @@ std::optional<Vec3> SurfaceTree::closest_point_within(const Vec3& p, double dist
     if (squared != best_squared) return squared < best_squared;
     return !best || std::lexicographical_compare(q.begin(), q.end(), best->begin(), best->end());
   };
-  tree_.nearest(p, best_squared, [&](int piece) {
+  tree_.nearest(axes_.along(p), best_squared, [&](int piece) {
     const Vec3 q = closest_on_triangle(corners(positions_, triangles_, pieces_[piece].triangle), p);
     const double squared = (q - p).squaredNorm();
     if (wins(q, squared)) best_squared = squared, best = q;
@@ -261,10 +294,11 @@ std::optional<Vec3> SurfaceTree::closest_point_within(const Vec3& p, double dist
 }
 
 double SurfaceTree::free_share(const Vec3& p, const Vec3& q) const {
-  const Vec3 way = q - p, inverse = way.cwiseInverse();
+  const Vec3 way = q - p, from = axes_.along(p), inverse = axes_.along(way).cwiseInverse();
   double free = 1;
   const auto rejects = [&](const Box& box) {
-    const Eigen::Array3d a = (box.lower - p).cwiseProduct(inverse), b = (box.upper - p).cwiseProduct(inverse);
+    const Eigen::Array3d a = (box.lower - from).cwiseProduct(inverse),
+                         b = (box.upper - from).cwiseProduct(inverse);
     return !(a.min(b).maxCoeff() <= std::min(a.max(b).minCoeff(), free)) || a.max(b).minCoeff() < 0;
   };
   tree_.any(rejects, [&](int piece) {

@@ -35,13 +35,13 @@ class SurfaceTree {
   // Share of the way from p to q at which the soup is first met, 1 where it is not; to rounding, unlike the
   // others.
   double free_share(const Vec3& p, const Vec3& q) const;
-  const std::vector<detail::TrianglePiece>& pieces() const { return pieces_; }
 
  private:
   Points positions_;
   Triangles triangles_;
-  std::vector<detail::TrianglePiece> pieces_;
-  detail::BoxTree tree_;  // of the pieces
+  detail::Axes axes_;
+  std::vector<detail::TrianglePiece> pieces_;  // along the axes
+  detail::BoxTree tree_;                       // of the pieces
 };
 
 }  // namespace limber::meshing

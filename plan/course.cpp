@@ -1,6 +1,7 @@
 #include "plan/course.h"
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 
 #include "core/error.h"
@@ -15,7 +16,9 @@ namespace {
 
 constexpr double settle_check_s = 0.05;  // rest is looked for this often
 
-constexpr int most_steps_between_signals = 1000;
+// Who can be stopped runs pieces of about so long, of so many steps at most.
+constexpr double least_piece_s = 0.05, most_piece_s = 0.1;
+constexpr int first_piece = 16, most_steps_a_piece = 1000;
 
 constexpr std::pair<const char*, CostKind> cost_kinds[] = {{"duration", CostKind::duration},
                                                            {"effort", CostKind::effort},
@@ -45,12 +48,11 @@ class Runner {
   double cost() const { return cost_in(course_.costs, options_.cost); }
   bool rests_in_goal() const { return ended() && course_.result == Course::rests_in_goal; }
 
-  void next(Rollout& rollout) const {
+  void next(Rollout& rollout, int most_steps) const {
     rollout.from = &state_;
     rollout.control = control_;
-    rollout.control.steps = int(std::min<std::int64_t>(steps_left_, step_of_next_frame() - state_.step));
-    if (options_.stoppable)
-      rollout.control.steps = std::min(rollout.control.steps, most_steps_between_signals);
+    rollout.control.steps =
+        int(std::min<std::int64_t>({steps_left_, step_of_next_frame() - state_.step, most_steps}));
   }
 
   void take(Rollout& rollout) {
@@ -167,8 +169,10 @@ void run_batch(const System& system, const Settings& settings, std::span<Course>
   std::vector<Runner*> going;
   std::vector<Rollout> rollouts;
   double cheapest = std::numeric_limits<double>::infinity();  // in the race so far
+  const bool stoppable = options.stoppable || nothing_to_keep();
+  int most_steps = stoppable ? first_piece : std::numeric_limits<int>::max();
   while (true) {
-    if (options.stoppable) throw_if_stopped();
+    if (stoppable) throw_if_stopped();
     for (const Runner& runner : runners)
       if (options.race && runner.rests_in_goal()) cheapest = std::min(cheapest, runner.cost());
     going.clear();
@@ -178,8 +182,12 @@ void run_batch(const System& system, const Settings& settings, std::span<Course>
     }
     if (going.empty()) return;
     rollouts.resize(going.size());
-    for (std::size_t i = 0; i < going.size(); ++i) going[i]->next(rollouts[i]);
+    for (std::size_t i = 0; i < going.size(); ++i) going[i]->next(rollouts[i], most_steps);
+    const auto began = std::chrono::steady_clock::now();
     propagator->propagate(rollouts);
+    const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count();
+    if (stoppable && seconds < least_piece_s) most_steps = std::min(2 * most_steps, most_steps_a_piece);
+    if (stoppable && seconds > most_piece_s) most_steps = std::max(1, most_steps / 2);
     for (std::size_t i = 0; i < going.size(); ++i) going[i]->take(rollouts[i]);
   }
 }

@@ -51,8 +51,9 @@ struct CourseOptions {
   CostKind cost = CostKind::duration;
   double most = std::numeric_limits<double>::infinity();
   bool race = false;
-  bool stoppable =
-      false;  // throws Interrupted soon after a stop signal; else whoever calls has something to keep
+  // Throws Interrupted soon after a stop signal, as where there is nothing_to_keep(); else whoever calls has
+  // something to keep.
+  bool stoppable = false;
 };
 
 // Fills what is out. A course depends on itself and the options alone, save that `race` ends losers sooner or

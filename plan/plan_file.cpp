@@ -238,7 +238,7 @@ class Reader {
     const std::vector<int> path = path_to(plan.tree, plan.best_node);
     std::vector<Leg> legs;
     for (const Json& leg : list) {
-      legs.push_back({whole(leg, "root"), leg.at("first_iteration").get<std::int64_t>()});
+      legs.push_back({whole(leg, "root"), whole(leg, "first_iteration")});
       const Leg before = legs.size() == 1 ? Leg{} : legs[legs.size() - 2], now = legs.back();
       require(std::count(path.begin(), path.end(), now.root) == 1 && now.root >= before.root &&
                   now.first_iteration >= before.first_iteration &&

@@ -141,6 +141,13 @@ class Search {
       --taken_;
       search_.give_back(static_cast<Expansion&>(rollout), std::move(outcome));
     }
+    bool wanted() override {
+      if (stop_signal() != 0) {
+        const std::lock_guard lock(search_.mutex_);
+        search_.look_at_limits();
+      }
+      return !search_.ended_;
+    }
     bool took_any() { return std::exchange(took_any_, false); }
 
    private:

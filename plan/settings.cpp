@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "core/error.h"
+#include "core/json_shape.h"
 
 namespace limber::plan {
 
@@ -167,6 +168,14 @@ Json json_of(const Settings& s) {
 }
 
 Settings settings_from_json(const Json& json, const std::string& what) try {
+  Json example = json_of(Settings{});
+  example.erase("time_limit_s");                       // a number or null
+  example["in_flight"] = example["laws"]["lag"] = -1;  // of 32 bits
+  example.erase("seed");                               // of 64 bits
+  constexpr const char* remedy = "plan anew with limber plan";
+  require_like(json, example, Keys::those_there, what + ": planner settings", remedy);
+  if (!json.at("seed").is_number_integer())
+    throw InputError(fmt::format("{}: planner settings: seed is no whole number; {}", what, remedy));
   Settings s;
   json.at("seed").get_to(s.seed);
   json.at("max_iterations").get_to(s.max_iterations);

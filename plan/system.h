@@ -42,6 +42,8 @@ class Supply {
   virtual std::int64_t next_shown(std::int64_t) const { return std::numeric_limits<std::int64_t>::max(); }
   virtual bool goes_on(const Rollout&, const State&) { return true; }
   virtual void done(Rollout&) = 0;
+  // Asked every few steps; once it is false all that is under way is to be given back, as diverged.
+  virtual bool wanted() { return true; }
 };
 
 // Scratch memory of one thread; its System must outlive it.

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/progress.h"
 #include "meshing/detail/nearest_on_triangle.h"
 #include "meshing/detail/surface_spots.h"
 
@@ -31,6 +32,7 @@ class Filler {
     const double reach = near_cells * cell_;
     clear_.assign(distance_.size(), float(reach));
     for (int n = 0; n < int(pieces_.size()); ++n) {
+      throw_if_stopped();
       const auto& [a, b, c] = pieces_[std::size_t(n)].corners;
       const bool seen = pieces_[std::size_t(n)].seen;
       Vec3 normal = (b - a).cross(c - a);
@@ -67,7 +69,8 @@ class Filler {
   void measure_far() {
     for (int way = 0; way < 8; ++way) {
       const auto order = [&](int axis, int i) { return way >> axis & 1 ? nodes_[axis] - 1 - i : i; };
-      for (int k = 0; k < nodes_[2]; ++k)
+      for (int k = 0; k < nodes_[2]; ++k) {
+        throw_if_stopped();
         for (int j = 0; j < nodes_[1]; ++j)
           for (int i = 0; i < nodes_[0]; ++i) {
             const std::array<int, 3> at{order(0, i), order(1, j), order(2, k)};
@@ -85,6 +88,7 @@ class Filler {
               if (distance < distance_[node]) distance_[node] = distance, nearest_[node] = piece;
             }
           }
+      }
     }
   }
 
@@ -99,6 +103,7 @@ class Filler {
       std::size_t clearest = start;
       for (std::size_t head = 0; head < region.size(); ++head) {
         const std::size_t node = region[head];
+        throw_if_stopped();
         if (clear_[node] > clear_[clearest]) clearest = node;
         for_uncrossed_edges(node, [&](std::size_t other) {
           if (reached[other]) return;
@@ -122,6 +127,7 @@ class Filler {
     std::vector<std::size_t> patch;
     for (std::size_t start = 0; start < inside.size(); ++start) {
       if (inside[start] != unknown) continue;
+      throw_if_stopped();
       const auto center = indices(start);
       const double there = winding.at(position(center[0], center[1], center[2])) - 0.5;
       inside[start] = there > 0 ? yes : no;
@@ -170,13 +176,16 @@ class Filler {
     if (!(spots >= 1)) return;
     const SurfaceSpots sequence(surface);
     std::vector<Place> places(std::size_t(std::min(spots, most_spots)));
-    for (std::size_t i = 0; i < places.size(); ++i)
+    for (std::size_t i = 0; i < places.size(); ++i) {
+      throw_if_stopped();
       places[i] = place_of(sequence.at(std::uint32_t(i)).position);
+    }
     std::vector<float> weights(distance_.size());
     for (const Place& p : places)
       for (int c = 0; c < 8; ++c) weights[p.node + offset(c)] += p.weights[std::size_t(c)];
     std::vector<double> errors(distance_.size());
     for (int step = 0; step < fitting_steps; ++step) {
+      throw_if_stopped();
       std::fill(errors.begin(), errors.end(), 0);
       for (const Place& p : places) {
         double error = 0;

@@ -29,17 +29,10 @@ bool is_closed(const Triangles& triangles) {
   return closed;
 }
 
-std::vector<Tri> triangles_of(const SurfaceMesh& surface) {
-  std::vector<Tri> triangles(std::size_t(surface.triangles.rows()));
-  for (std::size_t f = 0; f < triangles.size(); ++f)
-    for (int k = 0; k < 3; ++k) triangles[f][k] = surface.positions.row(surface.triangles(int(f), k));
-  return triangles;
-}
-
-Box box_of(const std::vector<Tri>& triangles) {
+Box box_of_triangles(const SurfaceMesh& surface) {
   Box all;
-  for (const Tri& triangle : triangles)
-    for (const Vec3& p : triangle) all.include(p);
+  for (Eigen::Index i = 0; i < surface.triangles.size(); ++i)
+    all.include(Vec3(surface.positions.row(surface.triangles.data()[i])));
   return all;
 }
 
@@ -60,10 +53,13 @@ std::vector<int> cells_near(const CageModel& model, const Lattice& lattice) {
   // less than a half: so they lie within [−1, 1.5] cells of the lower corner.
   const double to_middle = 0.25, half_width = 1.25;
   std::vector<bool> near(std::size_t(lattice.cell_count()));
-  for (const TrianglePiece& piece : model.tree.pieces()) {
+  for (const TrianglePiece& piece :
+       pieces_of(model.surface.positions, model.surface.triangles, lattice.spacing)) {
     std::array<Vec3, 3> p;
     for (int k = 0; k < 3; ++k)
-      p[k] = (model.triangles[piece.triangle][k] - lattice.origin) / lattice.spacing;
+      p[k] = (model.surface.positions.row(model.surface.triangles(piece.triangle, k)).transpose() -
+              lattice.origin) /
+             lattice.spacing;
     const Box box{(piece.box.lower - lattice.origin) / lattice.spacing,
                   (piece.box.upper - lattice.origin) / lattice.spacing};
     const Vec3 n = (p[1] - p[0]).cross(p[2] - p[0]);
@@ -243,12 +239,12 @@ void mend(Grid& grid) {
 
 }  // namespace
 
-CageModel::CageModel(const SurfaceMesh& surface)
-    : triangles(triangles_of(surface)),
-      box(box_of(triangles)),
-      tree(surface.positions, surface.triangles),
-      winding(surface.positions, surface.triangles),
-      closed(is_closed(surface.triangles)) {}
+CageModel::CageModel(const SurfaceMesh& given)
+    : surface(given),
+      box(box_of_triangles(given)),
+      tree(given.positions, given.triangles),
+      winding(given.positions, given.triangles),
+      closed(is_closed(given.triangles)) {}
 
 Selection select_tets(const CageModel& model, double spacing, const Vec3& phase,
                       const std::optional<DihedralRange>& warp_within) {

@@ -13,14 +13,12 @@
 
 namespace limber::meshing::detail {
 
-using Tri = std::array<Vec3, 3>;
-
 // What a cage must hold.
 struct CageModel {
   explicit CageModel(const SurfaceMesh&);
 
-  std::vector<Tri> triangles;
-  Box box;
+  SurfaceMesh surface;
+  Box box;  // of the triangles
   SurfaceTree tree;
   WindingNumber winding;
   bool closed;  // the winding number is whole, and the same wherever one can go without meeting the surface

@@ -61,6 +61,29 @@ TEST_F(Program_slow, APlanThatIsNotPerturbedIsItself) {
   EXPECT_NE(reports[0], limber_program({"robust", out(), "-n", "6", "--seed", "2", "--json"}).json());
 }
 
+// Perturbed much and given little time to settle, some rest and some do not.
+TEST_F(Program_slow, RobustCallsAtRestWhatIsSlowAtItsEndAndNothingElse) {
+  constexpr double slow_m_s = 0.02;  // planner.settle_speed_m_s
+  const std::string hasty = scene(replaced("max_force_n = 100", "max_force_n = 100\nsettle_time_s = 0.6"));
+  ASSERT_EQ(limber_program({"plan", hasty, "-o", out()}).code, exit_done);
+  const std::vector<std::string> words{"robust", out(), "-n", "12", "--forces", "0.4", "--turn", "30"};
+  std::vector<std::string> as_json = words;
+  as_json.push_back("--json");
+  const Json json = limber_program(as_json).json();
+  int rest = 0;
+  for (const Json& replay : json.at("replays")) {
+    const bool said = replay.at("end") == "at rest in the goal";
+    rest += said;
+    EXPECT_EQ(said, replay.at("reaches").get<bool>());
+    EXPECT_TRUE(!said || replay.at("speed_m_s") < slow_m_s) << replay;
+    EXPECT_TRUE(said || replay.at("speed_m_s") >= slow_m_s || replay.at("distance_m") > 0.3) << replay;
+  }
+  EXPECT_GT(rest, 0);
+  EXPECT_LT(rest, 12);
+  EXPECT_NE(limber_program(words).out.find(fmt::format("{} of 12 come to rest in the goal", rest)),
+            std::string::npos);
+}
+
 TEST_F(Program_slow, APlanIsCarriedToFinerCages) {
   const Json coarse = limber_program({"plan", scene(), "-o", out(), "--json"}).json();
   const Json same =

@@ -10,9 +10,12 @@
 #include <numeric>
 #include <sstream>
 
+#include "app/body.h"
 #include "app/commands.h"
+#include "app/preview.h"
 #include "core/error.h"
 #include "core/json.h"
+#include "core/mesh_files.h"
 #include "core/progress.h"
 #include "render/png_file.h"
 #include "tests/app/program.h"
@@ -398,6 +401,19 @@ TEST_F(Program_slow, PreviewPaintsTheSamePicturesEachTime) {
     EXPECT_EQ(picture->width, 1600) << name;
     EXPECT_EQ(read_file(folder.path() / "one" / name), read_file(folder.path() / "two" / name)) << name;
   }
+  // Nor does it matter where the model lies: two million of its lengths from the origin, to the bit where no
+  // coordinate is rounded there.
+  const auto painted = [&](const char* name, double at) {
+    const auto moved = [&](Points& p) { p = (p * 0x1p20).array().round() * 0x1p-20 + at; };
+    PreparedBody body = read_body(folder.path() / "one");
+    std::vector<ConvexShell> shells = read_obj_shells(folder.path() / "one" / "shells.obj");
+    moved(body.surface.positions), moved(body.cage.positions);
+    for (ConvexShell& shell : shells) moved(shell.vertices);
+    make_folder(folder.path() / name);
+    write_previews(body, shells, folder.path() / name);
+    return contents(folder.path() / name);
+  };
+  EXPECT_EQ(painted("here", 0), painted("there", 0x1p21));
   ASSERT_EQ(limber_program({"prepare", model, "-o", out("one"), "--tets", "200"}).code, exit_done);
   EXPECT_FALSE(fs::exists(folder.path() / "one" / "preview-cut.png")) << "it shows the old cage";
 }

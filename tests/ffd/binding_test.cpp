@@ -10,6 +10,7 @@
 #include <sstream>
 
 #include "core/error.h"
+#include "core/json.h"
 #include "core/npz.h"
 #include "core/random.h"
 #include "ffd/binding_file.h"
@@ -566,6 +567,26 @@ TEST_F(BindingFile, RoundTrip) {
   EXPECT_EQ(back.outside, 1);
   EXPECT_EQ(back.farthest_outside_vertex, 0);
   EXPECT_EQ(back.max_outside_distance_m, binding.max_outside_distance_m);
+}
+
+TEST_F(BindingFile, FiguresThatNoBindingHasAreRefused) {
+  const Npz good = read_npz(path);
+  const auto with = [&](const char* key, const Json& value) {
+    Npz file = good;
+    Json meta = Json::parse(file.text("meta.json"));
+    meta[key] = value;
+    file.texts["meta.json"] = meta.dump();
+    write_npz(path, file);
+  };
+  for (const char* key : {"outside", "farthest_outside_vertex", "max_outside_distance_m"}) {
+    for (const Json& odd : {Json(-2), Json(0x1p33), Json(1e300), Json("1"), Json()}) {
+      if (odd.is_number() && odd > 0 && std::string(key) == "max_outside_distance_m") continue;
+      with(key, odd);
+      EXPECT_THROW(read_binding(path, surface, cage), InputError) << key << " " << odd;
+    }
+    with(key, 0);
+    EXPECT_NO_THROW(read_binding(path, surface, cage)) << key;
+  }
 }
 
 // Vega's form: the vertex, then four times a node of the cage and its weight.

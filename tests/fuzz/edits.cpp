@@ -283,7 +283,7 @@ void edit_states(plan::Tree& tree, Script& script) {
 
 void edit_once(plan::Plan& plan, Script& script) {
   plan::Trajectory& path = plan.trajectory;
-  switch (script.below(14)) {
+  switch (script.below(16)) {
     case 0: {
       Json settings = json_of(plan.settings);
       edit_once(settings, script);
@@ -338,6 +338,18 @@ void edit_once(plan::Plan& plan, Script& script) {
       if (path.frames.size() > 1)
         path.frames.erase(path.frames.begin() + script.below(int(path.frames.size())));
       if (path.controls.size() > 1 && script.below(2) == 0) path.controls.pop_back();
+      break;
+    case 13:
+      if (plan::Leg* leg = one_of(plan.legs, script)) {
+        leg->root = script.below(plan.tree.size() + 1);
+        leg->first_iteration = script.whole(leg->first_iteration);
+      }
+      break;
+    case 14:
+      if (script.below(2) == 0 && !plan.legs.empty())
+        plan.legs.pop_back();
+      else
+        plan.settings.via.push_back({plan.settings.goal, script.below(2) == 0});
       break;
     default:
       edit_states(plan.tree, script);

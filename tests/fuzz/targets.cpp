@@ -68,6 +68,34 @@ plan::Plan small_plan() {
   return made;
 }
 
+// By a box on the way to a ball, with a branch that leads nowhere, in steps of 0.1 s.
+plan::Plan plan_with_legs() {
+  const auto state = [](std::int64_t step) {
+    return State{step, {0, 0, 0.1f * float(step), 1, 2, 3}, {0, 0, 1, 0, 0, 1}};
+  };
+  plan::Plan made;
+  made.tree.add(state(0), -1, Control{}, -1, {0, 0, 0});
+  const Control push{
+      .manipulation = Manipulation::control_point, .force_n = {0, 0, 2}, .node = 1, .steps = 4};
+  const Control pull{
+      .manipulation = Manipulation::interpolation, .target_m = {0, 0, 1}, .max_force_n = 5, .steps = 6};
+  made.tree.add(state(4), 0, push, 0, {0, 0, 0.4f});
+  made.tree.add(state(8), 1, push, 2, {0, 0, 0.8f});
+  made.tree.add(state(10), 1, pull, 3, {0, 0, 1});
+  made.settings.via = {{{{0, 0, 0.4}, 1, Box{{-1, -1, 0}, {1, 1, 0.5}}}, true}};
+  made.settings.goal = {{0, 0, 1}, 0.5};
+  made.settings.frames_per_second = made.trajectory.frames_per_second = 5;
+  made.legs = {{0, 0}, {1, 1}};
+  made.goal_node = made.best_node = 3;
+  made.ending = plan::Ending::goal;
+  made.statistics.iterations = 4;
+  made.trajectory.controls = {push, pull};
+  made.trajectory.controls.back().steps += 2, made.trajectory.settle_steps = 2;
+  for (int step = 0; step <= 12; step += 2) made.trajectory.frames.push_back(state(step));
+  made.trajectory.end = state(12);
+  return made;
+}
+
 template <class Write>
 std::string written(const char* name, Write write) {
   write(folder() / name);
@@ -328,7 +356,7 @@ void use(const ContactShape& shape) {
 
 void read_changed_plan(std::string_view bytes) {
   Script script(bytes);
-  plan::Plan changed = small_plan();
+  plan::Plan changed = script.below(2) == 0 ? small_plan() : plan_with_legs();
   edit(changed, script);
   plan::write_plan(folder() / "changed.npz", changed, {});
   const plan::Plan read = plan::read_plan(folder() / "changed.npz").plan;
@@ -376,7 +404,7 @@ void read_changed_scene(std::string_view bytes) {
 }
 
 std::vector<Target> changed_targets(const std::string& binding_npz, const std::string& contact_npz,
-                                    const std::string& plan_npz) {
+                                    const std::string& plan_npz, const std::string& legs_npz) {
   return {{"binding_changed",
            [binding_npz](auto bytes) {
              read_changed(binding_npz, bytes, false,
@@ -390,8 +418,10 @@ std::vector<Target> changed_targets(const std::string& binding_npz, const std::s
            },
            {no_edit}},
           {"plan_arrays_changed",
-           [plan_npz](auto bytes) {
-             read_changed(plan_npz, bytes, true,
+           [plan_npz, legs_npz](auto bytes) {
+             Script first(bytes.substr(0, 1));
+             read_changed(first.below(2) == 0 ? plan_npz : legs_npz,
+                          bytes.substr(std::min<std::size_t>(1, bytes.size())), true,
                           [](const fs::path& p) { plan::explain(plan::read_plan(p).plan); });
            },
            {no_edit}},
@@ -429,6 +459,8 @@ std::vector<Target> made_targets() {
   const std::string plan_npz = written("plan.npz", [](const fs::path& p) {
     plan::write_plan(p, small_plan(), {{"a", 1}});
   });
+  const std::string legs_npz =
+      written("legs.npz", [](const fs::path& p) { plan::write_plan(p, plan_with_legs(), {}); });
   const std::string report = written("report.json", [](const fs::path& p) {
     write_json(p, to_json(meshing::clean(surface(), {.count_self_intersections = false})));
   });
@@ -463,13 +495,17 @@ std::vector<Target> made_targets() {
       {"contact",
        [](auto bytes) { read_contact_shape(npz_of(bytes), surface(), cage()); },
        {packed(contact_npz)}},
-      {"plan", [](auto bytes) { plan::read_plan(npz_of(bytes)); }, {packed(plan_npz)}, hostile_plans()},
+      {"plan",
+       [](auto bytes) { plan::read_plan(npz_of(bytes)); },
+       {packed(plan_npz), packed(legs_npz)},
+       hostile_plans()},
       {"json",
        [](auto bytes) { read_json(file_of(bytes, "a.json")).dump(); },
        {report},
        {nested(200000, "[", "]"), nested(200000, "{\"a\":", "}")}},
       {"scene", [](auto bytes) { read_scene(std::string(bytes)); }, {scene_seed()}, hostile_scenes()}};
-  for (Target& target : changed_targets(npz, contact_npz, plan_npz)) all.push_back(std::move(target));
+  for (Target& target : changed_targets(npz, contact_npz, plan_npz, legs_npz))
+    all.push_back(std::move(target));
   return all;
 }
 

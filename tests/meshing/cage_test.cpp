@@ -15,6 +15,7 @@
 #include "meshing/quality.h"
 #include "tests/meshing/brute_force.h"
 #include "tests/meshing/cage_models.h"
+#include "tests/meshing/made_meshes.h"
 
 namespace limber::meshing {
 namespace {
@@ -66,6 +67,19 @@ TEST(Cage_slow, SaysWhenTheLatticeCannotMeetTheBudget) {
   ASSERT_EQ(cage.notes.size(), 1u);
   EXPECT_NE(cage.notes[0].find("8000 tets were asked for"), std::string::npos) << cage.notes[0];
   EXPECT_TRUE(certify(needle, cage.mesh).holds());
+}
+
+// 396 triangles, 200 of them as long as all, some 20,000 units from the origin: exact predicates ask of no
+// coordinate how large it is, and what is asked is bounded by what is near.
+TEST(Cage, ARodOfNeedlesFarFromTheOriginIsEnclosed) {
+  SurfaceMesh rod = rod_of_needles(100, 1e-4);
+  rod.positions = (8400 * rod.positions).rowwise() + Eigen::RowVector3d(1800, 300, 500);
+  const Cage cage = cage_of(rod, 500);
+  EXPECT_NEAR(double(cage.mesh.tets.rows()), 500, 50);
+  EXPECT_TRUE(certify(rod, cage.mesh).holds());
+  const BruteEnclosure brute = brute_enclosure(rod, cage.mesh);
+  EXPECT_EQ(brute.vertices_outside, 0);
+  EXPECT_EQ(brute.triangles_crossing, 0);
 }
 
 TEST(Cage_slow, DihedralsStayWithinTheirBounds) {

@@ -2,10 +2,12 @@
 
 #include <gtest/gtest.h>
 
+#include <csignal>
 #include <map>
 #include <set>
 
 #include "core/error.h"
+#include "core/progress.h"
 #include "core/random.h"
 #include "meshing/detail/growing_hull.h"
 #include "meshing/detail/orientation.h"
@@ -118,6 +120,14 @@ TEST(ConvexHull, RoughHullsOfRowsInThinPlatesStayWhole) {
       hull.add(points);
       EXPECT_NEAR(hull.volume(), 0.2 * 14 / 15 * 0.1 * thickness, 1e-8) << seed;
     }
+}
+
+// Of a surface of 30,000 vertices a hull takes seconds.
+TEST(ConvexHull, StopsForASignal) {
+  const Points corners = Points{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+  request_stop(SIGTERM);
+  EXPECT_THROW(convex_hull(corners), Interrupted);
+  request_stop(0);
 }
 
 }  // namespace

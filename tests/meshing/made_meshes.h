@@ -100,4 +100,25 @@ inline SurfaceMesh made_torus(double tube_radius, int around, int across) {
   return mesh;
 }
 
+// A rod askew, of needles as long as itself: no question to a tree of boxes may have to ask all of them.
+inline SurfaceMesh rod_of_needles(int sides, double radius) {
+  SurfaceMesh rod{Points(2 * sides, 3), Triangles(4 * sides - 4, 3)};
+  const Vec3 along = Vec3(0.5, 1, 0.1), u = along.cross(Vec3::UnitX()).normalized(),
+             v = along.cross(u).normalized();
+  for (int i = 0; i < sides; ++i) {
+    const double turn = 2 * std::numbers::pi * i / sides;
+    const Vec3 out = radius * (std::cos(turn) * u + std::sin(turn) * v);
+    rod.positions.row(i) = (Vec3(-2.9, 1, 0.6) + out).transpose();
+    rod.positions.row(sides + i) = (Vec3(-2.9, 1, 0.6) + along + out).transpose();
+    const int next = (i + 1) % sides;
+    rod.triangles.row(2 * i) << i, next, sides + next;
+    rod.triangles.row(2 * i + 1) << i, sides + next, sides + i;
+  }
+  for (int i = 1; i + 1 < sides; ++i) {
+    rod.triangles.row(2 * sides + i - 1) << 0, i + 1, i;
+    rod.triangles.row(3 * sides + i - 3) << sides, sides + i, sides + i + 1;
+  }
+  return rod;
+}
+
 }  // namespace limber::meshing

@@ -11,6 +11,7 @@
 #include "core/progress.h"
 #include "core/random.h"
 #include "tests/meshing/cage_models.h"
+#include "tests/meshing/made_meshes.h"
 
 namespace limber::meshing {
 namespace {
@@ -171,27 +172,6 @@ TEST(SurfaceTree, AnswersDoNotDependOnTheOrderOfTheTriangles) {
   ASSERT_EQ(tree.closest_point(Vec3::Zero()), other.closest_point(Vec3::Zero()));  // many are equally near
 }
 
-// A rod askew, of needles as long as itself: no question to the tree may have to ask all of them.
-SurfaceMesh rod_of_needles(int sides, double radius) {
-  SurfaceMesh rod{Points(2 * sides, 3), Triangles(4 * sides - 4, 3)};
-  const Vec3 along = Vec3(0.5, 1, 0.1), u = along.cross(Vec3::UnitX()).normalized(),
-             v = along.cross(u).normalized();
-  for (int i = 0; i < sides; ++i) {
-    const double turn = 2 * EIGEN_PI * i / sides;
-    const Vec3 out = radius * (std::cos(turn) * u + std::sin(turn) * v);
-    rod.positions.row(i) = (Vec3(-2.9, 1, 0.6) + out).transpose();
-    rod.positions.row(sides + i) = (Vec3(-2.9, 1, 0.6) + along + out).transpose();
-    const int next = (i + 1) % sides;
-    rod.triangles.row(2 * i) << i, next, sides + next;
-    rod.triangles.row(2 * i + 1) << i, sides + next, sides + i;
-  }
-  for (int i = 1; i + 1 < sides; ++i) {
-    rod.triangles.row(2 * sides + i - 1) << 0, i + 1, i;
-    rod.triangles.row(3 * sides + i - 3) << sides, sides + i, sides + i + 1;
-  }
-  return rod;
-}
-
 TEST(TrianglePieces, CoverTheirTrianglesAndAreCloseToThem) {
   const SurfaceMesh rod = rod_of_needles(200, 1e-3);
   const auto pieces = detail::pieces_of(rod.positions, rod.triangles);
@@ -225,13 +205,61 @@ TEST(TrianglePieces, CoverTheirTrianglesAndAreCloseToThem) {
   EXPECT_EQ(detail::pieces_of(fat.positions, fat.triangles).size(), 1u);
 }
 
+SurfaceMesh two(const SurfaceMesh& a, const SurfaceMesh& b) {
+  SurfaceMesh both{Points(a.positions.rows() + b.positions.rows(), 3),
+                   Triangles(a.triangles.rows() + b.triangles.rows(), 3)};
+  both.positions << a.positions, b.positions;
+  both.triangles << a.triangles, Triangles(b.triangles.array() + int(a.positions.rows()));
+  return both;
+}
+
+TEST(Axes, LieAlongARodOfNeedlesWhichThenHaveOneBoxEach) {
+  for (const Vec3& at : {Vec3(0, 0, 0), Vec3(-2e4, 1.4e4, 6e3)}) {
+    SurfaceMesh rod = rod_of_needles(50, 1e-3);
+    rod.positions.rowwise() += at.transpose();
+    const detail::Axes axes(rod.positions, rod.triangles);
+    ASSERT_TRUE(axes.turned());
+    EXPECT_EQ(detail::pieces_of(axes.along(rod.positions), rod.triangles).size(),
+              std::size_t(rod.triangles.rows()));
+    EXPECT_GT(detail::pieces_of(rod.positions, rod.triangles).size(),
+              10u * std::size_t(rod.triangles.rows()));
+    // A turn: distances stay.
+    const Vec3 p(0.3, -1, 2), q(1, 1, -0.5);
+    EXPECT_NEAR((axes.along(p) - axes.along(q)).norm(), (p - q).norm(), 1e-14);
+  }
+}
+
+TEST(Axes, AreTheWorldsWhereNoOthersAreMuchBetter) {
+  for (const auto& [name, m] : models())
+    EXPECT_FALSE(detail::Axes(m.positions, m.triangles).turned()) << name;
+  // Two rods askew, across one another: whichever has its way, the other has needles athwart.
+  const SurfaceMesh rod = rod_of_needles(50, 1e-3);
+  SurfaceMesh other = rod;
+  other.positions.col(1) *= -1, other.positions.col(2) *= 5;
+  const SurfaceMesh both = two(rod, other);
+  EXPECT_FALSE(detail::Axes(both.positions, both.triangles).turned());
+}
+
+// Of each triangle alone: where its plane is passed, if its edges are passed on one side (as signs of
+// volumes).
+double first_met(const SurfaceMesh& m, const Vec3& p, const Vec3& q) {
+  double first = 1;
+  for (const auto row : m.triangles.rowwise()) {
+    const Vec3 a = m.positions.row(row[0]), b = m.positions.row(row[1]), c = m.positions.row(row[2]);
+    const int ab = orientation(p, q, a, b), bc = orientation(p, q, b, c), ca = orientation(p, q, c, a);
+    if (ab != bc || bc != ca || ab == 0) continue;
+    const double before = signed_volume(a, b, c, p), after = signed_volume(a, b, c, q);
+    if ((before > 0) != (after > 0)) first = std::min(first, before / (before - after));
+  }
+  return first;
+}
+
 // Meetings as clipping finds them, nearest points as of each triangle alone.
-TEST(SurfaceTree_slow, OfNeedlesAnswersAsOfEachNeedleAlone) {
-  const SurfaceMesh rod = rod_of_needles(12, 1e-3);
+void expect_answers_as_of_each_alone(const SurfaceMesh& rod, int trials) {
   const SurfaceTree tree(rod.positions, rod.triangles);
   Rng rng(6, 0);
   int met = 0;
-  for (int trial = 0; trial < 100; ++trial) {
+  for (int trial = 0; trial < trials; ++trial) {
     const Vec3 on_rod = Vec3(-2.9, 1, 0.6) + rng.uniform(-0.1, 1.1) * Vec3(0.5, 1, 0.1);
     std::array<Vec3, 4> t;
     for (Vec3& corner : t) corner = on_rod + random_point(rng, 0.05);
@@ -247,10 +275,22 @@ TEST(SurfaceTree_slow, OfNeedlesAnswersAsOfEachNeedleAlone) {
     EXPECT_EQ(tree.triangles_meeting_tet(t[0], t[1], t[2], t[3]), alone);
     EXPECT_EQ(tree.meets_tet(t[0], t[1], t[2], t[3]), !alone.empty());
     EXPECT_EQ((tree.closest_point(t[0]) - t[0]).norm(), nearest);
+    EXPECT_EQ(tree.free_share(t[0], t[1]) < 1, first_met(rod, t[0], t[1]) < 1);
+    EXPECT_NEAR(tree.free_share(t[0], t[1]), first_met(rod, t[0], t[1]), 1e-12);
     met += !alone.empty();
   }
-  EXPECT_GT(met, 20);
-  EXPECT_LT(met, 90);
+  EXPECT_GT(met, trials / 5);
+  EXPECT_LT(met, trials * 9 / 10);
+}
+
+TEST(SurfaceTree_slow, OfNeedlesAnswersAsOfEachNeedleAlone) {
+  expect_answers_as_of_each_alone(rod_of_needles(12, 1e-3), 100);
+}
+
+TEST(SurfaceTree_slow, OfNeedlesAlongTheirAxesAnswersAsOfEachNeedleAlone) {
+  const SurfaceMesh rod = rod_of_needles(50, 1e-3);
+  ASSERT_TRUE(detail::Axes(rod.positions, rod.triangles).turned());
+  expect_answers_as_of_each_alone(rod, 40);
 }
 
 // Whoever waits for an answer may be told to stop.

@@ -2,7 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <csignal>
+
 #include "core/error.h"
+#include "core/progress.h"
 #include "core/threads.h"
 #include "plan/search.h"
 #include "tests/plan/toy.h"
@@ -35,6 +38,37 @@ void expect_same(const Course& a, const Course& b) {
   EXPECT_EQ(limber::hash_of(a.end), limber::hash_of(b.end));
   EXPECT_EQ(a.settle_steps, b.settle_steps);
   EXPECT_EQ(json_of(a.costs), json_of(b.costs));
+}
+
+TEST(Course, OfWhoeverHasNothingToKeepEndsAtASignalAndIsElseTheSame) {
+  const Toy toy(5, true, true, 1.1f);
+  const Settings s = toy_settings();
+  const CourseOptions kept{.settle = CourseOptions::anywhere, .keep_frames = true, .measure = true};
+  CourseOptions stoppable = kept;
+  stoppable.stoppable = true;
+  const auto courses = [&](const CourseOptions& options) {
+    std::vector<Course> all = some_courses(toy, s, 12);
+    run(toy, s, all, options);
+    return all;
+  };
+  const std::vector<Course> whole = courses(kept);
+  const auto expect_whole = [&](const std::vector<Course>& all) {
+    for (std::size_t i = 0; i < whole.size(); ++i) expect_same(all[i], whole[i]);
+  };
+  expect_whole(courses(stoppable));
+  {
+    const NothingToKeep nothing;
+    expect_whole(courses(kept));
+  }
+  request_stop(SIGTERM);
+  EXPECT_THROW(courses(stoppable), Interrupted);
+  expect_whole(courses(kept));
+  {
+    const NothingToKeep nothing;
+    EXPECT_THROW(courses(kept), Interrupted);
+  }
+  expect_whole(courses(kept));
+  request_stop(0);
 }
 
 TEST(Course, DoesNotDependOnItsNeighboursLanesOrThreads) {

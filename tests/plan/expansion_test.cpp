@@ -196,6 +196,13 @@ TEST(Settings, SurviveJson) {
     missing.erase(key);
     EXPECT_THROW(settings_from_json(missing, "test"), InputError) << key;
   }
+  // What no whole number can hold must not be cut to one.
+  for (const char* key : {"/seed", "/max_iterations", "/in_flight", "/laws/lag"})
+    for (const Json& odd : {Json(1e300), Json(-0x1p63), Json("1")}) {
+      Json other = whole;
+      other[Json::json_pointer(key)] = odd;
+      EXPECT_THROW(settings_from_json(other, "test"), InputError) << key << " " << odd;
+    }
 }
 
 }  // namespace

@@ -39,6 +39,10 @@ class ToyPropagator final : public Propagator {
     while (true) {
       while (Rollout* r = supply.next()) begin(), running.push_back({r, *r->from});
       if (running.empty()) return;
+      if (!supply.wanted()) {
+        for (const Running& mine : running) mine.rollout->ok = false, supply.done(*mine.rollout);
+        return;
+      }
       for (std::size_t i = 0; i < running.size();) {
         Running& mine = running[i];
         Rollout& rollout = *mine.rollout;
