@@ -85,11 +85,14 @@ std::string first_visits(const std::string& way) {
 }
 
 // Only its size makes the direct window be avoided: where it is wider than the ball, the ball takes it.
+// Linearly: bodies that bend give way more, and seed 1 gets half way through the smallest one and back.
 TEST_F(Controls, TheSmallestWindowIsAvoidedAndAWideOneTaken) {
-  const scenes::Scene windows = scene_of("windows", {});
+  const std::vector<std::string> linear{"bodies.ball.deformation=linear", "bodies.walls.deformation=linear"};
+  const scenes::Scene windows = scene_of("windows", linear);
   const scenes::Scene wide =
       scene_of("windows",
-               {"bodies.walls.model.blocks.holes=[[[4, 1.1, 1.2], [4.4, 2.9, 3.4]], [[1.25, 4, 1.2], [2.75, "
+               {linear[0], linear[1],
+                "bodies.walls.model.blocks.holes=[[[4, 1.1, 1.2], [4.4, 2.9, 3.4]], [[1.25, 4, 1.2], [2.75, "
                 "4.4, 2.7]], [[4, 5.7, 0.7], [4.4, 7.1, 2.1]], [[5.75, 4, 2.1], [7.05, 4.4, 3.4]]]"});
   for (int seed = 1; seed <= 2; ++seed) {
     EXPECT_TRUE(plan_of(windows, seed, 600).solved()) << seed;

@@ -114,6 +114,7 @@ bounds_m = [[0, 0, 0], [4, 2, 2]]
 name = "robot"
 role = "robot"
 contact = "surface"
+deformation = "linear"
 model = { box = { size_m = [0.5, 0.5, 0.5], bevel_m = 0.1, triangle_m = 0.2 } }
 cage = { cells = [2, 2, 2] }
 material = { youngs_modulus_pa = 5e3, density_kg_m3 = 100 }
@@ -122,6 +123,7 @@ pose = { position_m = [0.6, 1, 1.3] }
 name = "block"
 role = "obstacle"
 contact = "surface"
+deformation = "linear"
 model = { box = { size_m = [0.4, 1, 0.5], bevel_m = 0.1, triangle_m = 0.2 } }
 cage = { cells = [2, 2, 2] }
 material = { youngs_modulus_pa = 5e3, density_kg_m3 = 100 }
@@ -130,6 +132,7 @@ pose = { position_m = [2, 1, 0.3] }
 name = "cart"
 role = "free"
 contact = "surface"
+deformation = "linear"
 model = { box = { size_m = [0.4, 0.4, 0.4], bevel_m = 0.1, triangle_m = 0.2 } }
 cage = { cells = [2, 2, 2] }
 material = { youngs_modulus_pa = 5e3, density_kg_m3 = 100 }
