@@ -30,6 +30,7 @@ namespace {
 using namespace detail;
 
 constexpr int shadow_size = Targets::shadow_size;
+constexpr double most_shadow = 0.03;  // radius of the half-shade between bodies, over the side of the map
 constexpr int ground_key_cells = 768, ground_sky_cells = 384;
 // A level patch at height h hides the share h²/(π(h²+r²)²) of the sky from a place r beside its foot. Half a
 // narrow and half a wide Gaussian (deviations in units of h) keep within 0.03 of what it sums to over a disk.
@@ -198,6 +199,8 @@ struct Renderer::Impl {
   double near_m = 1, far_m = 1;
   Mat4 clip_from_world = Mat4::Identity(), shadow_from_world = Mat4::Identity();
   double shadow_texel_m = 1;
+  Eigen::Matrix3d shadow_from_normal = Eigen::Matrix3d::Identity();
+  double shadow_softness = 0;  // radius of the half-shade over depth, both in units of the shadow map
   GroundFrame ground;
   Plane ground_plane;
   bool ground_seen = false;  // there is one, and the eye is above it
@@ -288,6 +291,8 @@ void Renderer::Impl::draw_shadow_map() {
   half.diagonal() << 0.5, 0.5, 0.5, 1;
   half.col(3) << 0.5, 0.5, 0.5, 1;
   shadow_from_world = half * clip_from;
+  shadow_from_normal = shadow_from_world.topLeftCorner<3, 3>().inverse().transpose();
+  shadow_softness = std::tan(look.key_size_deg * std::numbers::pi / 180) * 1.02 * depth / side;
 
   glBindFramebuffer(GL_FRAMEBUFFER, targets.shadow_frame);
   glViewport(0, 0, shadow_size, shadow_size);
@@ -363,7 +368,10 @@ const Program& Renderer::Impl::use_mesh(const Mesh& mesh, const std::string& def
   p.set("clip_from_world", clip_from_world);
   p.set("shadow_from_world", shadow_from_world);
   p.set("shadow_offset_m", 2.0 * shadow_texel_m);
-  p.set("shadow_step", 1.15 / shadow_size);
+  p.set("shadow_from_normal", shadow_from_normal);
+  p.set("shadow_softness", shadow_softness);
+  p.set("least_shadow", 1.9 / shadow_size);
+  p.set("most_shadow", most_shadow);
   p.set("ground_x", Vec3(ground.plane_from_world.row(0)));
   p.set("ground_y", Vec3(ground.plane_from_world.row(1)));
   p.set("ground_lower", sky_shade.lower);
@@ -381,8 +389,11 @@ const Program& Renderer::Impl::use_mesh(const Mesh& mesh, const std::string& def
   p.set("faced_m", std::max(0.05 * stage_box.diagonal(), 1e-6));
   p.set("shadow_map", 0);
   p.set("ground_sky_map", 1);
+  p.set("shadow_depth", 2);
   targets.shadow_map.bind(0);
   targets.ground_sky_map.bind(1);
+  targets.shadow_map.bind(2);
+  glBindSampler(2, targets.not_compared);
 
   p.set("albedo", linear_from_srgb(mesh.look.color_srgb));
   p.set("roughness", mesh.look.roughness);

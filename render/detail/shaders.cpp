@@ -85,8 +85,10 @@ uniform vec2 ground_lower, ground_scale;
 uniform float ground_height;
 uniform float faced_m;           // how far before a wall lies the ground that lights it
 uniform float roughness, metallic, opacity;
-uniform float shadow_step;       // between taps, in units of the map
+uniform mat3 shadow_from_normal;
+uniform float shadow_softness, least_shadow, most_shadow;  // radius of the half-shade, in units of the map: for each unit of depth; limits
 uniform sampler2DShadow shadow_map;
+uniform sampler2D shadow_depth;  // the same, not compared
 uniform sampler2D ground_sky_map;
 #ifdef VEILED
 layout(early_fragment_tests) in;
@@ -94,14 +96,46 @@ layout(early_fragment_tests) in;
 layout(location = 0) out vec4 color;
 #endif
 
-// Four bilinear taps: 4 × 4 texels, of even weight but for a soft rim.
-float key_visibility() {
+#ifdef VEILED
+// Four bilinear taps: 4 × 4 texels, of even weight but for a soft rim. A veil has many layers, and shadows on it are faint.
+float key_visibility(vec3 n) {
   float sum = 0.0;
   for (int y = -1; y <= 1; y += 2)
     for (int x = -1; x <= 1; x += 2)
-      sum += texture(shadow_map, vec3(shadow_place.xy + shadow_step * vec2(x, y), shadow_place.z));
+      sum += texture(shadow_map, vec3(shadow_place.xy + 0.6 * least_shadow * vec2(x, y), shadow_place.z));
   return 0.25 * sum;
 }
+#else
+// Percentage-closer soft shadows (Fernando 2005): what hides the light near this place, by how far it is away, says over
+// which disc to ask. The disc lies in the tangent plane, or a slanting surface would shade itself; its taps are on
+// Vogel's spiral, turned from sample to sample.
+float key_visibility(vec3 n) {
+  const int searching = 5, taps = 8;
+  const mat2 golden = mat2(-0.73736888, 0.67549029, -0.67549029, -0.73736888);  // a turn by the golden angle
+  vec3 s = shadow_from_normal * n;
+  vec2 slope = -s.xy / min(s.z, -0.15 * length(s));
+  slope *= min(1.0, 6.0 / max(length(slope), 1e-6));
+  // Jimenez' interleaved gradient noise (2014), once round a diamond.
+  float turn = 4.0 * fract(52.9829189 * fract(dot(gl_FragCoord.xy, vec2(0.06711056, 0.00583715))));
+  vec2 along = normalize(vec2(abs(turn - 2.0) - 1.0, 1.0 - abs(abs(turn - 1.0) - 2.0)));
+  float search = clamp(shadow_softness * shadow_place.z, least_shadow, most_shadow);
+  float above = 0.0, blockers = 0.0;
+  for (int i = 0; i < searching; ++i) {
+    vec2 way = search * sqrt((float(i) + 0.5) / float(searching)) * along;
+    float height = shadow_place.z + dot(slope, way) - texture(shadow_depth, shadow_place.xy + way).r;
+    float blocks = step(0.0, height);
+    above += blocks * height, blockers += blocks;
+    along = golden * along;
+  }
+  float radius = clamp(shadow_softness * above / max(blockers, 1.0), least_shadow, most_shadow), sum = 0.0;
+  for (int i = 0; i < taps; ++i) {
+    vec2 way = radius * sqrt((float(i) + 0.5) / float(taps)) * along;
+    sum += texture(shadow_map, vec3(shadow_place.xy + way, shadow_place.z + dot(slope, way)));
+    along = golden * along;
+  }
+  return sum / float(taps);
+}
+#endif
 
 void main() {
   vec3 n = normalize(normal) * (gl_FrontFacing ? 1.0 : -1.0);
@@ -121,7 +155,7 @@ void main() {
   float grazing = 1.0 - v_h;
   float grazing2 = grazing * grazing;
   vec3 fresnel = f0 + (1.0 - f0) * (grazing2 * grazing2 * grazing);
-  vec3 key = (diffuse + fresnel * (a2 / (d * d) * visibility)) * (n_key * key_visibility()) * key_light;
+  vec3 key = (diffuse + fresnel * (a2 / (d * d) * visibility)) * (n_key * key_visibility(n)) * key_light;
 
   float n_up = dot(n, up);
   // The ground that a surface faces lights it less where it is itself in the dark, as under a body; from higher up one sees

@@ -77,6 +77,12 @@ Targets::Targets(int width, int height, SampleGrid grid) : width_(width), height
   glTexImage2D(GL_TEXTURE_2D, 0, GL_DEPTH_COMPONENT32F, shadow_size, shadow_size, 0, GL_DEPTH_COMPONENT,
                GL_FLOAT, nullptr);
   shadow_frame = new_framebuffer({}, shadow_map);
+  glGenSamplers(1, &not_compared);
+  glSamplerParameteri(not_compared, GL_TEXTURE_MIN_FILTER, GL_NEAREST);
+  glSamplerParameteri(not_compared, GL_TEXTURE_MAG_FILTER, GL_NEAREST);
+  glSamplerParameteri(not_compared, GL_TEXTURE_WRAP_S, GL_CLAMP_TO_BORDER);
+  glSamplerParameteri(not_compared, GL_TEXTURE_WRAP_T, GL_CLAMP_TO_BORDER);
+  glSamplerParameterfv(not_compared, GL_TEXTURE_BORDER_COLOR, lit);
 
   samples = new_target(GL_RGBA16F, grid);
   samples_depth = new_target(GL_DEPTH_COMPONENT32F, grid);

@@ -23,6 +23,7 @@ class Targets {
   static constexpr int shadow_size = 2048;
   Texture shadow_map;
   unsigned shadow_frame;
+  unsigned not_compared;  // a sampler that reads the depths of the shadow map
 
   // Colour (premultiplied, linear), and the depth of the opaque.
   Texture samples, samples_depth;

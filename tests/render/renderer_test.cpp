@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 #include <iostream>
+#include <numbers>
 #include <numeric>
 #include <thread>
 #include <tuple>
@@ -166,6 +167,69 @@ TEST(Renderer, TheShadowFallsWhereTheLightLeads) {
       const double area = 0.5 * std::abs(across.x() * other.y() - across.y() * other.x());
       EXPECT_NEAR(sum / area, 1, 0.12);
     }
+}
+
+// A roof ends at x = 0, at height h, and the light comes over it at 45 degrees, under a half angle a. Of its
+// disc, (acos(−t) + t √(1 − t²))/π is open at a place t r beside the shadow's edge, r = 2 h tan a: which goes
+// from a tenth to nine tenths within 1.374 r.
+TEST(Renderer, HalfShadeBetweenBodiesIsAsWideAsHeightAndLightMakeIt) {
+  const SurfaceMesh floor = quad_mesh({-4, -4, 0}, {4, -4, 0}, {4, 4, 0}, {-4, 4, 0});
+  for (const auto& [height, angle_deg] : {std::pair(0.5, 7.0), {1.0, 7.0}, {1.0, 3.5}, {1.5, 5.0}}) {
+    SCOPED_TRACE(fmt::format("{} m, {} degrees", height, angle_deg));
+    const SurfaceMesh roof = quad_mesh({-4, -4, height}, {0, -4, height}, {0, 4, height}, {-4, 4, height});
+    Camera camera = camera_from({height, 0, 6}, {height, 0, 0});
+    camera.up = {0, 1, 0};
+    Look look = small_look();
+    look.toward_key = {-1, 0, 1}, look.key_size_deg = angle_deg;
+    look.stage.include(Vec3(-4, -4, 0)), look.stage.include(Vec3(4, 4, 2));
+    Image images[2];
+    for (const bool with_roof : {false, true}) {
+      Renderer renderer(look);
+      renderer.add_mesh(floor.triangles, floor.positions, {"floor"});
+      if (with_roof) renderer.add_mesh(roof.triangles, roof.positions, {"roof"});
+      images[with_roof] = renderer.draw(camera);
+    }
+    const double metres_a_pixel = 12 * std::tan(0.5 * camera.fov_deg * std::numbers::pi / 180) / look.height;
+    // How much darker it is, from under the roof's edge to the light.
+    std::vector<double> darker;
+    for (int x = look.width / 2 - int(0.9 * height / metres_a_pixel); x < look.width; ++x) {
+      double sum = 0;
+      for (int y = 90; y < 150; ++y) {
+        const std::size_t at = 4 * (std::size_t(y) * std::size_t(look.width) + std::size_t(x)) + 1;
+        sum += double(images[0].rgba[at] - images[1].rgba[at]);
+      }
+      darker.push_back(sum);
+    }
+    const double all = *std::max_element(darker.begin(), darker.end());
+    const auto last_above = [&](double share) {
+      std::size_t k = darker.size() - 2;
+      while (k > 0 && darker[k] < share * all) --k;
+      return double(k) + (darker[k] - share * all) / (darker[k] - darker[k + 1]);
+    };
+    const double width_m = (last_above(0.1) - last_above(0.9)) * metres_a_pixel;
+    const double radius_m = 2 * height * std::tan(angle_deg * std::numbers::pi / 180);
+    EXPECT_NEAR(width_m / (1.374 * radius_m), 1, 0.1);
+    EXPECT_NEAR((last_above(0.5) - 0.9 * height / metres_a_pixel) * metres_a_pixel, 0,
+                0.1 * radius_m + 1.5 * metres_a_pixel);
+  }
+}
+
+// A wide disc does not darken the slanting face that it lies in.
+TEST(Renderer, NothingShadesItself) {
+  for (const double slant_deg : {0.0, 30.0, 50.0, 70.0}) {
+    const double slant = slant_deg * std::numbers::pi / 180;
+    const Vec3 along = 2 * Vec3(std::cos(slant), 0, std::sin(slant)), across(0, 2, 0);
+    const SurfaceMesh face = quad_mesh(-along - across, along - across, along + across, across - along);
+    Look look = small_look();
+    look.toward_key = {-0.3, 0.2, 1}, look.key_size_deg = 20;
+    Image images[2];
+    for (const bool casts : {false, true}) {
+      Renderer renderer(look);
+      renderer.add_mesh(face.triangles, face.positions, {.name = "face", .casts_shadow = casts});
+      images[casts] = renderer.draw(camera_from({0, -1, 6}));
+    }
+    EXPECT_LE(difference(images[0], images[1]).largest, 1) << slant_deg;
+  }
 }
 
 TEST(Renderer, TheOrderOfTrianglesAndVerticesChangesNoPixel) {
