@@ -84,7 +84,7 @@ State start_from(const fs::path& folder, const PlanFolder& other, int frame, con
     if (body.kind == fem::BodyKind::kinematic)
       require_same_place(fem::body_positions(world_there, there, int(same - world_there.bodies.begin())),
                          fem::body_positions(world, start, int(b)), body, fem::time_s(world, start), what);
-    if (body.kind == fem::BodyKind::kinematic || !same->moving) continue;
+    if (!same->moving) continue;
     const auto from = std::ptrdiff_t(3 * same->first_node), to = std::ptrdiff_t(3 * body.first_node),
                count = std::ptrdiff_t(3 * body.node_count());
     std::copy_n(there.positions.begin() + from, count, start.positions.begin() + to);
