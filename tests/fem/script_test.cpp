@@ -198,7 +198,7 @@ TEST(Script, WhatBeginsWakesWhatSleeps) {
   const World pushed = build_world(spec);
   const State before = run(pushed, int(2 / pushed.dt_s));
   EXPECT_EQ(body_positions(pushed, before, 0), body_positions(pushed, start_state(pushed), 0));
-  const State after = run(pushed, before, int(1 / pushed.dt_s));
+  const State after = run(pushed, int(3 / pushed.dt_s));
   EXPECT_GT(center_of_mass_m(pushed, after, 0).z() - center_of_mass_m(pushed, before, 0).z(), 0.45);
 
   spec.bodies[1].track.keyframes.clear();
