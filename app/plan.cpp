@@ -311,7 +311,9 @@ plan::Settings settings_of(const scenes::Scene& scene, const PlanOptions& option
 scenes::Scene read_scene(const PlanOptions& options) {
   std::vector<std::string> sets = options.scene.sets;
   if (!options.preset.empty()) sets.push_back("planner.preset=" + options.preset);
-  return scenes::read_scene_file(scenes::find_scene(options.scene.scene), sets);
+  scenes::Scene scene = scenes::read_scene_file(scenes::find_scene(options.scene.scene), sets);
+  scenes::require_plannable(scene);
+  return scene;
 }
 
 Outcome plan(const PlanOptions& options) {

@@ -72,6 +72,7 @@ PlanFolder read_plan_folder(const fs::path& folder) {
           extra.at("script").at("name").get_to(script.name_for_messages);
     result.scene = scenes::read_scene(extra.at("scene").get<std::string>(), file.string() + " (scene)",
                                       extra.at("sets").get<std::vector<std::string>>(), script);
+    if (!result.plan.simulation) scenes::require_plannable(result.scene);
     result.summary = extra.at("summary");
     result.cage_hashes = extra.at("cage_hashes");
     require_summary(result, file);

@@ -398,6 +398,16 @@ void check_shapes(const MotionFigures& figures, const fem::World& world, Promise
   check_seen(figures, world.touches_on_surfaces(), table);
 }
 
+// Also false where no simulation could begin there.
+bool starts_from(const fs::path& folder, const PlanFolder& other, int frame, const scenes::Scene& scene,
+                 const fem::World& world, const State& start) {
+  try {
+    return start_from(folder, other, frame, scene, world) == start;
+  } catch (const InputError&) {
+    return false;
+  }
+}
+
 // Where a simulation begins. Of a frame of another motion the folder must be here, as it was then.
 void check_beginning(const fs::path& folder, const PlanFolder& planned, const fem::World& world,
                      Promises& table) {
@@ -414,8 +424,9 @@ void check_beginning(const fs::path& folder, const PlanFolder& planned, const fe
   std::string why;
   try {
     const PlanFolder there = read_plan_folder(other);
+    read_bodies_of(there, other);
     if (hex(plan::hash_of(there.plan.trajectory)) == from.at("trajectory_hash")) {
-      table.row(promise, start_from(other, there, frame, planned.scene, world) == start, name);
+      table.row(promise, starts_from(other, there, frame, planned.scene, world, start), name);
       return;
     }
     why = "holds another motion now";

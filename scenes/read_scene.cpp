@@ -514,15 +514,28 @@ void add_body(BodySpec body, const Node& table, Scene& scene) {
   scene.bodies.push_back(std::move(body));
 }
 
+bool is_rigid_obstacle(const BodySpec& body) {
+  return body.role == Role::obstacle && body.kind == Kind::rigid;
+}
+
 void read_bodies(const Node& root, Scene& scene, const Complaints& complaints) {
   bool robot = false;  // also one that is complained of
   for (const Node& table : list(root, "bodies")) {
     robot |= read_role(text(table, "role")) == Role::robot;
     complaints.during([&] { add_body(read_body(table, scene.bounds_m), table, scene); });
   }
-  if (!robot)
+  if (robot) return;
+  if (root.find("goal"))
     complaints.during([&] {
       complain(child(root, "bodies"), "there is no robot; give the body that is to move role = \"robot\"");
+    });
+  const auto first = std::find_if_not(scene.bodies.begin(), scene.bodies.end(), is_rigid_obstacle);
+  if (first != scene.bodies.end())
+    scene.robot = int(first - scene.bodies.begin());
+  else
+    complaints.during([&] {
+      complain(child(root, "bodies"),
+               "no body can be pushed, so nothing happens; add one that is soft, or role = \"free\"");
     });
 }
 
@@ -546,10 +559,6 @@ int other_body(const Node& node, const Scene& scene, const std::string& key) {
   }
   complain(node, fmt::format("{} is \"{}\"; it must be a body other than the robot{}{}", key, as_text(node),
                              others.empty() ? ", and there is none" : ": ", fmt::join(others, ", ")));
-}
-
-bool is_rigid_obstacle(const BodySpec& body) {
-  return body.role == Role::obstacle && body.kind == Kind::rigid;
 }
 
 void read_force(const Node& table, Scene& scene) {
@@ -681,6 +690,31 @@ std::vector<Via> read_via(const Node& root, const Scene& scene) {
                "rest = false");
   }
   return all;
+}
+
+// Without a goal nothing is searched, and all that belongs to a search may lack.
+void read_goals(const Node& root, Scene& scene, const Complaints& complaints) {
+  if (!root.find("goal")) {
+    std::vector<std::string> lacks{"[goal]"};
+    if (!root.find("planner")) lacks.push_back("[planner]");
+    if (scene.bodies[std::size_t(scene.robot)].role != Role::robot)
+      lacks.push_back("a body with role = \"robot\"");
+    scene.lacks = fmt::format(
+        "{}: the scene can only be simulated (limber simulate); to be planned it lacks {}; add {}",
+        root.where.text(), fmt::join(lacks, ", "), lacks.size() == 1 ? "it" : "them");
+    if (!list(root, "via").empty())
+      complaints.during([&] {
+        complain(list(root, "via").front(), "[[via]] are goals before [goal], and there is none; add [goal]");
+      });
+    return;
+  }
+  if (!root.find("planner")) {
+    complaints.during(
+        [&] { complain(root, "the scene lacks \"planner\" (how the motion is searched); add [planner]"); });
+    return;
+  }
+  complaints.during([&] { scene.via = read_via(root, scene); });
+  complaints.during([&] { scene.goal = read_goal(root, scene); });
 }
 
 PlannerSpec read_planner(const Node& table) {
@@ -863,10 +897,10 @@ Scene read(const std::string& toml, const std::string& name_for_messages,
   if (all_bodies) {
     for (const Node& table : list(root, "forces")) complaints.during([&] { read_force(table, scene); });
     for (const Node& table : list(root, "motions")) complaints.during([&] { read_motion(table, scene); });
-    complaints.during([&] { scene.via = read_via(root, scene); });
-    complaints.during([&] { scene.goal = read_goal(root, scene); });
+    read_goals(root, scene, complaints);
   }
-  complaints.during([&] { scene.planner = read_planner(child(root, "planner")); });
+  if (const Node* planner = root.find("planner"))
+    complaints.during([&] { scene.planner = read_planner(*planner); });
   if (scene.planner.preset == "paper") keep_to_the_paper(root, scene);
   fill_in_max_stretch(scene);
   if (all_bodies) complaints.during([&] { scene.cameras = read_cameras(root, scene); });
@@ -890,6 +924,10 @@ std::vector<std::string> problems_of(const std::string& toml, const std::string&
   const Complaints complaints(&problems);
   complaints.during([&] { read(toml, name_for_messages, sets, {}, complaints); });
   return problems;
+}
+
+void require_plannable(const Scene& scene) {
+  if (!scene.lacks.empty()) throw InputError(scene.lacks);
 }
 
 Scene read_scene_file(const fs::path& file, const std::vector<std::string>& sets, const fs::path& script) {

@@ -248,8 +248,11 @@ struct Scene {
   std::vector<BodySpec> bodies;
   std::vector<ForceSpec> forces;
   std::vector<MotionSpec> motions;  // of one body each
-  int robot = -1;                   // index of the one body whose role is robot
-  std::vector<Via> via;             // goals that are reached before the last, in this order
+  // Index of the one body whose role is robot; of a scene without, the first that can be pushed: shares of
+  // "the robot's size" are of its.
+  int robot = -1;
+  std::string lacks;     // what it would need to be planned, as a complaint; empty: nothing
+  std::vector<Via> via;  // goals that are reached before the last, in this order
   Goal goal;
   PlannerSpec planner;
   std::vector<BodySpec> scenery;    // seen, but no part of the world; only names, models, poses and looks
@@ -273,6 +276,9 @@ Scene read_scene(const std::string& text, const std::string& name_for_messages,
 // `script` is a file, or empty.
 Scene read_scene_file(const fs::path&, const std::vector<std::string>& sets = {},
                       const fs::path& script = {});
+
+// Throws InputError where the scene can be simulated only: it has no goal.
+void require_plannable(const Scene&);
 
 // "+x" … "-z" as a unit vector.
 Vec3 axis_named(const std::string&);

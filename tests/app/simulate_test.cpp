@@ -7,6 +7,7 @@
 #include "core/progress.h"
 #include "fem/observe.h"
 #include "plan/simulation.h"
+#include "render/png_file.h"
 #include "tests/app/program.h"
 
 namespace limber::app {
@@ -329,6 +330,68 @@ TEST_F(Simulate_slow, APlanIsMadeAmongWhatMovesByItself) {
   const Table table = verify("out");
   EXPECT_TRUE(table.kept.at("replay gives the same bits"));
   EXPECT_TRUE(table.kept.at("searched again from the scene: the same tree"));
+}
+
+std::string without_search(std::string text) {
+  const auto cut = [&](const std::string& from, const std::string& to) {
+    const auto at = text.find(from);
+    text.erase(at, text.find(to, at) - at);
+  };
+  cut("[goal]", "[planner]"), cut("[planner]", "[film]");
+  return text.replace(text.find("\"robot\""), 7, "\"free\"");
+}
+
+// No robot, no goal, no planner: all that is done with a simulation is done with it, and no more.
+TEST_F(Simulate_slow, ASceneThatOnlyHappensNeedsNoRobotGoalOrPlanner) {
+  const std::string text = without_search(thrown), lift = file("lift.toml", lifting);
+  simulate(text, "out", {"--duration", "0.3", "--control", lift});
+  simulate(thrown, "as", {"--duration", "0.3", "--control", lift});
+  EXPECT_EQ(moved("out").frames(), moved("as").frames());
+  EXPECT_EQ(verify("out").code, exit_done);
+  EXPECT_EQ(limber_program({"info", out()}).code, exit_done);
+  EXPECT_EQ(limber_program({"render", out(), "--frames", "0"}).code, exit_done);
+  EXPECT_EQ(limber_program({"report", out()}).code, exit_done);
+
+  EXPECT_EQ(limber_program({"info", scene(text)}).code, exit_done);
+  const Result check = limber_program({"scene", "check", scene(text), "--json"});
+  EXPECT_EQ(check.code, exit_done) << check.err;
+  EXPECT_TRUE(check.json().at("can_be_simulated"));
+  EXPECT_FALSE(check.json().at("can_be_planned"));
+  for (const char* command : {"plan", "run"}) {
+    const Result refused = limber_program({command, scene(text), "-o", out("plan")});
+    EXPECT_EQ(refused.code, exit_bad_input);
+    EXPECT_NE(refused.err.find("scene.toml:1:1: the scene can only be simulated"), refused.err.npos)
+        << refused.err;
+    EXPECT_FALSE(fs::exists(out("plan")));
+  }
+}
+
+// An arrow of the colour of pushes, in the frames between which it acts, from where it acts.
+TEST_F(Simulate_slow, FilmShowsTheScenesForces) {
+  const std::string push =
+      "[[forces]]\nbody = \"cube\"\nfrom_s = 0.11\nto_s = 0.24\nforce_n = [0, 0, 40]\n";  // frames 2, 3, 4
+  simulate(without_search(thrown), "out", {"--duration", "0.4", "--control", file("push.toml", push)});
+  const auto arrow = [&](int frame, const std::string& name) {
+    const render::Image8 image =
+        render::read_png(fs::path(out()) / ("frames-" + name) / fmt::format("{:04}.png", frame));
+    int pixels = 0;  // orange: far more red than blue
+    for (std::size_t i = 0; i + 2 < image.rgb.size(); i += 3)
+      pixels += int(image.rgb[i]) > int(image.rgb[i + 2]) + 90 && image.rgb[i] > 130;
+    return pixels;
+  };
+  for (const char* forces : {"false", "true"})
+    ASSERT_EQ(limber_program({"render", out(), "--as", forces, "--set", fmt::format("film.forces={}", forces),
+                              "--set", "bodies.cube.color=#203060", "--set", "bodies.plate.color=#203060",
+                              "--size", "384x256"})
+                  .code,
+              exit_done);
+  for (int frame = 0; frame < 9; ++frame) {
+    EXPECT_EQ(arrow(frame, "false"), 0) << frame;
+    if (frame >= 2 && frame <= 4)
+      EXPECT_GT(arrow(frame, "true"), 5) << frame;
+    else
+      EXPECT_EQ(arrow(frame, "true"), 0) << frame;
+  }
 }
 
 TEST_F(Simulate_slow, WrongInputsSayWhatAndWhere) {

@@ -286,7 +286,6 @@ TEST(ReadScene, ComplainsWithLineAndColumn) {
        "lost_below_m", "unknown key"},
       {"radius_m = 0.25\n", "radius_m = 0.25\nshape = { angle_deg = 90 }\n", "{ angle_deg",
        "without a tolerance"},
-      {"[goal]\ncenter_of_mass_m = [9, 1.5, 1.5]\nradius_m = 0.25\n", "", "name", "add [goal]"},
       {"name = \"gate\"", "name = \"robot\"", "\"robot\"\nrole = \"obst", "two bodies are called \"robot\""},
       {"name = \"gate\"", "name = \"../gate\"", "\"../gate\"", "letters, digits"},
       {"[9, 1.5, 1.5]", "[11, 1.5, 1.5]", "[11,",
@@ -426,6 +425,49 @@ force_n = [3, 4, 5]
 body = "shutter"
 keyframes = [{ at_s = 1, position_m = [8, 1.5, 1.2] }, { at_s = 3, axis = [0, 0, 2], angle_deg = 720 }]
 )";
+
+// Where nothing is planned nothing is asked for that only planning needs.
+TEST(ReadScene, AScenesGoalRobotAndPlannerMayLackWhereItIsSimulated) {
+  const std::string no_goal =
+                        replaced(good, "[goal]\ncenter_of_mass_m = [9, 1.5, 1.5]\nradius_m = 0.25\n", ""),
+                    no_planner = replaced(no_goal, "[planner]\npreset = \"paper\"\nmax_force_n = 500\n", ""),
+                    no_robot = replaced(no_planner, "role = \"robot\"", "role = \"free\"");
+  const auto lack = [](const std::string& text) {
+    const Scene scene = read_scene(text, "s.toml");
+    try {
+      require_plannable(scene);
+    } catch (const InputError& error) {
+      EXPECT_EQ(scene.lacks, error.what());
+      return std::string(error.what());
+    }
+    return std::string();
+  };
+  const std::string can =
+      "s.toml:1:1: the scene can only be simulated (limber simulate); to be planned it lacks ";
+  EXPECT_EQ(lack(good), "");
+  EXPECT_EQ(lack(no_goal), can + "[goal]; add it");
+  EXPECT_EQ(lack(no_planner), can + "[goal], [planner]; add them");
+  EXPECT_EQ(lack(no_robot), can + "[goal], [planner], a body with role = \"robot\"; add them");
+  EXPECT_EQ(read_scene(no_goal, "s.toml").planner.preset, "paper");
+
+  // Sizes are told against the first that can be pushed.
+  EXPECT_EQ(read_scene(no_robot, "s.toml").robot, 0);
+  const std::string first_stands =
+      replaced(no_robot, "role = \"free\"\n", "role = \"obstacle\"\nkind = \"rigid\"\n");
+  EXPECT_EQ(read_scene(first_stands, "s.toml").robot, 1);
+  EXPECT_NE(complaint(first_stands, {"bodies.gate.kind=rigid"}).find("s.toml:4:1: no body can be pushed"),
+            std::string::npos)
+      << complaint(first_stands, {"bodies.gate.kind=rigid"});
+
+  // What is there is read as ever, and a goal wants the rest.
+  EXPECT_NE(
+      complaint(no_goal + "[[via]]\ncenter_of_mass_m = [5, 1, 1]\nradius_m = 1\n").find("before [goal]"),
+      std::string::npos);
+  EXPECT_NE(complaint(replaced(good, "[planner]\npreset = \"paper\"\nmax_force_n = 500\n", ""))
+                .find("s.toml:1:1: the scene lacks \"planner\""),
+            std::string::npos);
+  EXPECT_NE(complaint(no_goal, {"planner.max_force_n=-1"}).find("planner.max_force_n"), std::string::npos);
+}
 
 TEST(Script, StandsInTheSceneOrInAFileOfItsOwn) {
   const Scene one = read_scene(good + shutter + script, "s.toml"),
