@@ -30,6 +30,22 @@ void require_same_place(const Points& there, const Points& now, const fem::Body&
                     what, body.name, farthest, time_s));
 }
 
+void require_bodies_of(const fem::World& there, const fem::World& world, const std::string& what) {
+  std::vector<std::string> theirs, ours;
+  for (const fem::Body& body : there.bodies)
+    if (body.pushed()) theirs.push_back(body.name);
+  for (const fem::Body& body : world.bodies)
+    if (body.pushed()) ours.push_back(body.name);
+  const bool any = std::any_of(ours.begin(), ours.end(), [&](const std::string& name) {
+    return std::find(theirs.begin(), theirs.end(), name) != theirs.end();
+  });
+  if (!any)
+    throw InputError(fmt::format(
+        "{}: is of another scene: there {} can be pushed, and here {}; name a folder in which one "
+        "of these moves",
+        what, fmt::join(theirs, ", "), fmt::join(ours, ", ")));
+}
+
 struct Beginning {
   std::optional<State> start;  // nothing: the scene's
   Json from;                   // what the summary tells of it; null likewise
@@ -68,6 +84,7 @@ State start_from(const fs::path& folder, const PlanFolder& other, int frame, con
     throw InputError(fmt::format("{}: there is none; its frames are 0 … {}", what, frames.size() - 1));
   const State& there = frames[std::size_t(frame)];
   const fem::World world_there = world_of(other, read_bodies_of(other, folder));
+  require_bodies_of(world_there, world, what);
   State start = fem::start_state(world);
   start.step = std::llround(double(there.step) * world_there.dt_s / world.dt_s);
   fem::follow_keyframes(world, start);
@@ -108,6 +125,8 @@ Outcome simulate(const SimulateOptions& options) {
 
   std::optional<plan::Plan> earlier;
   if (options.resume) {
+    if (!fs::exists(file))
+      throw InputError(fmt::format("{}: there is none to go on from; leave --resume out", file.string()));
     earlier = read_plan_folder(options.out).plan;
     if (earlier->system_hash == system.hash()) require_of_world(*earlier, world, options.out);
   }

@@ -435,6 +435,11 @@ TEST_F(Simulate_slow, WrongInputsSayWhatAndWhere) {
   std::string finer = thrown;
   finer.replace(finer.find("cells = [2, 2, 2]"), 17, "cells = [3, 3, 3]");
   refused(run(finer, "out", {"--from", out("short"), "--control", lift}), "body cube has another cage there");
+  std::string stranger = thrown;
+  stranger.replace(stranger.find("\"cube\""), 6, "\"dice\"");
+  refused(run(stranger, "out", {"--from", out("short"), "--control", lift}),
+          "there cube can be pushed, and here dice");
+  refused(run(thrown, "nothing", {"--resume"}), "there is none to go on from");
 }
 
 }  // namespace
