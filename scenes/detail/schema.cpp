@@ -763,7 +763,8 @@ constexpr Key all_keys[] = {
      "false",
      "arrows where they leave the robot: the push that drives it, orange, as long as the robot where it is "
      "strongest (interpolation and holding: the sum over all nodes, along a line through the centre of "
-     "mass); what each body and the walls do to it, blue, at most twice as long",
+     "mass); what each body and the walls do to it, blue, at most twice as long; the scene's `[[forces]]`, "
+     "orange, where they leave their bodies; where nothing pushes, what the robot weighs is as long as it",
      "",
      ""},
     {"film.path", Type::boolean, {}, 0, "false", "draw the way of the robot's centre of mass", "", ""},
