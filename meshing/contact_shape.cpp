@@ -300,13 +300,14 @@ ContactShape make_contact_shape(const SurfaceMesh& surface, const TetMesh& cage,
       const double squares = seen.area_m2 / (r.characteristic_m * r.characteristic_m);
       const int most = int(std::clamp(settings.samples_a_square * squares,
                                       double(settings.fewest_most_samples), double(settings.most_samples)));
-      samples = detail::sample_surface(surface, seen, winding,
-                                       {.missed_m = settings.missed_depth * r.characteristic_m,
-                                        .least_m = settings.least_spacing * size,
-                                        .most_m = settings.most_spacing * size,
-                                        .most_flat_m = settings.most_flat_spacing * size,
-                                        .offset_m = offset},
-                                       most);
+      samples =
+          detail::sample_surface(surface, seen, winding,
+                                 {.missed_m = settings.missed_depth * r.characteristic_m,
+                                  .least_m = settings.least_spacing * std::max(r.characteristic_m, size / 3),
+                                  .most_m = settings.most_spacing * size,
+                                  .most_flat_m = settings.most_flat_spacing * size,
+                                  .offset_m = offset},
+                                 most);
       if (samples.empty()) return give_up(no_inside);
     }
     const FieldErrors at_samples = errors(shape.field, samples);

@@ -17,8 +17,8 @@ struct ContactShapeSettings {
   int most_cells = 160;                 // where that is not good enough
   std::int64_t most_nodes = 3'000'000;  // of the field; 1,000 or more
   double field_error = 0.0015;          // distance that the field may have on 99 % of the surface
-  double missed_depth = 0.005;          // of a flat body, between samples of a face that bends
-  double least_spacing = 0.012;         // of samples, over size
+  double missed_depth = 0.0035;         // d, where a face bends: a plane goes s²/2R = 2d deeper than samples
+  double least_spacing = 0.012;         // of samples, over 6 V / A or a third of size, what is more
   double most_spacing = 0.04;           // where the surface bends
   double most_flat_spacing = 0.08;      // in flat faces
   // Samples at most: so many for each square of the characteristic size that the surface has, within these

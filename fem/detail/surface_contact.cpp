@@ -126,6 +126,8 @@ SurfaceContacts<Real>::SurfaceContacts(const World& world, const Kernels<Real>& 
     slopes_.resize(std::size_t(world_nodes_)), spread_.resize(slopes_.size(), 0), bends_.resize(tets);
   stamps_.assign(std::size_t(first_bends_stamp_) + bends_.size(), 0);
   loads_.assign(std::size_t(world_nodes_), 0);
+  for (const Real mass : tables_.node_mass) reciprocal_mass_.push_back(1 / mass);
+  velocities_.resize(std::size_t(world_nodes_)), forces_.assign(std::size_t(world_nodes_), Place{});
   beside_.assign(tets, -1), sides_.assign(tets, 0);
   walls_asleep_until_.resize(std::size_t(lanes * bodies_));
   for (int k = 0; k < lanes * bodies_; ++k)
@@ -267,9 +269,14 @@ void SurfaceContacts<Real>::add_forces(int lane, const LaneView<Real>& view) {
   find(lane, view);
   if (touches_.empty()) return;
   share_loads(view);
-  for (const SurfaceTouch<Real>& touch : touches_) respond(view, touch);
+  for (const SurfaceTouch<Real>& touch : touches_) respond(touch);
   for (const SurfaceTouch<Real>& touch : touches_)
-    for (int i = touch.first_share; i < touch.last_share; ++i) loads_[shares_[i].node] = 0;
+    for (int i = touch.first_share; i < touch.last_share; ++i) {
+      const int node = shares_[i].node;
+      if (loads_[node] == 0) continue;
+      for (int c = 0; c < 3; ++c) view.f[view.force.at(node, c)] += forces_[node].at[c];
+      loads_[node] = 0, forces_[node].row = Row{};
+    }
 }
 
 template <class Real>
@@ -482,7 +489,6 @@ void SurfaceContacts<Real>::build(const LaneView<Real>& view, int from, int into
 template <class Real>
 void SurfaceContacts<Real>::find_in(const LaneView<Real>& view, int from, int into, Real reach, Real travel,
                                     Near& near) {
-  const bool bends = surface_.bodies[from].phong || surface_.bodies[into].phong;
   const std::size_t count = near.candidates.size();
   if (awake_.size() < count + block_size) awake_.resize(count + block_size), distance_.resize(awake_.size());
   const int awake = kernels_.find_at_most(near.asleep_until.data(), int(count), travel, awake_.data());
@@ -495,11 +501,12 @@ void SurfaceContacts<Real>::find_in(const LaneView<Real>& view, int from, int in
   for (int i = 0; i < awake;) {
     const int sample = near.candidates[awake_[i]].point;
     const Real* place = places_[row_of_sample(sample)].at;
+    const Real own_bulge = sample_bulge(view, from, sample);
     int best = -1;
     Real best_weight[4], best_least = -std::numeric_limits<Real>::max();
     for (; i < awake && near.candidates[awake_[i]].point == sample; ++i) {
       const int tet = near.candidates[awake_[i]].tet;
-      const Real bulge = bends ? sample_bulge(view, from, sample) + bulge_of(view, into, tet) : Real(0);
+      const Real bulge = own_bulge + bulge_of(view, into, tet);
       near.asleep_until[awake_[i]] = travel + kept * (distance_[i] - bulge) - rounding * reach;
       if (distance_[i] > bulge + certain * reach) continue;
       Real weight[4];
@@ -819,14 +826,21 @@ Real SurfaceContacts<Real>::load_of(const SurfaceTouch<Real>& touch) const {
   return surface_.samples[touch.sample].area * touch.depth;
 }
 
-// What each node bears, and each rigid body, of all touches: their shares of it are shares of mass.
+// What each node bears over its mass, and each rigid body, of all touches: their shares of it are shares of
+// mass.
 template <class Real>
 void SurfaceContacts<Real>::share_loads(const LaneView<Real>& view) {
   for (Bearing& bearing : bearings_) bearing.depths = 0;
   for (const SurfaceTouch<Real>& touch : touches_) {
     const Real load = load_of(touch);
-    for (int i = touch.first_share; i < touch.last_share; ++i)
-      loads_[shares_[i].node] += load * std::abs(shares_[i].weight);
+    for (int i = touch.first_share; i < touch.last_share; ++i) {
+      const auto [node, weight] = shares_[i];
+      if (loads_[node] == 0) {
+        const Real* v = view.v + view.state.at(node, 0);
+        velocities_[node].row = Row{v[0], v[view.state.component], v[2 * view.state.component], 0};
+      }
+      loads_[node] += load * std::abs(weight) * reciprocal_mass_[node];
+    }
     if (bearings_.empty()) continue;
     bearings_[touch.body].depths += double(load);
     if (touch.against >= 0) bearings_[touch.against].depths += double(load);
@@ -837,27 +851,33 @@ void SurfaceContacts<Real>::share_loads(const LaneView<Real>& view) {
 }
 
 template <class Real>
-void SurfaceContacts<Real>::respond(const LaneView<Real>& view, const SurfaceTouch<Real>& touch) {
+void SurfaceContacts<Real>::respond(const SurfaceTouch<Real>& touch) {
   const Real load = load_of(touch);
   const int side[2] = {touch.body, touch.against};
-  Real relative[3] = {0, 0, 0}, inverse_mass = 0;  // of what is not rigid
-  Real borne[2] = {0, 0}, all[2] = {0, 0};         // of the force: by nodes that move
-  for (int i = touch.first_share; i < touch.last_share; ++i) {
-    const auto [node, weight] = shares_[i];
-    const int k = i < touch.first_against ? 0 : 1;
-    const Real size = std::abs(weight);
-    all[k] += size;
-    if (tables_.inverse_mass[node] > 0) borne[k] += size;
-    for (int c = 0; c < 3; ++c) relative[c] += weight * view.v[view.state.at(node, c)];
-    // A held node counts with its mass: without, one that moves would be thrown by what they do not bear.
-    if (!is_rigid(side[k]) && topology_.bodies[side[k]].pushed)
-      inverse_mass += size * (loads_[node] / load) / tables_.node_mass[node];
+  Place relative;
+  relative.row = Row{};
+  Real loads = 0;                           // of what is not rigid
+  Real borne[2] = {0, 0}, all[2] = {0, 0};  // of the force: by nodes that move
+  for (const int k : {0, 1}) {
+    const int begin = k == 0 ? touch.first_share : touch.first_against,
+              end = k == 0 ? touch.first_against : touch.last_share;
+    Real loads_of_side = 0;
+    for (int i = begin; i < end; ++i) {
+      const auto [node, weight] = shares_[i];
+      const Real size = std::abs(weight);
+      all[k] += size;
+      if (tables_.inverse_mass[node] > 0) borne[k] += size;
+      relative.row += weight * velocities_[node].row;
+      // A held node counts with its mass: without, one that moves would be thrown by what they do not bear.
+      loads_of_side += size * loads_[node];
+    }
+    if (begin < end && !is_rigid(side[k]) && topology_.bodies[side[k]].pushed) loads += loads_of_side;
   }
   bool any_rigid = false;
   for (const int body : side) any_rigid |= body >= 0 && is_rigid(body);
   if (!any_rigid && !(borne[0] + borne[1] > 0)) return;
   const auto mass_along = [&](const Real along[3]) {
-    Real inverse = inverse_mass;
+    Real inverse = loads / load;
     for (const int body : side)
       if (body >= 0 && is_rigid(body))
         inverse += Real(bearings_[body].inverse_mass(touch.place, along, load));
@@ -865,13 +885,12 @@ void SurfaceContacts<Real>::respond(const LaneView<Real>& view, const SurfaceTou
   };
   Real force[3];
   const int other = touch.against < 0 ? touch.body : touch.against;
-  if (!penalty_force(Real(surface_beta), touch.depth, touch.normal, relative, mass_along, step_,
+  if (!penalty_force(Real(surface_beta), touch.depth, touch.normal, relative.at, mass_along, step_,
                      tables_.pair_friction[touch.body * bodies_ + other], force))
     return;
   for (int i = touch.first_share; i < touch.last_share; ++i) {
     const auto [node, weight] = shares_[i];
-    if (tables_.inverse_mass[node] > 0)
-      for (int c = 0; c < 3; ++c) view.f[view.force.at(node, c)] += weight * force[c];
+    if (tables_.inverse_mass[node] > 0) forces_[node].row += weight * Row{force[0], force[1], force[2], 0};
   }
   if (!told_) return;
   // What is set against nodes that never move on both sides, or against a wall, is borne by none.

@@ -121,7 +121,7 @@ class SurfaceContacts {
   void find_walls(int lane, const LaneView<Real>&, int body);
   void share_sample(int body, int sample, SurfaceTouch<Real>&);
   void share_loads(const LaneView<Real>&);
-  void respond(const LaneView<Real>&, const SurfaceTouch<Real>&);
+  void respond(const SurfaceTouch<Real>&);
   Real load_of(const SurfaceTouch<Real>&) const;
   bool is_rigid(int body) const;
 
@@ -148,8 +148,10 @@ class SurfaceContacts {
   unsigned stamp_ = 0;
   std::vector<int> awake_;
   std::vector<Real> distance_;
-  std::vector<Real> loads_;        // a node: Σ area × depth × weight of its touches
-  std::vector<Bearing> bearings_;  // a body; empty without rigid ones
+  std::vector<Real> loads_;            // a node: Σ area × depth × weight of its touches, over its mass
+  std::vector<Real> reciprocal_mass_;  // a node, held ones too
+  std::vector<Place> velocities_, forces_;  // of nodes with a load; 0 of the others' forces
+  std::vector<Bearing> bearings_;           // a body; empty without rigid ones
   // Scratch of a list's building.
   static constexpr int slabs = 32;
   std::vector<Group> groups_, unsorted_groups_;

@@ -119,7 +119,28 @@ TEST(ContactShape, WhatSticksOutIsSampled) {
       worst = std::max(
           worst, (surface.positions * down).maxCoeff() - (made.shape.samples.positions_m * down).maxCoeff());
     }
-    EXPECT_LT(worst, 2 * 0.0025 * made.report.characteristic_m);
+    EXPECT_LT(worst, 2 * ContactShapeSettings().missed_depth * made.report.characteristic_m);
+  }
+}
+
+// Rounded corners of a large plate, too, whose creases are none: they are small beside its size, and its
+// thickness is what others are pressed by.
+TEST(ContactShape, RoundedCornersOfAPlateAreSampled) {
+  constexpr double radius = 0.025;
+  const Vec3 middle_of_corner = 0.5 * Vec3(3, 2, 0.35) - Vec3::Constant(radius);
+  const Eigen::AngleAxisd aside(0.01, Vec3::UnitZ());  // no vertex lies between two corners
+  SurfaceMesh surface = made_sphere(61);
+  for (auto p : surface.positions.rowwise()) {
+    const Vec3 n = aside * p.transpose();
+    p = radius * n + n.cwiseSign().cwiseProduct(middle_of_corner);
+  }
+  const Made made(surface);
+  Rng rng(5, 0);
+  for (int i = 0; i < 2000; ++i) {
+    const Vec3 down = rng.direction();
+    ASSERT_LT((surface.positions * down).maxCoeff() - (made.shape.samples.positions_m * down).maxCoeff(),
+              2 * ContactShapeSettings().missed_depth * made.report.characteristic_m)
+        << down.transpose();
   }
 }
 
