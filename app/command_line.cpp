@@ -136,6 +136,32 @@ void add_plan(CLI::App& command, PlanOptions& options) {
       ->type_name("FILE.jsonl");
 }
 
+void add_simulate(CLI::App& command, SimulateOptions& options) {
+  command.add_option("-o,--out", options.out, "work folder; it is made where it is missing")
+      ->required()
+      ->type_name("DIR");
+  command.add_option("--duration", options.duration_s, "how long, from its start: 5, 5s, 2min or 1h")
+      ->transform(CLI::AsNumberWithUnit(std::map<std::string, double>{{"s", 1}, {"min", 60}, {"h", 3600}},
+                                        CLI::AsNumberWithUnit::DEFAULT, "s|min|h"))
+      ->capture_default_str();
+  command
+      .add_option("--control", options.script,
+                  "a TOML file with more [[forces]] and [[motions]], as the scene has them")
+      ->type_name("FILE");
+  CLI::Option* const from =
+      command
+          .add_option(
+              "--from", options.from,
+              "begin as a frame of the plan or simulation in this folder, positions and velocities as it "
+              "stores them; the clock goes on from there")
+          ->type_name("DIR");
+  command.add_option("--frame", options.frame, "of --from, counted from 0; default: its last")
+      ->type_name("N")
+      ->needs(from);
+  command.add_flag("--resume", options.resume,
+                   "go on from the simulation in the work folder: longer, or after it was stopped");
+}
+
 void add_shortcut(CLI::App& command, PlanOptions& options) {
   command
       .add_option("--shortcut", options.shortcut_rounds,
@@ -276,6 +302,7 @@ int run_command_line(int argc, const char* const* argv) {
   GlobalOptions global;
   PrepareOptions prepare_options;
   PlanOptions plan_options;
+  SimulateOptions simulate_options;
   RenderOptions render_options;
   BenchOptions bench_options;
   fs::path folder;
@@ -349,6 +376,13 @@ int run_command_line(int argc, const char* const* argv) {
                         "go on from the plan in the work folder: more iterations, or after it was stopped");
   add_global(plan_command, global), add_threads(plan_command, global), add_progress(plan_command, global);
   plan_command.callback([&] { chosen = [&] { return plan(plan_options); }; });
+
+  CLI::App& simulate_command = *program.add_subcommand(
+      "simulate", "scene left to itself → bodies, motion: velocities, forces and motions that it tells");
+  add_scene(simulate_command, simulate_options.scene), add_simulate(simulate_command, simulate_options);
+  add_global(simulate_command, global), add_threads(simulate_command, global),
+      add_progress(simulate_command, global);
+  simulate_command.callback([&] { chosen = [&] { return simulate(simulate_options); }; });
 
   CLI::App& render_command = *program.add_subcommand("render", "path → frames, contact sheet, film");
   render_command.add_option("DIR", render_options.folder, "work folder with a plan; with --still a scene")

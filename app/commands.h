@@ -67,6 +67,18 @@ struct PlanOptions {
 };
 Outcome plan(const PlanOptions&);
 
+struct SimulateOptions {
+  SceneOptions scene;
+  fs::path out;
+  double duration_s = 5;     // > 0, from the start
+  fs::path script;           // more forces and motions; empty: the scene's alone
+  fs::path from;             // a folder with a plan or a simulation; empty: the scene's start
+  std::optional<int> frame;  // of `from`
+  bool resume = false;       // go on from the simulation in `out`
+};
+// The scene left to itself: initial velocities, forces and motions that it tells, no search.
+Outcome simulate(const SimulateOptions&);
+
 struct RenderOptions {
   fs::path folder;
   std::string frames;   // "1-30,47-327:2"; empty: all

@@ -15,6 +15,23 @@ namespace {
 constexpr int preferred_lanes = 16;
 constexpr int widths[] = {1, 4, 8, 16};
 
+// Nothing where nothing happens by itself.
+void add_script(const fem::World& world, Hasher& hasher) {
+  for (const fem::Force& force : world.forces) {
+    hasher.text("force").value(force.body).value(force.first_step).value(force.end_step);
+    hasher.matrix(force.force_n).value(force.mass_kg);
+    for (const int n : force.nodes) hasher.value(n);
+  }
+  for (const fem::Body& body : world.bodies) {
+    if (!body.velocity_m_s.isZero(0) || !body.angular_velocity_rad_s.isZero(0))
+      hasher.text("velocity").text(body.name).matrix(body.velocity_m_s).matrix(body.angular_velocity_rad_s);
+    if (body.track.keyframes.empty()) continue;
+    hasher.text("track").text(body.name).matrix(body.track.pivot_m);
+    for (const fem::Keyframe& k : body.track.keyframes)
+      hasher.value(k.at_s).matrix(k.position_m).matrix(k.turn_rad);
+  }
+}
+
 std::uint64_t hash_of(const fem::World& world) {
   Hasher hasher;
   hasher.value(world.robot).matrix(world.bounds_m.lower).matrix(world.bounds_m.upper).value(int(world.walls));
@@ -40,6 +57,7 @@ std::uint64_t hash_of(const fem::World& world) {
     for (const bool fixed : body.fixed) hasher.value(int(fixed));
     if (body.shape) hasher.value(limber::hash_of(*body.shape));
   }
+  add_script(world, hasher);
   return hasher.digest();
 }
 
@@ -180,26 +198,32 @@ class FemSystem::Propagator final : public plan::Propagator {
   State peeked_;
 };
 
-FemSystem::FemSystem(const fem::World& world, const GoalRules& goal)
-    : FemSystem(world, goal, hash_of(world)) {}
+FemSystem::FemSystem(const fem::World& world, const GoalRules& goal, std::optional<State> start)
+    : FemSystem(world, goal, std::move(start), hash_of(world)) {}
 
-FemSystem::FemSystem(const fem::World& world, const GoalRules& goal, std::uint64_t hash_of_world)
-    : world_(world), goal_(goal), goal_body_start_m_(Vec3::Zero()), hash_(hash_of_world) {
-  if (goal.body >= 0) goal_body_start_m_ = fem::center_of_mass_m(world, start(), goal.body);
+FemSystem::FemSystem(const fem::World& world, const GoalRules& goal, std::optional<State> start,
+                     std::uint64_t hash_of_world)
+    : world_(world),
+      given_start_(std::move(start)),
+      goal_(goal),
+      goal_body_start_m_(Vec3::Zero()),
+      hash_(hash_of_world) {
+  if (goal.body >= 0) goal_body_start_m_ = fem::center_of_mass_m(world, this->start(), goal.body);
   Hasher hasher;
   hasher.value(hash_);
   for (const int body : {goal.body, goal.above, goal.below, goal.clear_of}) hasher.value(body);
   for (const auto& rule : {goal.lost_below_m, goal.turn_tolerance_deg, goal.shape_tolerance_m})
     hasher.value(int(rule.has_value())).value(rule.value_or(0));
   for (const GoalRules& rules : goal.via) {
-    via_.push_back(std::unique_ptr<FemSystem>(new FemSystem(world, rules, hash_of_world)));
+    via_.push_back(std::unique_ptr<FemSystem>(new FemSystem(world, rules, given_start_, hash_of_world)));
     via_.back()->last_ = this;
     hasher.value(via_.back()->hash());
   }
+  if (given_start_) hasher.value(limber::hash_of(*given_start_));
   hash_ = hasher.digest();
 }
 
-State FemSystem::start() const { return fem::start_state(world_); }
+State FemSystem::start() const { return given_start_ ? *given_start_ : fem::start_state(world_); }
 Vec3 FemSystem::robot_center(const State& state) const {
   return fem::center_of_mass_m(world_, state, world_.robot);
 }

@@ -25,7 +25,9 @@ struct GoalRules {
 
 class FemSystem final : public plan::System {
  public:
-  explicit FemSystem(const fem::World& world, const GoalRules& = {});  // the world must outlive it
+  // The world must outlive it. Begins where the world does, or in a state of the caller's.
+  explicit FemSystem(const fem::World& world, const GoalRules& = {},
+                     std::optional<State> start = std::nullopt);
 
   State start() const override;
   Vec3 robot_center(const State&) const override;
@@ -49,8 +51,9 @@ class FemSystem final : public plan::System {
 
  private:
   class Propagator;
-  FemSystem(const fem::World&, const GoalRules&, std::uint64_t hash_of_world);
+  FemSystem(const fem::World&, const GoalRules&, std::optional<State> start, std::uint64_t hash_of_world);
   const fem::World& world_;
+  std::optional<State> given_start_;
   GoalRules goal_;
   std::vector<std::unique_ptr<FemSystem>> via_;
   const FemSystem* last_ = this;  // on the leg to the last goal: what is lost to it is lost

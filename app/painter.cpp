@@ -109,11 +109,12 @@ struct Shot::Painter::View {
     if (shot.way_m_.rows() > 0) renderer.add_lines(shot.way_m_, way_lines);
     if (shot.tree_m_.rows() > 0) renderer.add_lines(shot.tree_m_, tree_lines);
     if (film.forces)
-      for (std::size_t i = 0; i <= shot.bodies_.size(); ++i) {
+      for (std::size_t i = 0; i <= shot.bodies_.size() + shot.world_.forces.size(); ++i) {
+        const bool is_push = i == 0 || i > shot.bodies_.size();
         const Vec3 nowhere = shot.look_.stage.center();
         arrows.push_back(renderer.add_mesh(
             render::arrow_triangles(), render::arrow(nowhere, nowhere + Vec3::UnitX(), shot.arrow_radius_m_),
-            {.name = "arrow", .color_srgb = i == 0 ? push_color : contact_color, .roughness = 0.6}));
+            {.name = "arrow", .color_srgb = is_push ? push_color : contact_color, .roughness = 0.6}));
       }
   }
 

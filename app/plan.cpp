@@ -123,24 +123,22 @@ std::string text_of_parting(const Json& s) {
         pair.at("bodies").at(0).get<std::string>(), pair.at("bodies").at(1).get<std::string>(),
         mm(pair.at("depth_m")), mm(pair.at("moved_m").at(0)), mm(pair.at("moved_m").at(1)),
         mm(pair.at("gap_m")));
-  return text + fmt::format(
-                    "               in {} steps, {:.2f} CPU s; no node was moved by more than {:.2f} % of "
-                    "the robot's size\n",
-                    parted.at("steps").get<int>(), s.at("dynamics").at("parting_cpu_s").get<double>(),
-                    100 * parted.at("largest_move_of_robot_size").get<double>());
+  return text +
+         fmt::format(
+             "               in {} steps{}; no node was moved by more than {:.2f} % of the robot's size\n",
+             parted.at("steps").get<int>(),
+             s.contains("dynamics")
+                 ? fmt::format(", {:.2f} CPU s", s.at("dynamics").at("parting_cpu_s").get<double>())
+                 : "",
+             100 * parted.at("largest_move_of_robot_size").get<double>());
 }
 
-std::string text_of(const Json& s, const std::string& extra, const fs::path& file) {
+// Of the motion: what a plan and a simulation tell alike.
+std::string text_of_motion(const Json& s) {
   std::string volumes;
   for (const auto& [name, percent] : s.at("largest_volume_change_percent").items())
     volumes += fmt::format("{}{} {:.2f} %", volumes.empty() ? "" : ", ", name, percent.get<double>());
-  const Json &t = s.at("statistics"), &d = s.at("dynamics");
   return fmt::format(
-      "{}\n"
-      "{}{}"
-      "  search       {} iterations, {} nodes, {} diverged, {} rejected; {:.2f} CPU s, {:.2f} s\n"
-      "  memory       {:.1f} kB a node, {:.1f} where nothing is shared with the parent\n"
-      "  dynamics     contact {:.2f} × the force step; a lane takes {:.1f} µs to load, {:.1f} µs to store\n"
       "  motion       {:.2f} s in {} frames, time step {:.3g} ms\n"
       "  volume       changes at most: {}\n"
       "  penetration  at most {:.4f} m, {:.2f} % of the robot's size ({})\n"
@@ -148,17 +146,8 @@ std::string text_of(const Json& s, const std::string& extra, const fs::path& fil
       "{:.2f} % "
       "in the median\n"
       "  strain       at most {:.3f} ({})\n"
-      "  contact      at most {:.1f} N ({})\n"
-      "{}"
-      "  hashes       tree {}, trajectory {}\n"
-      "  file         {}\n",
-      s.at("explanation").get<std::string>(), s.contains("parted") ? text_of_parting(s) : "",
-      s.contains("legs") ? text_of_legs(s.at("legs")) : "", t.at("iterations").get<std::int64_t>(),
-      s.at("nodes").get<int>(), t.at("diverged").get<std::int64_t>(), t.at("rejected").get<std::int64_t>(),
-      t.at("cpu_s").get<double>(), t.at("wall_s").get<double>(), 1e-3 * s.at("node_bytes").get<double>(),
-      1e-3 * s.at("node_bytes_unshared").get<double>(), d.at("contact_of_force_step").get<double>(),
-      d.at("load_us").get<double>(), d.at("store_us").get<double>(), s.at("motion_s").get<double>(),
-      s.at("frames").get<int>(), 1e3 * s.at("dt_s").get<double>(), volumes,
+      "  contact      at most {:.1f} N ({})\n",
+      s.at("motion_s").get<double>(), s.at("frames").get<int>(), 1e3 * s.at("dt_s").get<double>(), volumes,
       s.at("deepest_penetration_m").get<double>(),
       100 * s.at("deepest_penetration_of_robot_size").get<double>(),
       s.at("penetration_between").get<std::string>(),
@@ -167,7 +156,33 @@ std::string text_of(const Json& s, const std::string& extra, const fs::path& fil
       s.at("self_overlap_of").get<std::string>(),
       100 * s.at("gap_at_contact").at("median_of_robot_size").get<double>(),
       s.at("largest_strain").get<double>(), s.at("largest_strain_of").get<std::string>(),
-      s.at("largest_contact_force_n").get<double>(), s.at("contact_between").get<std::string>(), extra,
+      s.at("largest_contact_force_n").get<double>(), s.at("contact_between").get<std::string>());
+}
+
+std::string text_of_simulation(const Json& s, const std::string& extra, const fs::path& file) {
+  return fmt::format("{}\n{}{}{}  hashes       trajectory {}\n  file         {}\n",
+                     s.at("explanation").get<std::string>(), s.contains("parted") ? text_of_parting(s) : "",
+                     text_of_motion(s), extra, s.at("trajectory_hash").get<std::string>(), file.string());
+}
+
+std::string text_of(const Json& s, const std::string& extra, const fs::path& file) {
+  const Json &t = s.at("statistics"), &d = s.at("dynamics");
+  return fmt::format(
+      "{}\n"
+      "{}{}"
+      "  search       {} iterations, {} nodes, {} diverged, {} rejected; {:.2f} CPU s, {:.2f} s\n"
+      "  memory       {:.1f} kB a node, {:.1f} where nothing is shared with the parent\n"
+      "  dynamics     contact {:.2f} × the force step; a lane takes {:.1f} µs to load, {:.1f} µs to store\n"
+      "{}"
+      "{}"
+      "  hashes       tree {}, trajectory {}\n"
+      "  file         {}\n",
+      s.at("explanation").get<std::string>(), s.contains("parted") ? text_of_parting(s) : "",
+      s.contains("legs") ? text_of_legs(s.at("legs")) : "", t.at("iterations").get<std::int64_t>(),
+      s.at("nodes").get<int>(), t.at("diverged").get<std::int64_t>(), t.at("rejected").get<std::int64_t>(),
+      t.at("cpu_s").get<double>(), t.at("wall_s").get<double>(), 1e-3 * s.at("node_bytes").get<double>(),
+      1e-3 * s.at("node_bytes_unshared").get<double>(), d.at("contact_of_force_step").get<double>(),
+      d.at("load_us").get<double>(), d.at("store_us").get<double>(), text_of_motion(s), extra,
       s.at("tree_hash").get<std::string>(), s.at("trajectory_hash").get<std::string>(), file.string());
 }
 
@@ -194,28 +209,51 @@ bool finished(const plan::Plan& plan) { return plan.solved() || plan.ending == p
 
 }  // namespace
 
-Json facts_of(const plan::Plan& plan, const fem::World& world, const FemSystem& system,
-              const MotionFigures& figures) {
+namespace {
+
+// What a plan and a simulation tell alike.
+Json facts_of_motion(const plan::Plan& plan, const fem::World& world, const MotionFigures& figures) {
+  const plan::Trajectory& path = plan.trajectory;
+  Json json{{"explanation", plan::explain(plan)},
+            {"dt_s", world.dt_s},
+            {"motion_s", double(path.end.step - plan.tree.states.steps()[0]) * world.dt_s},
+            {"frames", path.frames.size()},
+            {"tree_hash", hex(plan::hash_of(plan.tree))},
+            {"trajectory_hash", hex(plan::hash_of(path))}};
+  if (is_unmeasured(plan)) return json;
   Json volumes;
   for (std::size_t b = 0; b < world.bodies.size(); ++b)
     volumes[world.bodies[b].name] = std::round(1e4 * 100 * figures.largest_volume_change[b]) / 1e4;
-  Json json{{"solved", plan.solved()},
-            {"explanation", plan::explain(plan)},
-            {"seed", plan.settings.seed},
-            {"nodes", plan.tree.size()},
-            {"node_bytes", plan.tree.states.bytes() / std::size_t(plan.tree.size())},
-            {"node_bytes_unshared", plan.tree.states.bytes_unshared() / std::size_t(plan.tree.size())},
-            {"distance_m", plan.best_distance_m},
-            {"statistics", plan::json_of(plan.statistics)},
-            {"dt_s", world.dt_s},
-            {"motion_s", double(plan.trajectory.end.step) * world.dt_s},
-            {"frames", plan.trajectory.frames.size()},
-            {"largest_volume_change_percent", volumes},
-            {"tree_hash", hex(plan::hash_of(plan.tree))},
-            {"trajectory_hash", hex(plan::hash_of(plan.trajectory))}};
+  json["largest_volume_change_percent"] = volumes;
   if (!world.parting.pairs.empty()) json["parted"] = json_of(world.parting, world, figures);
-  if (!plan.settings.via.empty()) json["legs"] = legs_of(plan);
   json.update(json_of(figures));
+  return json;
+}
+
+Json facts_of_simulation(const plan::Plan& plan, const fem::World& world, const MotionFigures& figures) {
+  Json json = facts_of_motion(plan, world, figures);
+  json.erase("largest_force_n");  // of controls, and there are none
+  json["simulation"] = {{"duration_s", plan.simulation->duration_s},
+                        {"starts_at_s", double(plan.tree.states.steps()[0]) * world.dt_s},
+                        {"forces", world.forces.size()},
+                        {"whole", plan.simulation->ending == plan::Simulation::whole}};
+  return json;
+}
+
+}  // namespace
+
+Json facts_of(const plan::Plan& plan, const fem::World& world, const FemSystem& system,
+              const MotionFigures& figures) {
+  if (plan.simulation) return facts_of_simulation(plan, world, figures);
+  Json json = facts_of_motion(plan, world, figures);
+  json.update({{"solved", plan.solved()},
+               {"seed", plan.settings.seed},
+               {"nodes", plan.tree.size()},
+               {"node_bytes", plan.tree.states.bytes() / std::size_t(plan.tree.size())},
+               {"node_bytes_unshared", plan.tree.states.bytes_unshared() / std::size_t(plan.tree.size())},
+               {"distance_m", plan.best_distance_m},
+               {"statistics", plan::json_of(plan.statistics)}});
+  if (!plan.settings.via.empty()) json["legs"] = legs_of(plan);
   if (plan.solved()) return json;
   const Diagnosis diagnosis = diagnose(world, system, plan);
   json["explanation"] = json["explanation"].get<std::string>() + " " + diagnosis.text;
@@ -225,10 +263,12 @@ Json facts_of(const plan::Plan& plan, const fem::World& world, const FemSystem& 
 
 std::map<std::string, std::string> pictures_of(const scenes::Scene& scene, const fem::World& world,
                                                const plan::Plan& plan, const MotionFigures& figures) {
+  if (is_unmeasured(plan)) return {};
   VolumePlot volume = volume_plot(scene, world, figures, plan.settings.frames_per_second);
-  return {{"volume.svg", std::move(volume.svg)},
-          {"volume.png", std::move(volume.png)},
-          {"tree.svg", tree_svg(scene, world, plan)}};
+  std::map<std::string, std::string> pictures{{"volume.svg", std::move(volume.svg)},
+                                              {"volume.png", std::move(volume.png)}};
+  if (!plan.simulation) pictures["tree.svg"] = tree_svg(scene, world, plan);
+  return pictures;
 }
 
 plan::Settings settings_of(const scenes::Scene& scene, const PlanOptions& options) {
@@ -271,7 +311,9 @@ plan::Settings settings_of(const scenes::Scene& scene, const PlanOptions& option
 scenes::Scene read_scene(const PlanOptions& options) {
   std::vector<std::string> sets = options.scene.sets;
   if (!options.preset.empty()) sets.push_back("planner.preset=" + options.preset);
-  return scenes::read_scene_file(scenes::find_scene(options.scene.scene), sets);
+  scenes::Scene scene = scenes::read_scene_file(scenes::find_scene(options.scene.scene), sets);
+  scenes::require_plannable(scene);
+  return scene;
 }
 
 Outcome plan(const PlanOptions& options) {
@@ -297,7 +339,7 @@ Outcome plan(const PlanOptions& options, const scenes::Scene& scene) {
   std::optional<plan::Plan> earlier;
   Json earlier_summary;
   if (options.resume) {
-    PlanFolder folder = read_plan_folder(options.out);
+    PlanFolder folder = read_searched_folder(options.out);
     if (folder.plan.system_hash == system.hash()) require_of_world(folder.plan, world, options.out);
     earlier = std::move(folder.plan);
     earlier_summary = std::move(folder.summary);
@@ -361,15 +403,30 @@ void remove_what_shows_another_plan(const fs::path& folder, const Json& summary)
 Outcome keep_plan(const fs::path& folder, const scenes::Scene& scene, const std::vector<PreparedBody>& bodies,
                   const fem::World& world, const FemSystem& system, const plan::Plan& plan, const Json& extra,
                   const std::string& extra_text) {
-  const MotionFigures figures = measure_motion(world, bodies, plan.trajectory);
+  return keep_measured_plan(folder, scene, bodies, world, system, plan,
+                            measure_motion(world, bodies, plan.trajectory), extra, extra_text);
+}
+
+Outcome keep_measured_plan(const fs::path& folder, const scenes::Scene& scene,
+                           const std::vector<PreparedBody>& bodies, const fem::World& world,
+                           const FemSystem& system, const plan::Plan& plan, const MotionFigures& figures,
+                           const Json& extra, const std::string& extra_text) {
   Json summary = facts_of(plan, world, system, figures);
-  summary["dynamics"] = json_of(system.cost());
-  if (!world.parting.pairs.empty()) summary["dynamics"]["parting_cpu_s"] = world.parting.cpu_s;
+  if (!plan.simulation) {  // whose bytes depend on no clock
+    summary["dynamics"] = json_of(system.cost());
+    if (!world.parting.pairs.empty()) summary["dynamics"]["parting_cpu_s"] = world.parting.cpu_s;
+  }
   if (!extra.is_null()) summary.update(extra);
   remove_what_shows_another_plan(folder, summary);
   write_plan_folder(folder, plan, scene, bodies, summary);
-  for (const auto& [name, bytes] : pictures_of(scene, world, plan, figures)) write_file(folder / name, bytes);
+  const std::map<std::string, std::string> pictures = pictures_of(scene, world, plan, figures);
+  for (const char* name : {"volume.svg", "volume.png", "tree.svg"})
+    if (!pictures.contains(name)) fs::remove(folder / name);  // of what was here before
+  for (const auto& [name, bytes] : pictures) write_file(folder / name, bytes);
   update_manifest(folder, "plan", summary);
+  if (plan.simulation)
+    return {plan.simulation->ending == plan::Simulation::diverged ? exit_no_plan : exit_done, summary,
+            is_unmeasured(plan) ? "" : text_of_simulation(summary, extra_text, folder / "plan.npz")};
   return {plan.solved() ? exit_done : exit_no_plan, summary,
           text_of(summary, extra_text, folder / "plan.npz")};
 }
@@ -378,7 +435,7 @@ bool plan_is_up_to_date(const PlanOptions& options, const scenes::Scene& scene) 
   if (!fs::exists(options.out / "plan.npz")) return false;
   try {
     const std::vector<PreparedBody> bodies = prepare_bodies(scene, options.scene.data, options.out);
-    const PlanFolder folder = read_plan_folder(options.out);
+    const PlanFolder folder = read_searched_folder(options.out);
     const fem::World world = build_world(scene, bodies, State(folder.plan.tree.states[0]).positions);
     plan::Settings settings = settings_of(scene, options);
     const Json searches = folder.summary.value("portfolio", Json::object()).value("searches", Json::array());

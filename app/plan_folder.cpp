@@ -13,12 +13,14 @@ void write_plan_folder(const fs::path& folder, const plan::Plan& plan, const sce
                        const std::vector<PreparedBody>& bodies, const Json& summary) {
   Json cages;
   for (std::size_t b = 0; b < bodies.size(); ++b) cages[scene.bodies[b].name] = hex(hash_of(bodies[b].cage));
-  plan::write_plan(folder / "plan.npz", plan,
-                   {{"version", version},
-                    {"scene", scene.text},
-                    {"sets", scene.sets},
-                    {"cage_hashes", cages},
-                    {"summary", summary}});
+  Json given{{"version", version},
+             {"scene", scene.text},
+             {"sets", scene.sets},
+             {"cage_hashes", cages},
+             {"summary", summary}};
+  if (!scene.script.text.empty())
+    given["script"] = {{"text", scene.script.text}, {"name", scene.script.name_for_messages}};
+  plan::write_plan(folder / "plan.npz", plan, given);
 }
 
 namespace {
@@ -44,6 +46,9 @@ void require_summary(const PlanFolder& planned, const fs::path& file) {
         planned.summary.at("shortcut"),
         {{"cost", ""}, {"rounds", -1}, {"accepted", -1}, {"cpu_s", 0.5}, {"before", costs}, {"after", costs}},
         Keys::all, file.string() + ": given.summary.shortcut", remedy);
+  if (begins_elsewhere(planned))
+    require_like(planned.summary.at("from"), {{"folder", ""}, {"frame", -1}, {"trajectory_hash", ""}},
+                 Keys::all, file.string() + ": given.summary.from", "simulate anew with limber simulate");
   kinds_of(planned.cage_hashes, Json::object(), "cage_hashes");
   for (const auto& [body, hash] : planned.cage_hashes.items()) kinds_of(hash, "", "cage_hashes");
 }
@@ -61,8 +66,13 @@ PlanFolder read_plan_folder(const fs::path& folder) {
   result.sealed = read.sealed;
   const Json& extra = read.given;
   try {
+    scenes::ScriptText script;
+    if (extra.contains("script"))
+      extra.at("script").at("text").get_to(script.text),
+          extra.at("script").at("name").get_to(script.name_for_messages);
     result.scene = scenes::read_scene(extra.at("scene").get<std::string>(), file.string() + " (scene)",
-                                      extra.at("sets").get<std::vector<std::string>>());
+                                      extra.at("sets").get<std::vector<std::string>>(), script);
+    if (!result.plan.simulation) scenes::require_plannable(result.scene);
     result.summary = extra.at("summary");
     result.cage_hashes = extra.at("cage_hashes");
     require_summary(result, file);
@@ -72,6 +82,26 @@ PlanFolder read_plan_folder(const fs::path& folder) {
   }
   result.file_hash = hash_of(std::string_view(read_file(file)));
   return result;
+}
+
+PlanFolder read_searched_folder(const fs::path& folder) {
+  PlanFolder planned = read_plan_folder(folder);
+  if (planned.plan.simulation)
+    throw InputError(
+        fmt::format("{}: holds a simulation, which has no goal and no search; name the folder of a "
+                    "plan, or make one with limber plan",
+                    folder.string()));
+  return planned;
+}
+
+bool begins_elsewhere(const PlanFolder& planned) {
+  return planned.plan.simulation && planned.summary.contains("from");
+}
+
+FemSystem system_of(const PlanFolder& planned, const fem::World& world) {
+  if (!planned.plan.simulation) return FemSystem(world, goal_rules_of(planned.scene));
+  if (!begins_elsewhere(planned)) return FemSystem(world);
+  return FemSystem(world, {}, State(planned.plan.tree.states[0]));
 }
 
 void require_of_world(const plan::Plan& plan, const fem::World& world, const fs::path& folder) {
@@ -93,6 +123,7 @@ void require_of_world(const plan::Plan& plan, const fem::World& world, const fs:
 }
 
 fem::World world_of(const PlanFolder& planned, const std::vector<PreparedBody>& bodies) {
+  if (begins_elsewhere(planned)) return build_world(planned.scene, bodies);
   return build_world(planned.scene, bodies, State(planned.plan.tree.states[0]).positions);
 }
 

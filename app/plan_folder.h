@@ -32,6 +32,16 @@ Outcome keep_plan(const fs::path& folder, const scenes::Scene&, const std::vecto
                   const fem::World&, const FemSystem&, const plan::Plan&, const Json& extra,
                   const std::string& extra_text);
 
+// The same of a motion that is measured already.
+Outcome keep_measured_plan(const fs::path& folder, const scenes::Scene&, const std::vector<PreparedBody>&,
+                           const fem::World&, const FemSystem&, const plan::Plan&, const MotionFigures&,
+                           const Json& extra, const std::string& extra_text);
+
+// Of a simulation that a signal ended nothing is measured, so that it ends at once: no figures, no pictures.
+inline bool is_unmeasured(const plan::Plan& plan) {
+  return plan.simulation && plan.simulation->ending == plan::Simulation::stopped;
+}
+
 // All of a summary that follows from the plan: not what the dynamics cost, nor what came after the search.
 Json facts_of(const plan::Plan&, const fem::World&, const FemSystem&, const MotionFigures&);
 
@@ -41,6 +51,16 @@ std::map<std::string, std::string> pictures_of(const scenes::Scene&, const fem::
 
 // Throws InputError when plan.npz is missing, damaged, or not limber's.
 PlanFolder read_plan_folder(const fs::path& folder);
+
+// The same of a plan that was searched: throws InputError where the folder holds a simulation.
+PlanFolder read_searched_folder(const fs::path& folder);
+
+// Whether it is a simulation from a frame of another folder (its summary's "from"), not from the scene's
+// start.
+bool begins_elsewhere(const PlanFolder&);
+
+// The system that the folder's motion is of: of a simulation without a goal, and from where it began.
+FemSystem system_of(const PlanFolder&, const fem::World&);
 
 // Throws InputError where the plan's states, controls or frame times are none of this world: what follows
 // would reach beyond its nodes, or replay without end.

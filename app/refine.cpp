@@ -49,7 +49,7 @@ int same_node(const TetMesh& coarse, int node, const TetMesh& fine) {
 }  // namespace
 
 Outcome refine(const RefineOptions& options) {
-  const PlanFolder planned = read_plan_folder(options.folder);
+  const PlanFolder planned = read_searched_folder(options.folder);
   if (!planned.plan.solved())
     throw InputError(
         fmt::format("{}: its plan does not reach the goal, so there is no path to carry; plan on with limber "
@@ -64,7 +64,8 @@ Outcome refine(const RefineOptions& options) {
   sets.insert(sets.end(), finer.begin(), finer.end());
   sets.insert(sets.end(), options.sets.begin(), options.sets.end());
   const scenes::Scene scene = scenes::read_scene(
-      planned.scene.text, fmt::format("{} (scene)", (options.folder / "plan.npz").string()), sets);
+      planned.scene.text, fmt::format("{} (scene)", (options.folder / "plan.npz").string()), sets,
+      planned.scene.script);
   make_folder(options.out);
   const FolderLock lock(options.out, FolderLock::alone);
   const std::vector<PreparedBody> bodies = prepare_bodies(scene, options.data, options.out);

@@ -113,7 +113,7 @@ scenes::Scene filmed_as(const scenes::Scene& planned, const std::vector<std::str
   }
   std::vector<std::string> all = planned.sets;
   all.insert(all.end(), sets.begin(), sets.end());
-  return scenes::read_scene(planned.text, planned.name, all);
+  return scenes::read_scene(planned.text, planned.name, all, planned.script);
 }
 
 std::string suffix_of(const RenderOptions& options) {

@@ -81,15 +81,22 @@ void summary(const Findings& f, Page& page) {
     page.add("<div><dt>{}</dt><b class=\"{}\">{}</b><span>{}</span></div>\n", what, kind, value,
              escaped(more));
   };
-  figure("Plan", f.plan().solved() ? "solved" : "not solved",
-         fmt::format("ends {:.3g} m from the goal", f.plan().best_distance_m),
-         f.plan().solved() ? "kept" : "broken");
+  if (f.plan().simulation)
+    figure("Simulation", f.plan().simulation->ending == plan::Simulation::whole ? "whole" : "cut short",
+           plan::explain(f.plan()));
+  else
+    figure("Plan", f.plan().solved() ? "solved" : "not solved",
+           fmt::format("ends {:.3g} m from the goal", f.plan().best_distance_m),
+           f.plan().solved() ? "kept" : "broken");
   figure("Promises", all_kept ? "all kept" : "not all kept", fmt::format("{} checked", f.promises.size()),
          all_kept ? "kept" : "broken");
-  figure("Motion", fmt::format("{:.2f} s", double(f.plan().trajectory.end.step) * f.world.dt_s),
+  figure("Motion",
+         fmt::format("{:.2f} s",
+                     double(f.plan().trajectory.end.step - f.plan().tree.states.steps()[0]) * f.world.dt_s),
          fmt::format("{} frames, step {:.3g} ms", f.frames().size(), 1e3 * f.world.dt_s));
-  figure("Search", fmt::format("{:.2f} CPU s", s.cpu_s),
-         fmt::format("{} iterations, {} nodes", s.iterations, f.plan().tree.size()));
+  if (!f.plan().simulation)
+    figure("Search", fmt::format("{:.2f} CPU s", s.cpu_s),
+           fmt::format("{} iterations, {} nodes", s.iterations, f.plan().tree.size()));
   figure("Volume change", fmt::format("{:.2f} %", 100 * volume), "at most, of any body");
   figure("Penetration",
          fmt::format("{:.2f} %", 100 * f.figures.deepest_penetration_m / f.figures.robot_size_m),
@@ -282,7 +289,8 @@ void tables(const Findings& f, Page& page) {
     const PreparedBody& prepared = f.bodies[b];
     rows.push_back({body.name,
                     body.kind == fem::BodyKind::deformable ? "deformable"
-                    : body.moving                          ? "rigid"
+                    : body.pushed()                        ? "rigid"
+                    : body.moving                          ? "moves by keyframes"
                                                            : "stands still",
                     std::to_string(prepared.surface.positions.rows()),
                     std::to_string(prepared.surface.triangles.rows()),
@@ -298,7 +306,8 @@ void tables(const Findings& f, Page& page) {
              rows);
   page.add("<h2>Timings</h2>\n");
   const plan::Statistics& s = f.plan().statistics;
-  times.push_back({"search", seconds(s.cpu_s)});
+  const bool searched = !f.plan().simulation;
+  if (searched) times.push_back({"search", seconds(s.cpu_s)});
   const Json& dynamics = f.planned.summary.value("dynamics", Json::object());
   for (const char* part : {"elastic", "contact", "controls", "integration"})
     if (const auto key = std::string(part) + "_cpu_s"; dynamics.contains(key))
@@ -307,12 +316,14 @@ void tables(const Findings& f, Page& page) {
   if (const Json entries = read_manifest(f.folder); entries.contains("render"))
     times.push_back({"render, last run", seconds(entries.at("render").value("cpu_s", 0.0))});
   page.table({"stage", "CPU s"}, times);
+  if (searched)
+    page.add(
+        "<p class=\"note\">Wall time of the search: {:.3f} s. {} rollouts computed for {} iterations.</p>\n",
+        s.wall_s, s.rollouts, s.iterations);
   page.add(
-      "<p class=\"note\">Wall time of the search: {:.3f} s. {} rollouts computed for {} iterations.</p>\n",
-      s.wall_s, s.rollouts, s.iterations);
-  page.add(
-      "<h2>All figures of the plan</h2>\n<details class=\"card\"><summary>as <code>limber info</code> prints "
-      "them</summary>\n");
+      "<h2>All figures of the {}</h2>\n<details class=\"card\"><summary>as <code>limber info</code> prints "
+      "them</summary>\n",
+      searched ? "plan" : "simulation");
   page.table({"figure", "value"}, rows_of(f.planned.summary));
   page.add("</details>\n");
 }
@@ -321,7 +332,11 @@ void scene_text(const Findings& f, Page& page) {
   std::string sets;
   for (const std::string& set : f.scene().sets) sets += "# --set " + set + "\n";
   page.add("<h2>Scene</h2>\n<details class=\"card\"><summary>{}</summary>\n<pre>{}{}</pre></details>\n",
-           "the scene file, as it was planned", escaped(sets), escaped(f.scene().text));
+           f.plan().simulation ? "the scene file, as it was simulated" : "the scene file, as it was planned",
+           escaped(sets), escaped(f.scene().text));
+  if (const std::string& script = f.scene().script.text; !script.empty())
+    page.add("<details class=\"card\"><summary>{}</summary>\n<pre>{}</pre></details>\n",
+             escaped(f.scene().script.name_for_messages), escaped(script));
 }
 
 Json motion_meta(const Findings& f, Json bodies) {
@@ -349,10 +364,13 @@ Json motion_meta(const Findings& f, Json bodies) {
                                                       scene.cameras[0].fov_deg, scene.cameras[0].fill);
   if (!scene.cameras[0].keyframes.empty())
     camera.eye = scene.cameras[0].keyframes[0].eye_m, camera.target = scene.cameras[0].keyframes[0].target_m;
-  Json goal{{"center", json_of(f.plan().settings.goal.center_of_mass_m)},
+  Json goal;
+  if (!f.plan().simulation) {
+    goal = {{"center", json_of(f.plan().settings.goal.center_of_mass_m)},
             {"radius", f.plan().settings.goal.radius_m}};
-  if (scene.goal.box_m) goal["box"] = json_of(*scene.goal.box_m);
-  if (scene.goal.moves_with >= 0) goal["shifts"] = shifts;
+    if (scene.goal.box_m) goal["box"] = json_of(*scene.goal.box_m);
+    if (scene.goal.moves_with >= 0) goal["shifts"] = shifts;
+  }
   return {{"frames", f.frames().size()},
           {"frames_per_second", f.plan().trajectory.frames_per_second},
           {"bounds", json_of(scene.bounds_m)},
@@ -387,7 +405,7 @@ Outcome report(const fs::path& folder, const std::optional<fs::path>& file) {
   const PlanFolder planned = read_plan_folder(folder);
   const std::vector<PreparedBody> bodies = read_bodies_of(planned, folder);
   const fem::World world = build_world(planned.scene, bodies);
-  const FemSystem system(world, goal_rules_of(planned.scene));
+  const FemSystem system = system_of(planned, world);
   MotionFigures figures;
   const Outcome verified = verify_plan(folder, planned, bodies, world, figures);
   const Findings findings{
@@ -403,7 +421,7 @@ Outcome report(const fs::path& folder, const std::optional<fs::path>& file) {
   film(findings, page, result);
   plots(findings, page);
   promises(findings, page);
-  tree(findings, page);
+  if (!planned.plan.simulation) tree(findings, page);
   tables(findings, page);
   scene_text(findings, page);
   end(findings, page);

@@ -287,9 +287,10 @@ class Check {
     json_["dt_s"] = start->step_known ? Json(start->world.dt_s) : Json();
     tell("time step", start->step_known ? fmt::format("{:.3g} ms", 1e3 * start->world.dt_s)
                                         : "not known before cages are made; --work DIR makes them");
-    if (start->prepared)
+    const bool can_be_planned = scene_.lacks.empty();
+    if (can_be_planned && start->prepared)
       try_search(*start);
-    else
+    else if (can_be_planned)
       look_at_goals();
     const std::string prepare =
         start->prepared
@@ -297,9 +298,10 @@ class Check {
             : fmt::format("about {:.2g} CPU s, by the number of triangles; may be twice or half that",
                           json_.at("estimate").at("prepare_cpu_s").get<double>());
     tell("to prepare", prepare);
-    tell("to plan", plan_estimate_.empty()
-                        ? "not known before bodies are prepared; --work DIR prepares and tries"
-                        : plan_estimate_);
+    if (can_be_planned)
+      tell("to plan", plan_estimate_.empty()
+                          ? "not known before bodies are prepared; --work DIR prepares and tries"
+                          : plan_estimate_);
     paint(*start);
   }
 
@@ -412,12 +414,15 @@ class Check {
   Outcome ended() {
     const bool good = problems_.empty();
     json_["problems"] = problems_, json_["warnings"] = warnings_;
-    json_["can_be_planned"] = good;
+    const bool to_plan = scene_.lacks.empty();
+    if (good && !to_plan) tell("no plan", scene_.lacks);
+    json_["can_be_planned"] = good && to_plan, json_["can_be_simulated"] = good;
     for (const std::string& warning : warnings_) tell("warning", warning);
     for (const std::string& problem : problems_) tell("problem", problem);
     if (!good) json_["error"] = problems_.front(), json_["exit_code"] = int(exit_bad_input);
-    const std::string verdict = good ? "can be planned"
-                                     : fmt::format("cannot be planned: {} problem{}", problems_.size(),
+    const char* const done = to_plan ? "planned" : "simulated";
+    const std::string verdict = good ? fmt::format("can be {}", done)
+                                     : fmt::format("cannot be {}: {} problem{}", done, problems_.size(),
                                                    problems_.size() == 1 ? "" : "s");
     return {good ? exit_done : exit_bad_input, json_,
             fmt::format("{}: {}\n{}", file_.string(), verdict, text_)};
@@ -450,17 +455,20 @@ Outcome info_of_scene(const fs::path& file) {
       json["bodies"].push_back(json_of(body));
       text += line_of(json.at("bodies").back());
     }
-  json["goals"] = scene.via.size() + 1;
-  json["preset"] = scene.planner.preset, json["iterations"] = scene.planner.iterations;
+  const bool to_plan = scene.lacks.empty();
+  json["goals"] = to_plan ? scene.via.size() + 1 : 0;
+  if (to_plan) json["preset"] = scene.planner.preset, json["iterations"] = scene.planner.iterations;
   json["film"] = {{"size_px", {scene.film.width_px, scene.film.height_px}},
                   {"frames_per_second", scene.film.frames_per_second},
                   {"cameras", scene.cameras.size()}};
+  text += to_plan ? fmt::format("  goals        {}\n  planner      {}, {} iterations\n", scene.via.size() + 1,
+                                scene.planner.preset, scene.planner.iterations)
+                  : "  goals        none; it can be simulated\n";
   text += fmt::format(
-      "  goals        {}\n  planner      {}, {} iterations\n  film         {} x {}, {} frames a second, "
-      "cameras: {}\n"
+      "  film         {} x {}, {} frames a second, cameras: {}\n"
       "limber scene check {} loads its models and says more\n",
-      scene.via.size() + 1, scene.planner.preset, scene.planner.iterations, scene.film.width_px,
-      scene.film.height_px, scene.film.frames_per_second, scene.cameras.size(), file.string());
+      scene.film.width_px, scene.film.height_px, scene.film.frames_per_second, scene.cameras.size(),
+      file.string());
   return {exit_done, json, text};
 }
 

@@ -311,6 +311,34 @@ fem::BodyKind kind_of(const scenes::BodySpec& body) {
   return body.role == scenes::Role::obstacle ? fem::BodyKind::immovable : fem::BodyKind::rigid;
 }
 
+void set_script(const scenes::Scene& scene, const std::vector<PreparedBody>& prepared, fem::WorldSpec& spec) {
+  for (const scenes::MotionSpec& motion : scene.motions) {
+    fem::BodySpec& body = spec.bodies[std::size_t(motion.body)];
+    body.kind = fem::BodyKind::kinematic;
+    body.track.pivot_m = scene.bodies[std::size_t(motion.body)].pose.position_m;
+    for (const scenes::MotionSpec::Keyframe& k : motion.keyframes)
+      body.track.keyframes.push_back({k.at_s, k.position_m, k.angle_deg * std::numbers::pi / 180 * k.axis});
+  }
+  for (const scenes::ForceSpec& force : scene.forces) {
+    fem::ForceSpec& made =
+        spec.forces.emplace_back(fem::ForceSpec{force.body, force.from_s, force.to_s, force.force_n});
+    if (!force.box_m) continue;
+    const std::string& name = scene.bodies[std::size_t(force.body)].name;
+    made.nodes =
+        scenes::nodes_in(*force.box_m, scene.bounds_m, prepared[std::size_t(force.body)].cage.positions);
+    if (made.nodes.empty())
+      throw InputError(
+          fmt::format("{}: no node of the cage of {} is in the box of this force; enlarge or move it",
+                      force.where, name));
+    const std::vector<int>& held = spec.bodies[std::size_t(force.body)].fixed_nodes;
+    if (std::includes(held.begin(), held.end(), made.nodes.begin(), made.nodes.end()))
+      throw InputError(
+          fmt::format("{}: all nodes of {} in the box of this force are held, so it moves nothing; "
+                      "move the box, or hold fewer",
+                      force.where, name));
+  }
+}
+
 // What the parts of a body say, tet by tet.
 void set_parts(const scenes::BodySpec& body, const PreparedBody& prepared, fem::BodySpec& out) {
   if (body.parts.empty()) return;
@@ -445,11 +473,13 @@ fem::World build_world(const scenes::Scene& scene, const std::vector<PreparedBod
                          .mesh_independent = body.material.mesh_independent};
     fem_body.fixed_nodes = scenes::fixed_nodes(body, scene.bounds_m, prepared[b].cage.positions);
     fem_body.kind = kind_of(body);
+    fem_body.velocity_m_s = body.velocity_m_s, fem_body.angular_velocity_rad_s = body.angular_velocity_rad_s;
     fem_body.max_volume_change = body.max_volume_change;
     if (body.max_stretch && *body.max_stretch < scenes::any_stretch) fem_body.max_stretch = *body.max_stretch;
     set_parts(body, prepared[b], fem_body);
     spec.bodies.push_back(std::move(fem_body));
   }
+  set_script(scene, prepared, spec);
   set_contact(scene, prepared, spec);
   spec.robot = scene.robot;
   spec.bounds_m = scene.bounds_m;

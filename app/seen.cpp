@@ -88,7 +88,7 @@ class Surfaces {
       const fem::Body& body = world_.bodies[std::size_t(a)];
       const meshing::PlacedSurface& one = *now[std::size_t(a)];
       for (int b = a + 1; b < int(now.size()); ++b) {
-        if (!body.moving && !world_.bodies[std::size_t(b)].moving) continue;
+        if (!body.pushed() && !world_.bodies[std::size_t(b)].pushed()) continue;
         const double depth = meshing::overlap(one, *now[std::size_t(b)]).depth_m;
         if (depth > frame.overlap_m) frame.overlap_m = depth, frame.overlap_body = a, frame.overlap_other = b;
       }

@@ -238,10 +238,20 @@ void Shot::measure_forces() {
   double strongest = 0;
   for (const Control& control : plan_.trajectory.controls)
     strongest = std::max(strongest, double(largest_force(control)));
+  for (const fem::Force& force : world_.forces) strongest = std::max(strongest, force.force_n.norm());
+  if (strongest == 0)  // of a simulation: what the robot weighs
+    strongest = world_.bodies[std::size_t(world_.robot)].mass_kg * world_.gravity_m_s2.norm();
   const double robot = bounding_box(bodies_[std::size_t(world_.robot)].surface.positions).diagonal();
   strongest_push_n_ = strongest;
   arrow_m_per_n_ = strongest > 0 ? robot / strongest : 0;
   arrow_radius_m_ = 0.02 * robot;
+}
+
+bool Shot::acts(const fem::Force& force, int frame) const {
+  const std::vector<State>& all = plan_.trajectory.frames;
+  const std::int64_t step = all[std::size_t(frame)].step,
+                     next = frame + 1 < frames() ? all[std::size_t(frame) + 1].step : step + 1;
+  return force.first_step < next && force.end_step > step;
 }
 
 Points Shot::arrows_at(int frame) const {
@@ -249,17 +259,18 @@ Points Shot::arrows_at(int frame) const {
   const Vec3 robot = fem::center_of_mass_m(world_, state, world_.robot);
   const int bodies = int(world_.bodies.size());
   const Points nodes = fem::body_positions(world_, state, world_.robot);
-  // Inside the robot nothing would be seen of an arrow: it begins where a line along the force leaves it.
-  const auto put = [&](Points& ends, Eigen::Index row, const Vec3& at, const Vec3& force_n) {
+  // Inside a body nothing would be seen of an arrow: it begins where a line along the force leaves it.
+  const auto put = [&](Points& ends, Eigen::Index row, const Points& body, const Vec3& at,
+                       const Vec3& force_n) {
     if (force_n.norm() == 0) return;
     const Vec3 along = force_n.normalized();
-    const Vec3 from = at + std::max(0.0, (nodes * along).maxCoeff() - at.dot(along)) * along;
+    const Vec3 from = at + std::max(0.0, (body * along).maxCoeff() - at.dot(along)) * along;
     ends.row(row) = from.transpose();
     const double length =
         std::min(arrow_m_per_n_ * force_n.norm(), longest_arrow * arrow_m_per_n_ * strongest_push_n_);
     ends.row(row + 1) = (from + length * along).transpose();
   };
-  Points ends(2 * (1 + bodies), 3);  // the push; what each body does to the robot, last the walls
+  Points ends(2 * (1 + bodies + Eigen::Index(world_.forces.size())), 3);
   ends.rowwise() = robot.transpose();
   const auto push =
       std::find_if(pushes_.rbegin(), pushes_.rend(), [&](const Push& p) { return p.first_frame <= frame; });
@@ -269,7 +280,7 @@ Points Shot::arrows_at(int frame) const {
     Vec3 force_n = control.force_n.cast<double>();
     if (control.manipulation == Manipulation::interpolation || control.manipulation == Manipulation::hold)
       for (const Vec3& on_node : fem::control_forces_n(world_, state, control)) force_n += on_node;
-    put(ends, 0, at_point ? Vec3(nodes.row(control.node).transpose()) : robot, force_n);
+    put(ends, 0, nodes, at_point ? Vec3(nodes.row(control.node).transpose()) : robot, force_n);
   }
   // Each at the middle of its contacts, by their forces.
   std::vector<Vec3> force(std::size_t(bodies), Vec3::Zero()), place = force;
@@ -284,7 +295,18 @@ Points Shot::arrows_at(int frame) const {
     weight[slot] += contact.force_n.norm();
   }
   for (std::size_t b = 0; b < weight.size(); ++b)
-    if (weight[b] > 0) put(ends, 2 + 2 * Eigen::Index(b), place[b] / weight[b], force[b]);
+    if (weight[b] > 0) put(ends, 2 + 2 * Eigen::Index(b), nodes, place[b] / weight[b], force[b]);
+  for (std::size_t i = 0; i < world_.forces.size(); ++i) {
+    const fem::Force& given = world_.forces[i];
+    if (!acts(given, frame)) continue;
+    const Points body = fem::body_positions(world_, state, given.body);
+    const std::vector<double>& mass = world_.bodies[std::size_t(given.body)].node_mass_kg;
+    Vec3 sum = Vec3::Zero();
+    double all = 0;
+    for (const int n : given.nodes)
+      sum += mass[std::size_t(n)] * body.row(n).transpose(), all += mass[std::size_t(n)];
+    put(ends, 2 * (1 + bodies + Eigen::Index(i)), body, sum / all, given.force_n);
+  }
   return ends;
 }
 
@@ -321,6 +343,11 @@ std::uint64_t Shot::hash_of_look() const {
         .value(control.radius_m)
         .matrix(control.target_m)
         .value(control.max_force_n);
+  for (const fem::Force& force : world_.forces) {
+    if (!film.forces) break;
+    hasher.value(force.body).value(force.first_step).value(force.end_step).matrix(force.force_n);
+    for (const int n : force.nodes) hasher.value(n);
+  }
   const auto add_look = [&](const scenes::BodySpec& body) {
     hasher.matrix(body.color_srgb).value(body.opacity).value(body.roughness).value(body.metallic);
   };

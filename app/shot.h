@@ -72,8 +72,9 @@ class Shot {
   void measure_forces();
   void find_tree();
   // Arrows of a frame, rows 2i and 2i + 1 their ends; always the same number, those of no force without
-  // length.
+  // length: the control's push, what each body does to the robot and last the walls, each force of the world.
   Points arrows_at(int frame) const;
+  bool acts(const fem::Force&, int frame) const;  // in some step of those from this frame to the next
   std::uint64_t hash_of_look() const;
 
   const scenes::Scene& scene_;

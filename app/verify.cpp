@@ -48,7 +48,7 @@ Outcome verify_plan(const fs::path& folder, const PlanFolder& planned,
   }
   for (const scenes::BodySpec& body : planned.scene.scenery)
     check_origin(body.name, origin_of_scenery(planned.scene, body, folder), table);
-  check_plan(planned, bodies, world, figures, table);
+  check_plan(folder, planned, bodies, world, figures, table);
   check_pictures(folder, planned, world, figures, table);
   return outcome_of(table, json_of(figures));
 }

@@ -4,6 +4,7 @@
 #include "app/goal_terms.h"
 #include "app/manifest.h"
 #include "app/scene_world.h"
+#include "app/simulate.h"
 #include "app/tree_plot.h"
 #include "app/verify.h"
 #include "core/error.h"
@@ -11,6 +12,7 @@
 #include "core/progress.h"
 #include "plan/course.h"
 #include "plan/shortcut.h"
+#include "plan/simulation.h"
 
 namespace limber::app {
 
@@ -396,15 +398,95 @@ void check_shapes(const MotionFigures& figures, const fem::World& world, Promise
   check_seen(figures, world.touches_on_surfaces(), table);
 }
 
+// Also false where no simulation could begin there.
+bool starts_from(const fs::path& folder, const PlanFolder& other, int frame, const scenes::Scene& scene,
+                 const fem::World& world, const State& start) {
+  try {
+    return start_from(folder, other, frame, scene, world) == start;
+  } catch (const InputError&) {
+    return false;
+  }
+}
+
+// Where a simulation begins. Of a frame of another motion the folder must be here, as it was then.
+void check_beginning(const fs::path& folder, const PlanFolder& planned, const fem::World& world,
+                     Promises& table) {
+  const State start = planned.plan.tree.states[0];
+  if (!begins_elsewhere(planned)) {
+    table.row("it starts as the scene says", start == fem::start_state(world), "");
+    return;
+  }
+  const Json& from = planned.summary.at("from");
+  const fs::path other = folder / from.at("folder").get<std::string>();
+  const int frame = from.at("frame").get<int>();
+  const std::string promise = fmt::format("it starts as frame {} of another motion", frame),
+                    name = other.lexically_normal().string();
+  std::string why;
+  try {
+    const PlanFolder there = read_plan_folder(other);
+    read_bodies_of(there, other);
+    if (hex(plan::hash_of(there.plan.trajectory)) == from.at("trajectory_hash")) {
+      table.row(promise, starts_from(other, there, frame, planned.scene, world, start), name);
+      return;
+    }
+    why = "holds another motion now";
+  } catch (const InputError& error) {
+    why = "is not here any more";
+  }
+  table.measured(promise + ", taken for granted", fmt::format("{} {}", name, why));
+}
+
+void check_claims_of_simulation(const PlanFolder& planned, const fem::World& world, const FemSystem& system,
+                                const MotionFigures& figures, Promises& table) {
+  Json facts = facts_of(planned.plan, world, system, figures);
+  if (planned.summary.contains("from")) facts["from"] = planned.summary.at("from");
+  const std::string other = first_difference(facts, planned.summary);
+  table.row("what the simulation tells of itself is so", other.empty(),
+            other.empty() ? "" : "summary." + other + " is not");
+}
+
+void check_simulation(const fs::path& folder, const PlanFolder& planned,
+                      const std::vector<PreparedBody>& bodies, const fem::World& world,
+                      MotionFigures& figures, Promises& table) {
+  const plan::Plan& plan = planned.plan;
+  const plan::Simulation& simulation = *plan.simulation;
+  const FemSystem system = system_of(planned, world);
+  plan::Settings settings;
+  settings.frames_per_second = planned.scene.film.frames_per_second / planned.scene.film.speed;
+  table.row("its frames are as many a second as the scene says",
+            plan.trajectory.frames_per_second == settings.frames_per_second,
+            fmt::format("{:g}", settings.frames_per_second));
+  table.row("the simulation is of this world and its script", plan.system_hash == system.hash(),
+            hex(system.hash()));
+  if (!begins_elsewhere(planned)) check_start(plan, world, table);
+  check_beginning(folder, planned, world, table);
+
+  const Replay replay(system, plan, settings);
+  const plan::Course& course = replay.course();
+  check_path(plan, settings, replay, table);
+  Control nothing;
+  nothing.steps = std::int32_t(plan.trajectory.end.step - system.start().step);
+  table.row("nothing acts but what the scene says", plan.trajectory.controls == std::vector{nothing}, "");
+  const std::int64_t asked = plan::steps_of_simulation(system, simulation.duration_s);
+  table.row("it lasts as long as was asked for",
+            simulation.ending == plan::Simulation::whole && nothing.steps == asked,
+            fmt::format("{:.4g} of {:.4g} s", nothing.steps * world.dt_s, simulation.duration_s));
+  figures = measure_motion(
+      world, bodies, {plan.trajectory.controls, 0, settings.frames_per_second, course.frames, course.end});
+  check_shapes(figures, world, table);
+  check_claims_of_simulation(planned, world, system, figures, table);
+}
+
 }  // namespace
 
-void check_plan(const PlanFolder& planned, const std::vector<PreparedBody>& bodies, const fem::World& world,
-                MotionFigures& figures, Promises& table) {
+void check_plan(const fs::path& folder, const PlanFolder& planned, const std::vector<PreparedBody>& bodies,
+                const fem::World& world, MotionFigures& figures, Promises& table) {
   const plan::Plan& plan = planned.plan;
-  const FemSystem system(world, goal_rules_of(planned.scene));
-  const plan::Settings settings = settings_for(planned.scene, plan.settings);
   table.row("one hash stands over all of plan.npz", planned.sealed,
             planned.sealed ? "" : "it is of an older limber, and has none; plan anew");
+  if (plan.simulation) return check_simulation(folder, planned, bodies, world, figures, table);
+  const FemSystem system = system_of(planned, world);
+  const plan::Settings settings = settings_for(planned.scene, plan.settings);
   const std::string other = first_difference(plan::json_of(settings), plan::json_of(plan.settings));
   table.row("the plan's settings are the scene's", other.empty(), other.empty() ? "" : other + " is not");
   table.row("the plan is of this world", plan.system_hash == system.hash(), hex(system.hash()));
@@ -429,11 +511,12 @@ void check_pictures(const fs::path& folder, const PlanFolder& planned, const fem
   const Json manifest = read_manifest(folder);
   const Json entry = manifest.value("plan", Json());
   const std::string other = first_difference(planned.summary, entry);
-  table.row("manifest.json tells of this plan", other.empty(),
+  const std::string what = planned.plan.simulation ? "simulation" : "plan";
+  table.row("manifest.json tells of this " + what, other.empty(),
             other.empty() ? "" : (other == "." ? "plan" : "plan." + other) + " is another's");
   for (const auto& [name, content] : pictures_of(planned.scene, world, planned.plan, figures)) {
     const bool there = fs::exists(folder / name);
-    table.row(name + " shows this plan", there && read_file(folder / name) == content,
+    table.row(name + " shows this " + what, there && read_file(folder / name) == content,
               there ? "" : "it is missing");
   }
 }

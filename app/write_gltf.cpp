@@ -191,7 +191,7 @@ class Writer {
     }
     std::vector<Pose> poses;
     for (const Points& cage : cages) poses.push_back(best_fit(rest, cage));
-    if (body.kind == fem::BodyKind::rigid)
+    if (body.kind != fem::BodyKind::deformable)
       animate(add_root(node), poses);
     else
       add_skin(add_root(node), b, rest, cages, poses);

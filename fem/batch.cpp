@@ -26,7 +26,7 @@ Outcome judge(const World& world, const State& state) {
   const Vec3 center = world.bounds_m.center();
   const double far = 2 * world.bounds_m.diagonal() + 1e6 * !world.walls;
   for (const Body& body : world.bodies) {
-    for (int n = 0; n < body.node_count() && body.moving; ++n)
+    for (int n = 0; n < body.node_count() && body.pushed(); ++n)
       for (int c = 0; c < 3; ++c) {
         const std::size_t k = std::size_t(3 * (body.first_node + n) + c);
         const float x = state.positions[k], v = state.velocities[k];
@@ -76,7 +76,7 @@ struct Batch::Impl {
   void rest_stale_lanes() {
     for (std::size_t l = 0; l < lanes.size(); ++l)
       if (std::exchange(lanes[l].stale, false))
-        stepper.load(int(l), rest.positions.data(), rest.velocities.data(), {}, false);
+        stepper.load(int(l), 0, rest.positions.data(), rest.velocities.data(), {}, false);
   }
 };
 
@@ -96,7 +96,8 @@ void Batch::load(int lane, const State& state, const Control& control) {
   LIMBER_CHECK(control.steps >= 0, control.steps);
   Stopwatch watch;
   impl_->lanes.at(std::size_t(lane)) = {control, control.steps, state, {}};
-  impl_->stepper.load(lane, state.positions.data(), state.velocities.data(), control, control.steps > 0);
+  impl_->stepper.load(lane, state.step, state.positions.data(), state.velocities.data(), control,
+                      control.steps > 0);
   impl_->cost.load_s += watch.lap_s(), ++impl_->cost.loads;
   if (control.steps == 0) impl_->finish(lane);
 }

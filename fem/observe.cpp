@@ -96,7 +96,7 @@ double kinetic_energy_j(const World& world, const State& state) {
 double kinetic_energy_j(const World& world, const State& state, int index) {
   const Body& body = world.bodies.at(std::size_t(index));
   double energy = 0;
-  for (int n = 0; n < body.node_count() && body.moving; ++n)
+  for (int n = 0; n < body.node_count() && body.pushed(); ++n)
     energy += 0.5 * body.node_mass_kg[n] * velocity(state, body.first_node + n).squaredNorm();
   return energy;
 }
@@ -229,7 +229,7 @@ Penetration deepest_penetration(const World& world, const State& state) {
     const Body& one = world.bodies[a];
     for (int b = a + 1; b < int(world.bodies.size()); ++b) {
       const Body& two = world.bodies[b];
-      if (!one.moving && !two.moving) continue;
+      if (!one.pushed() && !two.pushed()) continue;
       const auto overlap = detail::deepest_overlap({positions[a], one.cage.tets, one.surface},
                                                    {positions[b], two.cage.tets, two.surface});
       if (overlap.depth_m > deepest.depth_m) deepest = {overlap.depth_m, a, b, overlap.place};
@@ -250,7 +250,7 @@ int piercing_edges(const World& world, const State& state) {
   for (int a = 0; a < int(world.bodies.size()); ++a)
     for (int b = a + 1; b < int(world.bodies.size()); ++b) {
       const Body &one = world.bodies[a], &two = world.bodies[b];
-      if (one.moving || two.moving)
+      if (one.pushed() || two.pushed())
         count += detail::passing_edges({body_positions(world, state, a), one.cage.tets, one.surface},
                                        {body_positions(world, state, b), two.cage.tets, two.surface});
     }

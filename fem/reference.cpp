@@ -13,7 +13,7 @@ ReferenceState reference_state(const State& s) {
 
 void advance(const World& world, const Control& control, ReferenceState& state) {
   detail::Stepper<double> stepper(world, 1, detail::best_isa());
-  stepper.load(0, state.positions.data(), state.velocities.data(), control, true);
+  stepper.load(0, state.step, state.positions.data(), state.velocities.data(), control, true);
   for (int s = 0; s < control.steps; ++s) stepper.step();
   stepper.store(0, state.positions.data(), state.velocities.data());
   state.step += control.steps;

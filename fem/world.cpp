@@ -6,6 +6,7 @@
 #include <limits>
 #include <map>
 #include <numbers>
+#include <numeric>
 #include <set>
 
 #include <Eigen/LU>
@@ -72,6 +73,12 @@ void check(const BodySpec& spec) {
     if (n < 0 || n >= nodes)
       throw InputError(
           fmt::format("body {}: fixed node {} does not exist; nodes are 0 to {}", spec.name, n, nodes - 1));
+  for (std::size_t k = 0; k < spec.track.keyframes.size(); ++k)
+    if (!(spec.track.keyframes[k].at_s > (k == 0 ? 0 : spec.track.keyframes[k - 1].at_s)))
+      throw InputError(fmt::format("body {}: keyframe {} is at {} s; keyframes begin after 0 and ascend",
+                                   spec.name, k, spec.track.keyframes[k].at_s));
+  if (!spec.velocity_m_s.allFinite() || !spec.angular_velocity_rad_s.allFinite())
+    throw InputError(fmt::format("body {}: its velocity at the start is not finite", spec.name));
   if (spec.kind == BodyKind::rigid && !spec.fixed_nodes.empty())
     throw InputError(fmt::format(
         "body {}: node {} of a rigid body is fixed; fix none, or make the body immovable or deformable",
@@ -109,14 +116,17 @@ Body make_body(const BodySpec& spec) {
   body.surface = boundary_triangles(body.cage.tets);
   body.surface_nodes = vertices_of(body.surface);
   const int nodes = body.node_count();
-  body.fixed.assign(std::size_t(nodes), spec.kind == BodyKind::immovable);
   body.kind = spec.kind;
+  body.velocity_m_s = spec.velocity_m_s, body.angular_velocity_rad_s = spec.angular_velocity_rad_s;
+  body.track = spec.track;
+  const bool kinematic = spec.kind == BodyKind::kinematic;
+  body.fixed.assign(std::size_t(nodes), spec.kind == BodyKind::immovable || kinematic);
   body.max_volume_change = spec.max_volume_change;
   body.shape = spec.shape;
   body.max_stretch = spec.max_stretch;
   body.self_contact = spec.self_contact && spec.kind == BodyKind::deformable;
   for (int n : spec.fixed_nodes) body.fixed[n] = true;
-  body.moving = std::find(body.fixed.begin(), body.fixed.end(), false) != body.fixed.end();
+  body.moving = kinematic || std::find(body.fixed.begin(), body.fixed.end(), false) != body.fixed.end();
   body.node_mass_kg.assign(std::size_t(nodes), 0.0);
   body.phong = spec.phong && spec.shape && body.moving && spec.kind == BodyKind::deformable;
   body.rest_volume_m3 = volume(body.cage);
@@ -470,7 +480,7 @@ void append_topology(const Body& body, int index, Topology& topology) {
   Topology::Body& range = topology.bodies[index];
   range.first_node = body.first_node, range.last_node = body.first_node + body.node_count();
   range.first_tet = body.first_tet, range.last_tet = body.first_tet + int(body.cage.tets.rows());
-  range.moving = body.moving;
+  range.moving = body.moving, range.pushed = body.pushed();
   for (int n : body.surface_nodes) range.surface_nodes.push_back(body.first_node + n);
   append_tets(body, topology);
   range.first_point = int(topology.points.size());
@@ -482,7 +492,7 @@ void append_topology(const Body& body, int index, Topology& topology) {
 void check_places(const World& world) {
   const double size = world.bounds_m.diagonal();
   for (const Body& body : world.bodies)
-    for (int n = 0; n < body.node_count() && world.walls && body.moving; ++n)
+    for (int n = 0; n < body.node_count() && world.walls && body.pushed(); ++n)
       for (int c = 0; c < 3; ++c) {
         const double x = body.cage.positions(n, c);
         if (x < world.bounds_m.lower[c] - 1e-6 * size || x > world.bounds_m.upper[c] + 1e-6 * size)
@@ -494,7 +504,7 @@ void check_places(const World& world) {
   for (std::size_t a = 0; a < world.bodies.size(); ++a)
     for (std::size_t b = a + 1; b < world.bodies.size(); ++b) {
       const Body &one = world.bodies[a], &two = world.bodies[b];
-      if ((!one.moving && !two.moving) || world.touches_on_surfaces()) continue;
+      if ((!one.pushed() && !two.pushed()) || world.touches_on_surfaces()) continue;
       const auto overlap = detail::deepest_overlap({one.cage.positions, one.cage.tets, one.surface},
                                                    {two.cage.positions, two.cage.tets, two.surface});
       if (overlap.depth_m > 1e-6 * size)
@@ -553,6 +563,38 @@ void choose_step(double max_dt_s, World& world) {
         stiffest->name, world.dt_s));
 }
 
+Force make_force(const ForceSpec& spec, const World& world) {
+  const auto refuse = [](const std::string& why) { throw InputError(why); };
+  if (spec.body < 0 || spec.body >= int(world.bodies.size()))
+    refuse(fmt::format("a force acts on body {}, and there are {}", spec.body, world.bodies.size()));
+  const Body& body = world.bodies[std::size_t(spec.body)];
+  if (!body.pushed())
+    refuse(fmt::format("body {}: a force acts on it, and none of its nodes can be pushed", body.name));
+  if (!(spec.from_s >= 0 && spec.to_s > spec.from_s && spec.to_s / world.dt_s < 1e15))
+    refuse(fmt::format("body {}: a force acts on it from {} to {} s, which is no time", body.name,
+                       spec.from_s, spec.to_s));
+  if (!spec.force_n.allFinite()) refuse(fmt::format("body {}: a force on it is not finite", body.name));
+  Force force{spec.body,
+              std::llround(spec.from_s / world.dt_s),
+              std::llround(spec.to_s / world.dt_s),
+              spec.force_n,
+              {},
+              body.mass_kg};
+  std::vector<int> nodes = spec.nodes;
+  if (nodes.empty()) {
+    nodes.resize(std::size_t(body.node_count()));
+    std::iota(nodes.begin(), nodes.end(), 0);
+  } else {
+    force.mass_kg = 0;
+    for (const int n : nodes) force.mass_kg += body.node_mass_kg.at(std::size_t(n));
+  }
+  std::copy_if(nodes.begin(), nodes.end(), std::back_inserter(force.nodes),
+               [&](int n) { return !body.fixed[std::size_t(n)]; });
+  if (force.nodes.empty())
+    refuse(fmt::format("body {}: a force acts on nodes of it that are all held", body.name));
+  return force;
+}
+
 }  // namespace
 
 World build_world(const WorldSpec& spec) {
@@ -565,7 +607,7 @@ World build_world(const WorldSpec& spec) {
   world.rest_speed_m_s = spec.rest_speed_m_s;
   world.part_overlaps = spec.part_overlaps;
   for (const BodySpec& body : spec.bodies) world.bodies.push_back(make_body(body));
-  if (!world.bodies[spec.robot].moving)
+  if (!world.bodies[spec.robot].pushed())
     throw InputError(
         fmt::format("body {}: the robot has no node that can move", world.bodies[spec.robot].name));
 
@@ -585,7 +627,7 @@ World build_world(const WorldSpec& spec) {
       append_nodes(body, tables);
       append_topology(body, int(b), world.topology);
       if (body.kind == BodyKind::rigid) world.rigid_tables[b] = make_rigid(body);
-      if (!moving || body.kind == BodyKind::rigid) continue;
+      if (!moving || body.kind != BodyKind::deformable) continue;
       const ElementTables<double> elements = make_elements(body);
       body.elastic_dt_limit_s = largest_stable_step(body, elements);
       append(elements, int(b), body.first_node, tables.elements);
@@ -603,6 +645,7 @@ World build_world(const WorldSpec& spec) {
   }
   world.tables = single_precision(tables);
   choose_step(spec.max_dt_s, world);
+  for (const ForceSpec& force : spec.forces) world.forces.push_back(make_force(force, world));
   detail::make_surface_tables(spec.contact_offset_m, world);
   check_places(world);
   detail::set_start(spec, world);
@@ -628,7 +671,39 @@ State rest_state(const World& world) {
 State start_state(const World& world) {
   State state = rest_state(world);
   state.positions = world.start_positions;
+  for (const Body& body : world.bodies) {
+    if (!body.pushed()) continue;
+    using Rows = Eigen::Matrix<float, Eigen::Dynamic, 3, Eigen::RowMajor>;
+    const Eigen::Map<const Rows> places(&state.positions[std::size_t(3 * body.first_node)], body.node_count(),
+                                        3);
+    const Vec3 center = center_of(body, places.cast<double>());
+    for (int n = 0; n < body.node_count(); ++n) {
+      if (body.fixed[std::size_t(n)]) continue;
+      const Vec3 from_center = places.row(n).cast<double>().transpose() - center;
+      const Vec3f velocity =
+          (body.velocity_m_s + body.angular_velocity_rad_s.cross(from_center)).cast<float>();
+      std::copy_n(velocity.data(), 3, &state.velocities[std::size_t(3 * (body.first_node + n))]);
+    }
+  }
+  follow_keyframes(world, state);
   return state;
+}
+
+void follow_keyframes(const World& world, State& state) {
+  for (const Body& body : world.bodies) {
+    if (body.kind != BodyKind::kinematic) continue;
+    const Pose now = pose_at(body.track, double(state.step) * world.dt_s),
+               next = pose_at(body.track, double(state.step + 1) * world.dt_s);
+    for (int n = 0; n < body.node_count(); ++n) {
+      const Vec3 from_pivot = body.cage.positions.row(n).transpose() - body.track.pivot_m;
+      const Vec3f place = (now.place_m + now.turn * from_pivot).cast<float>();
+      const Vec3f velocity =
+          ((next.place_m - now.place_m + (next.turn - now.turn) * from_pivot) / world.dt_s).cast<float>();
+      const std::size_t k = std::size_t(3 * (body.first_node + n));
+      std::copy_n(place.data(), 3, &state.positions[k]),
+          std::copy_n(velocity.data(), 3, &state.velocities[k]);
+    }
+  }
 }
 
 }  // namespace limber::fem

@@ -12,6 +12,7 @@
 #include "core/state.h"
 #include "fem/detail/surface_tables.h"
 #include "fem/detail/tables.h"
+#include "fem/script.h"
 
 namespace limber::fem {
 
@@ -34,8 +35,9 @@ struct Material {
 
 enum class BodyKind {
   deformable,
-  rigid,     // moves as one piece, by gravity, contact and controls
-  immovable  // no node ever moves
+  rigid,      // moves as one piece, by gravity, contact and controls
+  immovable,  // no node ever moves
+  kinematic   // moves as one piece by its keyframes: it pushes, and nothing pushes it
 };
 
 struct BodySpec {
@@ -54,6 +56,9 @@ struct BodySpec {
   // none has: then contact is between the cages. Shared, for it is large and never changes.
   std::shared_ptr<const ContactShape> shape = nullptr;
   bool phong = false;  // the cage moves that surface by Phong Deformation (docs/binding.md); else linearly
+  // At the start, of a body that is pushed; it turns about its centre of mass. Held nodes do not move.
+  Vec3 velocity_m_s = Vec3::Zero(), angular_velocity_rad_s = Vec3::Zero();
+  Track track = {};  // kinematic
 };
 
 struct WorldSpec {
@@ -70,6 +75,7 @@ struct WorldSpec {
   double rest_speed_m_s = 0;
   double contact_offset_m = 0;  // ≥ 0: fine surfaces that near push each other
   bool part_overlaps = true;    // fine surfaces that overlap where bodies start are parted, else refused
+  std::vector<ForceSpec> forces = {};
   // World::start_positions of a world of this spec, which spares it the parting; empty: not known.
   std::vector<float> start_positions = {};
 };
@@ -81,6 +87,7 @@ struct Body {
   BodyKind kind;
   bool self_contact;  // as asked for; false unless deformable
   bool moving;        // false: static, not part of State
+  bool pushed() const { return moving && kind != BodyKind::kinematic; }  // forces count
   TetMesh cage;       // rest; positions rounded to float32, as the simulation has them
   int first_node;     // the body's row 0 among the world's nodes; for moving bodies also among those of State
   int first_tet;      // its tet 0 among the world's
@@ -94,6 +101,8 @@ struct Body {
   std::shared_ptr<const ContactShape> shape;  // as given
   bool phong;                             // as asked for; false unless deformable, moving and with a shape
   double max_volume_change, max_stretch;  // as asked for
+  Vec3 velocity_m_s, angular_velocity_rad_s;        // as asked for
+  Track track;                                      // likewise
   std::vector<Eigen::Matrix3d> inverse_rest_edges;  // (T) of the edges from a tet's node 0, as columns
   double stiffness_share;     // by which the elements' stiffness is multiplied; 1 unless mesh_independent
   double elastic_dt_limit_s;  // largest stable step of the damped elastic body; infinite unless deformable
@@ -138,12 +147,14 @@ struct World {
   std::vector<float> start_positions;  // (3 × moving_nodes) rest shapes and places, unless they were parted
   Parting parting;
   bool part_overlaps;                            // as asked for
+  std::vector<Force> forces;                     // in the order of WorldSpec
   std::vector<detail::RigidTable> rigid_tables;  // a body; empty unless it is rigid
 };
 
 // Throws InputError naming body and element: a cage that is not valid, a node in no tet, a fixed node that
 // does not exist or belongs to a rigid body, a material out of range, a robot that is missing or cannot move,
-// a body outside the bounds, two bodies that overlap at the start (and how deep) and are not parted,
+// a body outside the bounds, a force between no times or on a body or nodes that nothing can push, keyframes
+// that do not ascend from above 0, two bodies that overlap at the start (and how deep) and are not parted,
 // coordinates too large for float32, a step too small to be of use, start_positions of another number. Throws
 // Interrupted after a stop signal.
 World build_world(const WorldSpec&);
@@ -158,7 +169,10 @@ CageOverlap cage_overlap(const TetMesh& one, const TetMesh& two);
 
 // All moving bodies in their rest shapes and places, at rest.
 State rest_state(const World&);
-// Where all begins: the same, or as bodies that overlap there were parted.
+// Where all begins: the same, or as bodies that overlap there were parted, with the velocities at the start.
 State start_state(const World&);
+// Puts kinematic bodies where their keyframes have them at state.step, with the velocities of the step that
+// begins.
+void follow_keyframes(const World&, State& state);
 
 }  // namespace limber::fem

@@ -133,6 +133,7 @@ class Runner {
     if (step_of_next_frame() > state_.step) return;
     for (; step_of_next_frame() <= state_.step; ++next_frame_)  // several where a step lasts longer
       if (options_.keep_frames) course_.frames.push_back(state_);
+    if (options_.keep_frames && options_.watch) options_.watch(state_);
     if (!options_.measure) return;
     const Measures now = system_.measures(state_);
     Costs& costs = course_.costs;

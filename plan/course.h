@@ -2,6 +2,7 @@
 // Method: docs/planning.md.
 #pragma once
 
+#include <functional>
 #include <limits>
 #include <span>
 #include <string>
@@ -54,6 +55,7 @@ struct CourseOptions {
   // Throws Interrupted soon after a stop signal, as where there is nothing_to_keep(); else whoever calls has
   // something to keep.
   bool stoppable = false;
+  std::function<void(const State&)> watch = {};  // called with every frame that is kept
 };
 
 // Fills what is out. A course depends on itself and the options alone, save that `race` ends losers sooner or

@@ -83,6 +83,9 @@ const char* name_of(Ending ending) {
   return "";
 }
 
+constexpr std::pair<Simulation::Ending, const char*> simulation_endings[] = {
+    {Simulation::whole, "whole"}, {Simulation::stopped, "stopped"}, {Simulation::diverged, "diverged"}};
+
 // Reads one plan.npz; every complaint names the file.
 class Reader {
  public:
@@ -327,6 +330,69 @@ Json json_of(const Statistics& s) {
           {"cpu_s", s.cpu_s},           {"wall_s", s.wall_s}};
 }
 
+namespace {
+
+Json json_of(const Simulation& simulation) {
+  const auto ending = std::find_if(std::begin(simulation_endings), std::end(simulation_endings),
+                                   [&](const auto& e) { return e.first == simulation.ending; });
+  return {{"simulation", {{"duration_s", simulation.duration_s}, {"ending", ending->second}}}};
+}
+
+Json json_of_search(const Plan& plan) {
+  Json meta;
+  meta["solved"] = plan.solved();
+  meta["ending"] = name_of(plan.ending);
+  meta["goal_node"] = plan.goal_node;
+  meta["best_node"] = plan.best_node;
+  meta["best_distance_m"] = plan.best_distance_m;
+  for (std::size_t leg = 0; leg < plan.legs.size() && !plan.settings.via.empty(); ++leg)
+    meta["legs"].push_back(
+        {{"root", plan.legs[leg].root}, {"first_iteration", plan.legs[leg].first_iteration}});
+  meta["settings"] = json_of(plan.settings);
+  meta["statistics"] = json_of(plan.statistics);
+  return meta;
+}
+
+void read_simulation(const Reader& reader, const Json& json, double frames_per_second, Plan& plan) {
+  Simulation& simulation = plan.simulation.emplace();
+  json.at("duration_s").get_to(simulation.duration_s);
+  reader.require(simulation.duration_s > 0 && std::isfinite(simulation.duration_s),
+                 fmt::format("it lasts {} s", simulation.duration_s));
+  const auto ending = std::find_if(std::begin(simulation_endings), std::end(simulation_endings),
+                                   [&](const auto& e) { return json.at("ending") == e.second; });
+  reader.require(ending != std::end(simulation_endings),
+                 "its ending is " + json.at("ending").dump() + ", which is none");
+  simulation.ending = ending->first;
+  reader.require(frames_per_second >= least_frames_per_second && frames_per_second <= most_frames_per_second,
+                 fmt::format("frames_per_second is {}", frames_per_second));
+  plan.settings.frames_per_second = frames_per_second;
+  reader.require(plan.tree.size() == 2, "a simulation has a start and an end, and nothing else");
+  plan.best_node = 1;
+}
+
+void read_search(const Reader& reader, const Json& meta, const std::string& file, Plan& plan) {
+  plan.settings = settings_from_json(meta.at("settings"), file);
+  plan.statistics = statistics_from_json(reader, meta.at("statistics"));
+  plan.goal_node = reader.whole(meta, "goal_node"), plan.best_node = reader.whole(meta, "best_node");
+  meta.at("best_distance_m").get_to(plan.best_distance_m);
+  reader.require(plan.best_distance_m >= 0 && std::isfinite(plan.best_distance_m),
+                 fmt::format("best_distance_m is {}", plan.best_distance_m));
+  try {
+    validate(plan.settings);
+  } catch (const InputError& error) {
+    reader.refuse(error.what());
+  }
+  plan.ending = reader.ending(meta.at("ending"));
+  reader.require(plan.best_node >= 0 && plan.best_node < plan.tree.size(),
+                 "best_node is not a node of the tree");
+  reader.require(plan.goal_node == -1 || plan.goal_node == plan.best_node, "goal_node is not best_node");
+  reader.require(meta.at("solved") == plan.solved(),
+                 fmt::format("solved is {}, and goal_node {}", meta.at("solved").dump(), plan.goal_node));
+  if (!plan.settings.via.empty()) plan.legs = reader.legs(meta.at("legs"), plan);
+}
+
+}  // namespace
+
 void write_plan(const fs::path& path, const Plan& plan, const Json& given) {
   Npz file;
   put_shared_states(file, plan.tree.states);
@@ -349,16 +415,7 @@ void write_plan(const fs::path& path, const Plan& plan, const Json& given) {
 
   Json meta;
   meta["format"] = format_name;
-  meta["solved"] = plan.solved();
-  meta["ending"] = name_of(plan.ending);
-  meta["goal_node"] = plan.goal_node;
-  meta["best_node"] = plan.best_node;
-  meta["best_distance_m"] = plan.best_distance_m;
-  for (std::size_t leg = 0; leg < plan.legs.size() && !plan.settings.via.empty(); ++leg)
-    meta["legs"].push_back(
-        {{"root", plan.legs[leg].root}, {"first_iteration", plan.legs[leg].first_iteration}});
-  meta["settings"] = json_of(plan.settings);
-  meta["statistics"] = json_of(plan.statistics);
+  meta.update(plan.simulation ? json_of(*plan.simulation) : json_of_search(plan));
   meta["settle_steps"] = plan.trajectory.settle_steps;
   meta["frames_per_second"] = plan.trajectory.frames_per_second;
   meta["system_hash"] = hex(plan.system_hash);
@@ -380,24 +437,10 @@ PlanFile read_plan(const fs::path& path) {
     reader.require(shared || meta.at("format") == earlier_format_name, "it is not of this version's format");
     Plan& plan = file.plan;
     plan.tree = reader.tree(shared);
-    plan.settings = settings_from_json(meta.at("settings"), path.string());
-    plan.statistics = statistics_from_json(reader, meta.at("statistics"));
-    plan.goal_node = reader.whole(meta, "goal_node"), plan.best_node = reader.whole(meta, "best_node");
-    meta.at("best_distance_m").get_to(plan.best_distance_m);
-    reader.require(plan.best_distance_m >= 0 && std::isfinite(plan.best_distance_m),
-                   fmt::format("best_distance_m is {}", plan.best_distance_m));
-    try {
-      validate(plan.settings);
-    } catch (const InputError& error) {
-      reader.refuse(error.what());
-    }
-    plan.ending = reader.ending(meta.at("ending"));
-    const int nodes = plan.tree.size();
-    reader.require(plan.best_node >= 0 && plan.best_node < nodes, "best_node is not a node of the tree");
-    reader.require(plan.goal_node == -1 || plan.goal_node == plan.best_node, "goal_node is not best_node");
-    reader.require(meta.at("solved") == plan.solved(),
-                   fmt::format("solved is {}, and goal_node {}", meta.at("solved").dump(), plan.goal_node));
-    if (!plan.settings.via.empty()) plan.legs = reader.legs(meta.at("legs"), plan);
+    if (meta.contains("simulation"))
+      read_simulation(reader, meta.at("simulation"), meta.at("frames_per_second").get<double>(), plan);
+    else
+      read_search(reader, meta, path.string(), plan);
 
     Trajectory& t = plan.trajectory;
     t.controls = reader.controls("path", -1);

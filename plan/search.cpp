@@ -427,7 +427,29 @@ std::string name_of_goal(const Settings& settings, int leg) {
                                         : "the goal";
 }
 
+namespace {
+
+std::string explain_simulation(const Plan& plan) {
+  const Simulation& s = *plan.simulation;
+  const std::string asked = fmt::format("{:g} s", s.duration_s);
+  switch (s.ending) {
+    case Simulation::whole:
+      return "simulated " + asked;
+    case Simulation::stopped:
+      return fmt::format("a signal ended the simulation before its {}; resume it to go on", asked);
+    case Simulation::diverged:
+      return fmt::format(
+          "the dynamics diverged before the {} were over; try a smaller world.max_dt_s, or weaker "
+          "forces and slower motions",
+          asked);
+  }
+  return "";
+}
+
+}  // namespace
+
 std::string explain(const Plan& plan) {
+  if (plan.simulation) return explain_simulation(plan);
   const Settings s = settings_of_leg(plan.settings, plan.leg());
   const Statistics& statistics = plan.statistics;
   const std::string goal = name_of_goal(plan.settings, plan.leg());

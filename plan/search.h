@@ -33,6 +33,13 @@ struct Leg {
   std::int64_t first_iteration = 0;  // of all that the search counts
 };
 
+// What was not searched, but only simulated (plan/simulation.h): where Plan has one, its tree is the start
+// and the end, nothing is said of a goal, and of its settings frames_per_second counts alone.
+struct Simulation {
+  double duration_s = 0;  // asked for
+  enum Ending { whole, stopped, diverged } ending = whole;
+};
+
 struct Plan {
   Settings settings;
   std::uint64_t system_hash = 0;
@@ -43,6 +50,7 @@ struct Plan {
   double best_distance_m = 0;  // of its centre of mass from the goal's
   Ending ending = Ending::iterations;
   Statistics statistics;
+  std::optional<Simulation> simulation;
   Trajectory trajectory;  // to best_node, and with a settle when that is goal_node
   bool solved() const { return goal_node >= 0; }
   int leg() const { return int(legs.size()) - 1; }  // the last that began; its goal is the one sought

@@ -149,14 +149,27 @@ void transform(const Eigen::Affine3d& map, Points& positions) {
     positions.row(v) = (map * Vec3(positions.row(v).transpose())).transpose();
 }
 
+namespace {
+
+bool is_in(const Box& box, const Box& bounds_m, const Vec3& p) {
+  const double tolerance_m = 1e-6 * bounds_m.diagonal();
+  return ((p - box.lower).array() >= -tolerance_m).all() && ((box.upper - p).array() >= -tolerance_m).all();
+}
+
+}  // namespace
+
+std::vector<int> nodes_in(const Box& box_m, const Box& bounds_m, const Points& positions) {
+  std::vector<int> nodes;
+  for (int n = 0; n < int(positions.rows()); ++n)
+    if (is_in(box_m, bounds_m, positions.row(n))) nodes.push_back(n);
+  return nodes;
+}
+
 std::vector<int> fixed_nodes(const BodySpec& body, const Box& bounds_m, const Points& cage_positions) {
   const double tolerance_m = 1e-6 * bounds_m.diagonal();
   const auto on_wall = [&](const Vec3& p) {
     return ((p - bounds_m.lower).cwiseAbs().minCoeff() <= tolerance_m) ||
            ((p - bounds_m.upper).cwiseAbs().minCoeff() <= tolerance_m);
-  };
-  const auto in = [&](const Box& box, const Vec3& p) {
-    return ((p - box.lower).array() >= -tolerance_m).all() && ((box.upper - p).array() >= -tolerance_m).all();
   };
   std::vector<int> nodes;
   std::vector<bool> box_holds_one(body.fixed.boxes_m.size());
@@ -164,7 +177,7 @@ std::vector<int> fixed_nodes(const BodySpec& body, const Box& bounds_m, const Po
     const Vec3 p = cage_positions.row(n);
     bool held = (body.kind == Kind::rigid && body.role == Role::obstacle) || (body.fixed.walls && on_wall(p));
     for (std::size_t b = 0; b < body.fixed.boxes_m.size(); ++b)
-      if (in(body.fixed.boxes_m[b], p)) held = box_holds_one[b] = true;
+      if (is_in(body.fixed.boxes_m[b], bounds_m, p)) held = box_holds_one[b] = true;
     if (held) nodes.push_back(n);
   }
   if (body.fixed.walls && nodes.empty())

@@ -37,4 +37,7 @@ void transform(const Eigen::Affine3d& map, Points& positions);
 // obstacle. Throws InputError naming the body when it asks for fixed nodes and no node is where it says.
 std::vector<int> fixed_nodes(const BodySpec&, const Box& bounds_m, const Points& cage_positions);
 
+// Rows of `positions` in the box, ascending; as fixed_nodes, a millionth of the bounds beyond it too.
+std::vector<int> nodes_in(const Box& box_m, const Box& bounds_m, const Points& positions);
+
 }  // namespace limber::scenes

@@ -155,6 +155,29 @@ void edit(Node& root, const std::string& set) {
   *node = parse_set_value(set.substr(equals + 1), source);
 }
 
+// What the other file holds, behind the scene's own.
+void append(const ScriptText& script, Node& root) {
+  if (script.text.empty()) return;
+  Node more = parse_document(script.text, script.name_for_messages);
+  for (Entry& entry : std::get<Table>(more.value)) {
+    if (entry.key != "forces" && entry.key != "motions")
+      throw InputError(
+          fmt::format("{}: \"{}\" is not for this file; it holds [[forces]] and [[motions]], all "
+                      "else stands in the scene",
+                      entry.where.text(), entry.key));
+    Node* const own = root.find(entry.key);
+    if (!own) {
+      std::get<Table>(root.value).push_back(std::move(entry));
+      continue;
+    }
+    auto *to = std::get_if<Array>(&own->value), *from = std::get_if<Array>(&entry.value.value);
+    if (!from)
+      throw InputError(fmt::format("{}: {} must be a list of tables; write [[{}]]", entry.where.text(),
+                                   entry.key, entry.key));
+    if (to) std::move(from->begin(), from->end(), std::back_inserter(*to));
+  }
+}
+
 // ---- the parts of a scene, with the checks that look at more than one key ----
 
 double triangle_edge(const Node& table, const Vec3& size) {
@@ -434,6 +457,15 @@ BodySpec read_body(const Node& table, const Box& bounds) {
           *triangles,
           fmt::format("{} is not scenery, so its surface is kept vertex by vertex; remove triangles", what));
   }
+  body.velocity_m_s = vector(table, "velocity_m_s");
+  body.angular_velocity_rad_s = vector(table, "angular_velocity_rad_s");
+  const bool stands = body.role == Role::scenery || (body.role == Role::obstacle && body.kind == Kind::rigid);
+  for (const char* key : {"velocity_m_s", "angular_velocity_rad_s"})
+    if (stands && !vector(table, key).isZero(0))
+      complain(child(table, key),
+               fmt::format(
+                   "{} cannot be pushed, and has no {}; {}", what, key,
+                   body.role == Role::scenery ? "remove it" : "write [[motions]] for it, or another role"));
   if (body.role == Role::scenery) {
     for (const char* key : {"cage", "material"})
       if (const Node* node = table.find(key))
@@ -482,15 +514,28 @@ void add_body(BodySpec body, const Node& table, Scene& scene) {
   scene.bodies.push_back(std::move(body));
 }
 
+bool is_rigid_obstacle(const BodySpec& body) {
+  return body.role == Role::obstacle && body.kind == Kind::rigid;
+}
+
 void read_bodies(const Node& root, Scene& scene, const Complaints& complaints) {
   bool robot = false;  // also one that is complained of
   for (const Node& table : list(root, "bodies")) {
     robot |= read_role(text(table, "role")) == Role::robot;
     complaints.during([&] { add_body(read_body(table, scene.bounds_m), table, scene); });
   }
-  if (!robot)
+  if (robot) return;
+  if (root.find("goal"))
     complaints.during([&] {
       complain(child(root, "bodies"), "there is no robot; give the body that is to move role = \"robot\"");
+    });
+  const auto first = std::find_if_not(scene.bodies.begin(), scene.bodies.end(), is_rigid_obstacle);
+  if (first != scene.bodies.end())
+    scene.robot = int(first - scene.bodies.begin());
+  else
+    complaints.during([&] {
+      complain(child(root, "bodies"),
+               "no body can be pushed, so nothing happens; add one that is soft, or role = \"free\"");
     });
 }
 
@@ -514,6 +559,60 @@ int other_body(const Node& node, const Scene& scene, const std::string& key) {
   }
   complain(node, fmt::format("{} is \"{}\"; it must be a body other than the robot{}{}", key, as_text(node),
                              others.empty() ? ", and there is none" : ": ", fmt::join(others, ", ")));
+}
+
+void read_force(const Node& table, Scene& scene) {
+  ForceSpec force;
+  const std::string what = fmt::format("forces[{}]", scene.forces.size());
+  force.where = table.where.text();
+  force.body = body_called(child(table, "body"), scene, what + ".body");
+  if (const BodySpec& body = scene.bodies[std::size_t(force.body)]; is_rigid_obstacle(body))
+    complain(child(table, "body"),
+             fmt::format("{}: {} is a rigid obstacle, which no force moves; choose another body, or make it "
+                         "soft or free",
+                         what, body.name));
+  force.from_s = number(table, "from_s"), force.to_s = number(table, "to_s");
+  if (!(force.to_s > force.from_s))
+    complain(child(table, "to_s"),
+             fmt::format("{}.to_s is {}, not after from_s, {}; write the later one there", what, force.to_s,
+                         force.from_s));
+  force.force_n = vector(table, "force_n");
+  if (table.find("box_m")) force.box_m = box(table, "box_m");
+  scene.forces.push_back(std::move(force));
+}
+
+void read_motion(const Node& table, Scene& scene) {
+  MotionSpec motion;
+  const std::string what = fmt::format("motions[{}]", scene.motions.size());
+  motion.where = table.where.text();
+  const Node& name = child(table, "body");
+  motion.body = body_called(name, scene, what + ".body");
+  const BodySpec& body = scene.bodies[std::size_t(motion.body)];
+  if (!is_rigid_obstacle(body))
+    complain(name, fmt::format("{}: {} is no rigid obstacle, and goes where it is pushed; write role = "
+                               "\"obstacle\" and kind = \"rigid\" for it, or [[forces]]",
+                               what, body.name));
+  for (const MotionSpec& other : scene.motions)
+    if (other.body == motion.body)
+      complain(name, fmt::format("{}: {} has a motion already; put all keyframes into one", what, body.name));
+  for (const Node& node : list(table, "keyframes")) {
+    MotionSpec::Keyframe frame{number(node, "at_s"), body.pose.position_m,
+                               direction(node, "axis", (what + ".keyframes.axis").c_str()),
+                               number(node, "angle_deg")};
+    if (node.find("position_m")) frame.position_m = vector(node, "position_m");
+    if (!motion.keyframes.empty() && !(frame.at_s > motion.keyframes.back().at_s))
+      complain(child(node, "at_s"),
+               fmt::format("keyframe at {} s does not come after the one at {} s; put them in order",
+                           frame.at_s, motion.keyframes.back().at_s));
+    motion.keyframes.push_back(frame);
+  }
+  if (motion.keyframes.empty())
+    complain(
+        child(table, "keyframes"),
+        fmt::format("{}.keyframes is empty; write for example keyframes = [{{ at_s = 1, position_m = [0, "
+                    "0, 1] }}]",
+                    what));
+  scene.motions.push_back(std::move(motion));
 }
 
 Goal::Shape read_goal_shape(const Node& table) {
@@ -591,6 +690,31 @@ std::vector<Via> read_via(const Node& root, const Scene& scene) {
                "rest = false");
   }
   return all;
+}
+
+// Without a goal nothing is searched, and all that belongs to a search may lack.
+void read_goals(const Node& root, Scene& scene, const Complaints& complaints) {
+  if (!root.find("goal")) {
+    std::vector<std::string> lacks{"[goal]"};
+    if (!root.find("planner")) lacks.push_back("[planner]");
+    if (scene.bodies[std::size_t(scene.robot)].role != Role::robot)
+      lacks.push_back("a body with role = \"robot\"");
+    scene.lacks = fmt::format(
+        "{}: the scene can only be simulated (limber simulate); to be planned it lacks {}; add {}",
+        root.where.text(), fmt::join(lacks, ", "), lacks.size() == 1 ? "it" : "them");
+    if (!list(root, "via").empty())
+      complaints.during([&] {
+        complain(list(root, "via").front(), "[[via]] are goals before [goal], and there is none; add [goal]");
+      });
+    return;
+  }
+  if (!root.find("planner")) {
+    complaints.during(
+        [&] { complain(root, "the scene lacks \"planner\" (how the motion is searched); add [planner]"); });
+    return;
+  }
+  complaints.during([&] { scene.via = read_via(root, scene); });
+  complaints.during([&] { scene.goal = read_goal(root, scene); });
 }
 
 PlannerSpec read_planner(const Node& table) {
@@ -745,13 +869,14 @@ namespace {
 
 // After a complaint goes on with what does not hang on what is complained of.
 Scene read(const std::string& toml, const std::string& name_for_messages,
-           const std::vector<std::string>& sets, const Complaints& complaints) {
+           const std::vector<std::string>& sets, const ScriptText& script, const Complaints& complaints) {
   Node root = parse_document(toml, name_for_messages);
   if (root.table()->empty())
     throw InputError(
         fmt::format("{}:1:1: the scene is empty; start from one that comes with limber (`limber scenes` "
                     "lists them)",
                     name_for_messages));
+  complaints.during([&] { append(script, root); });
   for (const std::string& set : sets) complaints.during([&] { edit(root, set); });
   check_and_complete(root, complaints);
   Scene scene;
@@ -770,36 +895,45 @@ Scene read(const std::string& toml, const std::string& name_for_messages,
   read_bodies(root, scene, complaints);
   const bool all_bodies = !complaints.any();  // else others may name one that was left out
   if (all_bodies) {
-    complaints.during([&] { scene.via = read_via(root, scene); });
-    complaints.during([&] { scene.goal = read_goal(root, scene); });
+    for (const Node& table : list(root, "forces")) complaints.during([&] { read_force(table, scene); });
+    for (const Node& table : list(root, "motions")) complaints.during([&] { read_motion(table, scene); });
+    read_goals(root, scene, complaints);
   }
-  complaints.during([&] { scene.planner = read_planner(child(root, "planner")); });
+  if (const Node* planner = root.find("planner"))
+    complaints.during([&] { scene.planner = read_planner(*planner); });
   if (scene.planner.preset == "paper") keep_to_the_paper(root, scene);
   fill_in_max_stretch(scene);
   if (all_bodies) complaints.during([&] { scene.cameras = read_cameras(root, scene); });
   complaints.during([&] { scene.film = read_film(child(root, "film")); });
   scene.text = toml;
   scene.sets = sets;
+  scene.script = script;
   return scene;
 }
 
 }  // namespace
 
 Scene read_scene(const std::string& toml, const std::string& name_for_messages,
-                 const std::vector<std::string>& sets) {
-  return read(toml, name_for_messages, sets, Complaints());
+                 const std::vector<std::string>& sets, const ScriptText& script) {
+  return read(toml, name_for_messages, sets, script, Complaints());
 }
 
 std::vector<std::string> problems_of(const std::string& toml, const std::string& name_for_messages,
                                      const std::vector<std::string>& sets) {
   std::vector<std::string> problems;
   const Complaints complaints(&problems);
-  complaints.during([&] { read(toml, name_for_messages, sets, complaints); });
+  complaints.during([&] { read(toml, name_for_messages, sets, {}, complaints); });
   return problems;
 }
 
-Scene read_scene_file(const fs::path& file, const std::vector<std::string>& sets) {
-  Scene scene = read_scene(read_file(file, most_scene_bytes), file.string(), sets);
+void require_plannable(const Scene& scene) {
+  if (!scene.lacks.empty()) throw InputError(scene.lacks);
+}
+
+Scene read_scene_file(const fs::path& file, const std::vector<std::string>& sets, const fs::path& script) {
+  ScriptText more;
+  if (!script.empty()) more = {read_file(script, most_scene_bytes), script.string()};
+  Scene scene = read_scene(read_file(file, most_scene_bytes), file.string(), sets, more);
   scene.folder = fs::absolute(file).parent_path();
   return scene;
 }

@@ -121,10 +121,33 @@ struct BodySpec {
   std::vector<PartSpec> parts;  // a later one rules where two meet
   Pose pose;
   FixedSpec fixed;
-  Vec3 color_srgb = Vec3::Zero();  // 0 … 1
+  Vec3 velocity_m_s = Vec3::Zero(), angular_velocity_rad_s = Vec3::Zero();  // at the start
+  Vec3 color_srgb = Vec3::Zero();                                           // 0 … 1
   double opacity = 1, roughness = 0.45, metallic = 0;
   int triangles = 0;  // scenery: its surface is simplified to about so many; 0: as it is
   std::string where;  // "scene.toml:12:24": its place in the text, for complaints
+};
+
+// A force that acts on a body between two times.
+struct ForceSpec {
+  int body = -1;
+  double from_s = 0, to_s = 0;  // from < to
+  Vec3 force_n = Vec3::Zero();  // on all of the body, or of what is in the box, together
+  std::optional<Box> box_m;     // the nodes of the cage that are in it at the start
+  std::string where;            // its place in the text, for complaints
+};
+
+// A rigid obstacle goes from keyframe to keyframe; at 0 s it is where its pose has it.
+struct MotionSpec {
+  struct Keyframe {
+    double at_s = 0;                 // > 0, ascending
+    Vec3 position_m = Vec3::Zero();  // of its anchor
+    Vec3 axis = Vec3::UnitZ();       // unit
+    double angle_deg = 0;            // about that axis, through the anchor, from its pose
+  };
+  int body = -1;
+  std::vector<Keyframe> keyframes;
+  std::string where;
 };
 
 struct Goal {
@@ -207,6 +230,12 @@ struct FilmSpec {
   int sheet_columns = 0, sheet_rows = 0;
 };
 
+// More [[forces]] and [[motions]], in a file of their own.
+struct ScriptText {
+  std::string text, name_for_messages;
+  bool operator==(const ScriptText&) const = default;
+};
+
 struct Scene {
   std::string name, description;
   Box bounds_m;
@@ -217,7 +246,12 @@ struct Scene {
   bool part_overlaps = true;               // surfaces that overlap at the start are parted, else refused
   std::optional<double> max_dt_s;          // only ever lowers the automatic time step
   std::vector<BodySpec> bodies;
-  int robot = -1;        // index of the one body whose role is robot
+  std::vector<ForceSpec> forces;
+  std::vector<MotionSpec> motions;  // of one body each
+  // Index of the one body whose role is robot; of a scene without, the first that can be pushed: shares of
+  // "the robot's size" are of its.
+  int robot = -1;
+  std::string lacks;     // what it would need to be planned, as a complaint; empty: nothing
   std::vector<Via> via;  // goals that are reached before the last, in this order
   Goal goal;
   PlannerSpec planner;
@@ -225,18 +259,26 @@ struct Scene {
   std::vector<CameraSpec> cameras;  // the first is `camera`, called main
   FilmSpec film;
 
-  fs::path folder;                // where the scene file lies; empty when the text came from elsewhere
-  std::string text;               // as the user wrote it
-  std::vector<std::string> sets;  // the edits made to it; read_scene(text, …, sets) gives this scene again
+  fs::path folder;   // where the scene file lies; empty when the text came from elsewhere
+  std::string text;  // as the user wrote it
+  std::vector<std::string>
+      sets;           // the edits made to it; read_scene(text, …, sets, script) gives this scene again
+  ScriptText script;  // what came with it
 };
 
 // `sets` are edits "a.b.c=value" made before the text is checked; bodies.robot.x addresses a body by its
 // name, and bodies.robot.friction is short for bodies.robot.material.friction. A value that is not TOML is
-// taken as a text. Throws InputError "NAME:line:column: what; what to try" with the first complaint.
+// taken as a text. What `script` holds follows the scene's own lists. Throws InputError "NAME:line:column:
+// what; what to try" with the first complaint.
 inline constexpr std::uintmax_t most_scene_bytes = 16 << 20;
 Scene read_scene(const std::string& text, const std::string& name_for_messages,
-                 const std::vector<std::string>& sets = {});
-Scene read_scene_file(const fs::path&, const std::vector<std::string>& sets = {});
+                 const std::vector<std::string>& sets = {}, const ScriptText& script = {});
+// `script` is a file, or empty.
+Scene read_scene_file(const fs::path&, const std::vector<std::string>& sets = {},
+                      const fs::path& script = {});
+
+// Throws InputError where the scene can be simulated only: it has no goal.
+void require_plannable(const Scene&);
 
 // "+x" … "-z" as a unit vector.
 Vec3 axis_named(const std::string&);

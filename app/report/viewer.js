@@ -291,6 +291,7 @@ function makeViewer(canvas, meta, bodies) {
     return [0, 1, 2, 3, 4, 5, 6, 7].flatMap((i) => [1, 2, 4].filter((k) => !(i & k)).flatMap((k) => [...corner(i), ...corner(i | k)]));
   }
   function goalLines(shift) {
+    if (!meta.goal) return [];  // a simulation has none
     if (meta.goal.box) return boxEdges(meta.goal.box.map((p) => plus(p, shift)));
     const center = plus(meta.goal.center, shift), lines = [], n = 48;
     for (let axis = 0; axis < 3; ++axis)
@@ -339,7 +340,7 @@ function makeViewer(canvas, meta, bodies) {
       frame = wanted;
       for (const body of bodies) if (body.frames) move(body, frame);
       const near = Math.round(frame);
-      if (meta.goal.shifts) goal.fill(0, new Float32Array(goalLines(meta.goal.shifts[near])));
+      if (meta.goal?.shifts) goal.fill(0, new Float32Array(goalLines(meta.goal.shifts[near])));
     }
     gl.enable(gl.DEPTH_TEST);
     gl.bindFramebuffer(gl.FRAMEBUFFER, target.buffer);

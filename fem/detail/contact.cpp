@@ -112,7 +112,7 @@ Contacts<Real>::Contacts(const World& world, const Kernels<Real>& kernels, int l
   for (int a = 0; a < bodies_; ++a) {
     if (world.bodies[a].moving && world.bodies[a].self_contact) pairs_.emplace_back(a, a);
     for (int b = a + 1; b < bodies_; ++b)
-      if (world.bodies[a].moving || world.bodies[b].moving) pairs_.emplace_back(a, b);
+      if (world.bodies[a].pushed() || world.bodies[b].pushed()) pairs_.emplace_back(a, b);
   }
   for (const Body& body : world.bodies)
     if (body.kind == BodyKind::rigid) bearings_.resize(world.bodies.size());
@@ -855,7 +855,7 @@ void Contacts<Real>::respond(const LaneView<Real>& view, int a, int b, const Tou
 template <class Real>
 template <class Each>
 void Contacts<Real>::for_each_beyond_wall(const LaneView<Real>& view, int body, const Each& each) const {
-  if (!world_.walls || !topology_.bodies[body].moving) return;
+  if (!world_.walls || !topology_.bodies[body].pushed) return;
   for (int axis = 0; axis < 3; ++axis)
     for (int side = 0; side < 2; ++side) {
       const Real out = side == 0 ? Real(1) : Real(-1);
@@ -896,7 +896,7 @@ template <class Real>
 void Contacts<Real>::add_forces_of_walls(const LaneView<Real>& view) const {
   for (int body = 0; body < bodies_ && world_.walls; ++body) {
     const Topology::Body& nodes = topology_.bodies[body];
-    if (!nodes.moving || world_.bodies[body].kind == BodyKind::rigid) continue;
+    if (!nodes.pushed || world_.bodies[body].kind == BodyKind::rigid) continue;
     Wall<Real> wall{};
     wall.nodes = nodes.surface_nodes.data(), wall.count = int(nodes.surface_nodes.size());
     wall.mass = tables_.node_mass.data(), wall.inverse_mass = tables_.inverse_mass.data();

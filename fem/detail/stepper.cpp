@@ -35,6 +35,9 @@ Stepper<Real>::Stepper(const World& world, int lanes, Isa isa)
       state_layout_(state_layout(lanes)),
       force_layout_(force_layout(lanes)),
       first_velocity_(lanes == 1 ? 4 : world.nodes * state_layout_.node),
+      forced_(world.bodies.size()),
+      step_(std::size_t(lanes), 0),
+      next_change_(std::size_t(lanes), 0),
       controls_(std::size_t(lanes)),
       contact_(std::size_t(lanes), false),
       rest_speed2_(Real(world.rest_speed_m_s * world.rest_speed_m_s)),
@@ -50,9 +53,13 @@ Stepper<Real>::Stepper(const World& world, int lanes, Isa isa)
   state_.assign(nodes * std::size_t(lanes == 1 ? 8 : 6 * lanes), 0);
   f_.assign(nodes * std::size_t(force_layout_.node), 0);
   push_.assign(std::size_t(3 * world.bodies[world.robot].node_count() * lanes), 0);
+  for (const Force& force : world.forces)
+    forced_[std::size_t(force.body)].assign(
+        std::size_t(3 * world.bodies[std::size_t(force.body)].node_count() * lanes), 0);
+  if (!forced_[std::size_t(world.robot)].empty()) all_pushes_.assign(push_.size(), 0);
   lower_.resize(3 * bodies), upper_.resize(3 * bodies);
   for (const Body& body : world.bodies)
-    wears_inside_.push_back(body.kind != BodyKind::rigid &&
+    wears_inside_.push_back(body.kind == BodyKind::deformable &&
                             (std::isfinite(body.max_stretch) || body.self_contact || body.phong));
   speed2_.assign(bodies, 0), travel_.assign(bodies, 0), inner_travel_.assign(bodies, 0);
   unchanged_.assign(bodies, 0), asleep_.assign(bodies, 0), stands_.assign(bodies, 0);
@@ -61,12 +68,13 @@ Stepper<Real>::Stepper(const World& world, int lanes, Isa isa)
   for (int n = 0; n < world.nodes; ++n)
     for (int c = 0; c < 3; ++c) std::fill_n(&x(0, n, c), lanes, tables_.rest_positions[3 * n + c]);
   const std::vector<Real> still(std::size_t(3 * world.moving_nodes), 0);
-  for (int lane = 0; lane < lanes; ++lane) load(lane, tables_.rest_positions.data(), still.data(), {}, false);
+  for (int lane = 0; lane < lanes; ++lane)
+    load(lane, 0, tables_.rest_positions.data(), still.data(), {}, false);
 }
 
 template <class Real>
-void Stepper<Real>::load(int lane, const Real* positions, const Real* velocities, const Control& control,
-                         bool contact) {
+void Stepper<Real>::load(int lane, std::int64_t step, const Real* positions, const Real* velocities,
+                         const Control& control, bool contact) {
   for (int n = 0; n < world_.moving_nodes; ++n)
     for (int c = 0; c < 3; ++c) {
       x(lane, n, c) = positions[3 * n + c];
@@ -101,6 +109,9 @@ void Stepper<Real>::load(int lane, const Real* positions, const Real* velocities
     inner_travel_[b * lanes_ + lane] = contact ? Real(0) : -std::numeric_limits<Real>::infinity();
   contact_[lane] = contact;
   controls_[lane] = control;
+  step_[lane] = next_change_[lane] = step;
+  for (Numbers& forced : forced_)
+    for (std::size_t k = 0; k < forced.size(); k += std::size_t(lanes_)) forced[k + lane] = 0;
 
   const Body& robot = world_.bodies[world_.robot];
   Real acceleration[3];
@@ -177,6 +188,8 @@ void Stepper<Real>::pull_towards_goal(int lane) {
 
 template <class Real>
 void Stepper<Real>::step() {
+  for (int lane = 0; lane < lanes_; ++lane)
+    if (contact_[lane] && step_[lane] >= next_change_[lane]) follow_forces(lane);
   if (cost_.steps++ % Cost::sampled != Cost::sampled / 2) {
     find_sleepers(), add_contact_forces(), find_pushes(), add_stretch_limits(), add_elastic_forces(),
         integrate();
@@ -188,6 +201,36 @@ void Stepper<Real>::step() {
   find_pushes(), cost_.controls_s += spent();
   add_stretch_limits(), add_elastic_forces(), cost_.elastic_s += spent();
   integrate(), cost_.integration_s += spent();
+}
+
+// Where one of the world's forces begins or ends, the bodies that have any are awake.
+template <class Real>
+void Stepper<Real>::follow_forces(int lane) {
+  const std::int64_t step = step_[lane];
+  std::int64_t& next = next_change_[lane] = std::numeric_limits<std::int64_t>::max();
+  for (std::size_t b = 0; b < forced_.size(); ++b) {
+    if (forced_[b].empty()) continue;
+    for (std::size_t k = 0; k < forced_[b].size(); k += std::size_t(lanes_)) forced_[b][k + lane] = 0;
+    unchanged_[b * lanes_ + lane] = 0;
+  }
+  for (const Force& force : world_.forces) {
+    for (const std::int64_t change : {force.first_step, force.end_step})
+      if (change > step) next = std::min(next, change);
+    if (step < force.first_step || step >= force.end_step) continue;
+    for (int c = 0; c < 3; ++c) {
+      const Real acceleration = Real(float(force.force_n[c])) / Real(force.mass_kg);
+      for (const int n : force.nodes)
+        forced_[std::size_t(force.body)][(3 * n + c) * lanes_ + lane] += acceleration;
+    }
+  }
+}
+
+// Whether a kinematic body is elsewhere at the end of the step that begins.
+template <class Real>
+bool Stepper<Real>::goes_on(int lane, int body) const {
+  const Track& track = world_.bodies[body].track;
+  return !(pose_at(track, double(step_[lane]) * world_.dt_s) ==
+           pose_at(track, double(step_[lane] + 1) * world_.dt_s));
 }
 
 // A body that did not change in the last step, and whose boxes met only such bodies' then and now, will not
@@ -221,6 +264,9 @@ void Stepper<Real>::find_sleepers() {
       }
     for (int b = 0; b < bodies; ++b) {
       if (!world_.bodies[b].moving) asleep_[at(b)] = 1;
+      // What it touches sees that a step later.
+      if (contact_[lane] && world_.bodies[b].kind == BodyKind::kinematic && goes_on(lane, b))
+        asleep_[at(b)] = 0;
       if (asleep_[at(b)] == 0) all_asleep_[b] = false;
     }
     for (int a = 0; a < bodies && contact_[lane]; ++a)
@@ -273,27 +319,70 @@ void Stepper<Real>::add_elastic_forces() {
                        f_.data());
 }
 
+// As Motion has them; null: none.
+template <class Real>
+const Real* Stepper<Real>::pushes_on(std::size_t body) {
+  const Numbers& forced = forced_[body];
+  if (int(body) != world_.robot) return forced.empty() ? nullptr : forced.data();
+  if (forced.empty()) return push_.data();
+  for (std::size_t k = 0; k < push_.size(); ++k) all_pushes_[k] = push_[k] + forced[k];
+  return all_pushes_.data();
+}
+
+// Velocities are those of the way in the step, from the poses and not from rounded places.
+template <class Real>
+void Stepper<Real>::move_by_keyframes(std::size_t b) {
+  const Body& body = world_.bodies[b];
+  for (int lane = 0; lane < lanes_; ++lane) {
+    const std::size_t at = b * std::size_t(lanes_) + std::size_t(lane);
+    if (asleep_[at] > 0) continue;
+    const Pose before = pose_at(body.track, double(step_[lane]) * world_.dt_s),
+               now = pose_at(body.track, double(step_[lane] + 1) * world_.dt_s);
+    const Eigen::Matrix3d turning = (now.turn - before.turn) / world_.dt_s;
+    const Vec3 going = (now.place_m - before.place_m) / world_.dt_s;
+    constexpr Real huge = std::numeric_limits<Real>::max();
+    Real lower[3] = {huge, huge, huge}, upper[3] = {-huge, -huge, -huge}, speed2 = 0;
+    bool same = true;
+    for (int n = 0; n < body.node_count(); ++n) {
+      const int node = body.first_node + n;
+      const Vec3 from_pivot = body.cage.positions.row(n).transpose() - body.track.pivot_m;
+      const Vec3 place = now.place_m + now.turn * from_pivot, velocity = going + turning * from_pivot;
+      Real square = 0;
+      for (int c = 0; c < 3; ++c) {
+        const Real xn = Real(place[c]), vn = Real(velocity[c]);
+        same = same && x(lane, node, c) == xn && v(lane, node, c) == vn;
+        x(lane, node, c) = xn, v(lane, node, c) = vn;
+        lower[c] = std::min(lower[c], xn), upper[c] = std::max(upper[c], xn);
+        square += vn * vn;
+      }
+      speed2 = std::max(speed2, square);
+    }
+    for (int c = 0; c < 3; ++c)
+      lower_[(3 * b + c) * lanes_ + lane] = lower[c], upper_[(3 * b + c) * lanes_ + lane] = upper[c];
+    speed2_[at] = speed2, unchanged_[at] = same;
+    travel_[at] += Real(world_.dt_s) * std::sqrt(speed2);
+  }
+}
+
 template <class Real>
 void Stepper<Real>::integrate() {
   for (std::size_t b = 0; b < world_.bodies.size(); ++b) {
     const Topology::Body& body = world_.topology.bodies[b];
     if (!body.moving) continue;
     const std::size_t first = b * std::size_t(lanes_);
+    if (world_.bodies[b].kind == BodyKind::kinematic) {
+      move_by_keyframes(b);
+      continue;
+    }
     if (all_asleep_[b]) {
       if (pushed_asleep_[b])
         std::fill(&f_[force_layout_.at(body.first_node, 0)],
                   &f_[force_layout_.at(body.last_node - 1, 0)] + force_layout_.node, Real(0));
       continue;
     }
-    Motion<Real> motion{body.first_node,
-                        body.last_node,
-                        tables_.inverse_mass.data(),
-                        Real(world_.dt_s),
-                        {},
-                        int(b) == world_.robot ? push_.data() : nullptr,
-                        &lower_[3 * first],
-                        &upper_[3 * first],
-                        &speed2_[first]};
+    Motion<Real> motion{
+        body.first_node, body.last_node,     tables_.inverse_mass.data(), Real(world_.dt_s), {},
+        pushes_on(b),    &lower_[3 * first], &upper_[3 * first],          &speed2_[first]};
     for (int c = 0; c < 3; ++c) motion.gravity[c] = Real(world_.gravity_m_s2[c]);
     Real *const x = state_.data(), *const v = &state_[first_velocity_];
     std::fill_n(&stands_[first], lanes_, Real(0));
@@ -316,6 +405,7 @@ void Stepper<Real>::integrate() {
     for (int lane = 0; lane < lanes_; ++lane)
       inner_travel_[first + lane] += motion.dt * std::sqrt(inner_speed2_[lane]);
   }
+  for (std::int64_t& step : step_) ++step;
 }
 
 template <class Real>

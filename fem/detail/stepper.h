@@ -32,8 +32,10 @@ template <class Real>
 class Stepper {
  public:
   Stepper(const World&, int lanes, Isa);
-  // 3 × moving_nodes numbers each. A lane without contact (idle) costs nothing but its share of the kernels.
-  void load(int lane, const Real* positions, const Real* velocities, const Control&, bool contact);
+  // At that step of the world's time, 3 × moving_nodes numbers each. A lane without contact (idle) costs
+  // nothing but its share of the kernels.
+  void load(int lane, std::int64_t step, const Real* positions, const Real* velocities, const Control&,
+            bool contact);
   void store(int lane, Real* positions, Real* velocities) const;
   void step();
   struct Node {
@@ -49,6 +51,7 @@ class Stepper {
   Real& x(int lane, int node, int c) { return state_[state_layout_.at(node, c) + lane]; }
   Real& v(int lane, int node, int c) { return state_[first_velocity_ + state_layout_.at(node, c) + lane]; }
   void pull_towards_goal(int lane);
+  void follow_forces(int lane);
   void find_sleepers();
   bool may_stand(std::size_t body) const;
   void add_contact_forces();
@@ -56,6 +59,9 @@ class Stepper {
   void add_stretch_limits();
   void add_elastic_forces();
   void integrate();
+  bool goes_on(int lane, int body) const;
+  void move_by_keyframes(std::size_t body);
+  const Real* pushes_on(std::size_t body);
 
   const World& world_;
   const Tables<Real>& tables_;
@@ -69,9 +75,15 @@ class Stepper {
   int first_velocity_;
   using Numbers = std::vector<Real, LineAllocator<Real>>;
   Numbers state_, f_;
-  Numbers push_;             // [robot node][xyz][lane] accelerations
-  Numbers lower_, upper_;    // [body][xyz][lane]
-  Numbers speed2_, travel_;  // [body][lane]
+  Numbers push_;  // [robot node][xyz][lane] accelerations, by the controls
+  // [body][its node][xyz][lane] The same by the world's forces, nothing for bodies without; and of the
+  // robot's both together.
+  std::vector<Numbers> forced_;
+  Numbers all_pushes_;
+  std::vector<std::int64_t> step_;         // [lane] at which its state is
+  std::vector<std::int64_t> next_change_;  // [lane] of the forces that act
+  Numbers lower_, upper_;                  // [body][xyz][lane]
+  Numbers speed2_, travel_;                // [body][lane]
   // [body][lane] of nodes against their mean, of bodies that ask for it.
   Numbers inner_travel_;
   std::vector<bool> wears_inside_;

@@ -47,7 +47,7 @@ StretchLimits<Real>::StretchLimits(const World& world, const Kernels<Real>& kern
   std::vector<std::size_t> first;
   for (std::size_t b = 0; b < world.bodies.size(); ++b) {
     const fem::Body& body = world.bodies[b];
-    if (!body.moving || body.kind == BodyKind::rigid || !std::isfinite(body.max_stretch)) continue;
+    if (!body.moving || body.kind != BodyKind::deformable || !std::isfinite(body.max_stretch)) continue;
     const double most = 1 + free_share * (body.max_stretch - 1);
     Body& limited = bodies_.emplace_back();
     limited.index = int(b), limited.least = Real(1 / most), limited.most = Real(most);

@@ -115,7 +115,7 @@ SurfaceContacts<Real>::SurfaceContacts(const World& world, const Kernels<Real>& 
   for (int a = 0; a < bodies_; ++a) {
     if (world.bodies[a].moving && world.bodies[a].self_contact) pairs_.emplace_back(a, a);
     for (int b = a + 1; b < bodies_; ++b)
-      if (world.bodies[a].moving || world.bodies[b].moving) pairs_.emplace_back(a, b);
+      if (world.bodies[a].pushed() || world.bodies[b].pushed()) pairs_.emplace_back(a, b);
   }
   for (const auto& body : world.bodies)
     if (body.kind == BodyKind::rigid) bearings_.resize(world.bodies.size());
@@ -285,7 +285,7 @@ const std::vector<SurfaceTouch<Real>>& SurfaceContacts<Real>::find(int lane, con
   touches_.clear(), shares_.clear();
   for (std::size_t p = 0; p < pairs_.size(); ++p) find_pair(lane, view, p);
   for (int body = 0; body < bodies_ && world_.walls; ++body)
-    if (topology_.bodies[body].moving && !view.sleeps(body)) find_walls(lane, view, body);
+    if (topology_.bodies[body].pushed && !view.sleeps(body)) find_walls(lane, view, body);
   return touches_;
 }
 
@@ -871,7 +871,7 @@ void SurfaceContacts<Real>::respond(const SurfaceTouch<Real>& touch) {
       // A held node counts with its mass: without, one that moves would be thrown by what they do not bear.
       loads_of_side += size * loads_[node];
     }
-    if (begin < end && !is_rigid(side[k]) && topology_.bodies[side[k]].moving) loads += loads_of_side;
+    if (begin < end && !is_rigid(side[k]) && topology_.bodies[side[k]].pushed) loads += loads_of_side;
   }
   bool any_rigid = false;
   for (const int body : side) any_rigid |= body >= 0 && is_rigid(body);

@@ -98,7 +98,7 @@ struct Topology {
       neighbors;  // nodes that share a tet with all of a point's nodes, without the vertex itself, ascending
   struct Body {
     int first_node, last_node, first_tet, last_tet, first_point, first_ridge, last_point;
-    bool moving;
+    bool moving, pushed;             // as of Body
     std::vector<int> surface_nodes;  // world nodes, ascending
     SelfContact self;                // empty where the body does not touch itself
   };

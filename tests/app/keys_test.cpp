@@ -164,6 +164,12 @@ constexpr const char* one_via = "via=[{ center_of_mass_m = [2, 1, 1.5], radius_m
 constexpr const char* keyed = "camera.keyframes=[{ at = 0, eye_m = [0, -5, 1], target_m = [2, 1, 1] }]";
 constexpr const char* side_keyed =
     "cameras=[{ name = \"side\", keyframes = [{ at = 0, eye_m = [0, -5, 1], target_m = [2, 1, 1] }] }]";
+constexpr const char* one_force = "forces=[{ body = \"cart\", to_s = 1, force_n = [1, 0, 0] }]";
+constexpr const char* one_motion =
+    "bodies.block.kind=rigid|"
+    "motions=[{ body = \"block\", keyframes = [{ at_s = 1, position_m = [3, 1, 1] }] }]";
+constexpr const char* turning =
+    "bodies.block.kind=rigid|motions=[{ body = \"block\", keyframes = [{ at_s = 1, angle_deg = 9 }] }]";
 const std::vector<Row> rows{
     {"description", "description=other", nothing},
     {"world.bounds_m", "world.bounds_m=[[0, 0, 0], [4, 2, 3]]", world | film},
@@ -204,6 +210,26 @@ const std::vector<Row> rows{
     {"bodies[].fixed", "bodies.block.fixed=[{ box_m = [[0, 0, 0], [4, 2, 0.1]] }]", world},
     {"bodies[].fixed[].box_m", "bodies.block.fixed=[{ box_m = [[0, 0, 0], [4, 2, 0.4]] }]", world,
      "bodies.block.fixed=[{ box_m = [[0, 0, 0], [4, 2, 0.1]] }]"},
+    {"bodies[].velocity_m_s", "bodies.cart.velocity_m_s=[0, 0, 1]", world},
+    {"bodies[].angular_velocity_rad_s", "bodies.cart.angular_velocity_rad_s=[0, 0, 1]", world},
+    {"forces[].body", "forces=[{ body = \"robot\", to_s = 1, force_n = [1, 0, 0] }]", world, one_force},
+    {"forces[].from_s", "forces=[{ body = \"cart\", from_s = 0.5, to_s = 1, force_n = [1, 0, 0] }]", world,
+     one_force},
+    {"forces[].to_s", "forces=[{ body = \"cart\", to_s = 2, force_n = [1, 0, 0] }]", world, one_force},
+    {"forces[].force_n", "forces=[{ body = \"cart\", to_s = 1, force_n = [1, 0, 1] }]", world, one_force},
+    {"forces[].box_m",
+     "forces=[{ body = \"cart\", to_s = 1, force_n = [1, 0, 0], box_m = [[3, 0, 0], [4, 2, 0.2]] }]", world,
+     one_force},
+    {"motions[].keyframes[].at_s",
+     "motions=[{ body = \"block\", keyframes = [{ at_s = 2, position_m = [3, 1, 1] }] }]", world, one_motion},
+    {"motions[].keyframes[].position_m",
+     "motions=[{ body = \"block\", keyframes = [{ at_s = 1, position_m = [3, 1, 0.9] }] }]", world,
+     one_motion},
+    {"motions[].keyframes[].axis",
+     "motions=[{ body = \"block\", keyframes = [{ at_s = 1, angle_deg = 9, axis = [1, 0, 0] }] }]", world,
+     turning},
+    {"motions[].keyframes[].angle_deg",
+     "motions=[{ body = \"block\", keyframes = [{ at_s = 1, angle_deg = 10 }] }]", world, turning},
     {"goal.center_of_mass_m", "goal.center_of_mass_m=[3.1, 1, 1.2]", search},
     {"goal.radius_m", "goal.radius_m=0.2", search},
     {"goal.moves_with", "goal.moves_with=cart", world, "planner.settle_time_s=0"},
@@ -311,6 +337,7 @@ const std::map<std::string, std::string> elsewhere{
     {"bodies[].name", "names a folder"},
     {"bodies[].role", "says which bodies move, and so what a state is: below"},
     {"bodies[].triangles", "of scenery: below"},
+    {"motions[].body", "likewise says which bodies move: below"},
     {"cameras[].name", "names a film"},
     {"goal.box_m", "instead of radius_m: below"},
     {"goal.shape.cage", "a file: below"},
@@ -416,6 +443,13 @@ TEST_F(Keys_slow, ChangeWhatTheyShapeAndNothingElse) {
   };
   EXPECT_NE(hash_of_world({"bodies.cart.kind=rigid"}),
             hash_of_world({"bodies.cart.kind=rigid", "bodies.cart.role=obstacle"}));
+
+  const auto hash_with_motion_of = [&](const char* body) {
+    return hash_of_world(
+        {"bodies.block.kind=rigid", "bodies.cart.kind=rigid", "bodies.cart.role=obstacle",
+         fmt::format("motions=[{{ body = \"{}\", keyframes = [{{ at_s = 1, angle_deg = 9 }}] }}]", body)});
+  };
+  EXPECT_NE(hash_with_motion_of("block"), hash_with_motion_of("cart"));
 
   // Those that go with others, or without.
   const auto text_of_stage = [](const char* from, const char* to) {

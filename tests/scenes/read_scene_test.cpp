@@ -286,7 +286,6 @@ TEST(ReadScene, ComplainsWithLineAndColumn) {
        "lost_below_m", "unknown key"},
       {"radius_m = 0.25\n", "radius_m = 0.25\nshape = { angle_deg = 90 }\n", "{ angle_deg",
        "without a tolerance"},
-      {"[goal]\ncenter_of_mass_m = [9, 1.5, 1.5]\nradius_m = 0.25\n", "", "name", "add [goal]"},
       {"name = \"gate\"", "name = \"robot\"", "\"robot\"\nrole = \"obst", "two bodies are called \"robot\""},
       {"name = \"gate\"", "name = \"../gate\"", "\"../gate\"", "letters, digits"},
       {"[9, 1.5, 1.5]", "[11, 1.5, 1.5]", "[11,",
@@ -398,12 +397,146 @@ TEST(Sets, SceneIsReadAgainFromItsTextAndSets) {
   EXPECT_EQ(twice.bodies[0].material.friction, 0.7);
 }
 
+// All that a scene says, but for its text.
+std::string all_of(const Scene& s);
+
 bool reads_or_complains(const std::string& text) {
   try {
     read_scene(text, "s.toml");
   } catch (const InputError&) {
   }
   return true;  // anything else flies on and fails the test
+}
+
+const std::string shutter = R"([[bodies]]
+name = "shutter"
+role = "obstacle"
+kind = "rigid"
+model = { box = { size_m = [1, 1, 1] } }
+cage = { cells = [1, 1, 1] }
+pose = { position_m = [8, 1.5, 1.5] }
+)";
+const std::string script = R"([[forces]]
+body = "robot"
+from_s = 0.5
+to_s = 2
+force_n = [3, 4, 5]
+[[motions]]
+body = "shutter"
+keyframes = [{ at_s = 1, position_m = [8, 1.5, 1.2] }, { at_s = 3, axis = [0, 0, 2], angle_deg = 720 }]
+)";
+
+// Where nothing is planned nothing is asked for that only planning needs.
+TEST(ReadScene, AScenesGoalRobotAndPlannerMayLackWhereItIsSimulated) {
+  const std::string no_goal =
+                        replaced(good, "[goal]\ncenter_of_mass_m = [9, 1.5, 1.5]\nradius_m = 0.25\n", ""),
+                    no_planner = replaced(no_goal, "[planner]\npreset = \"paper\"\nmax_force_n = 500\n", ""),
+                    no_robot = replaced(no_planner, "role = \"robot\"", "role = \"free\"");
+  const auto lack = [](const std::string& text) {
+    const Scene scene = read_scene(text, "s.toml");
+    try {
+      require_plannable(scene);
+    } catch (const InputError& error) {
+      EXPECT_EQ(scene.lacks, error.what());
+      return std::string(error.what());
+    }
+    return std::string();
+  };
+  const std::string can =
+      "s.toml:1:1: the scene can only be simulated (limber simulate); to be planned it lacks ";
+  EXPECT_EQ(lack(good), "");
+  EXPECT_EQ(lack(no_goal), can + "[goal]; add it");
+  EXPECT_EQ(lack(no_planner), can + "[goal], [planner]; add them");
+  EXPECT_EQ(lack(no_robot), can + "[goal], [planner], a body with role = \"robot\"; add them");
+  EXPECT_EQ(read_scene(no_goal, "s.toml").planner.preset, "paper");
+
+  // Sizes are told against the first that can be pushed.
+  EXPECT_EQ(read_scene(no_robot, "s.toml").robot, 0);
+  const std::string first_stands =
+      replaced(no_robot, "role = \"free\"\n", "role = \"obstacle\"\nkind = \"rigid\"\n");
+  EXPECT_EQ(read_scene(first_stands, "s.toml").robot, 1);
+  EXPECT_NE(complaint(first_stands, {"bodies.gate.kind=rigid"}).find("s.toml:4:1: no body can be pushed"),
+            std::string::npos)
+      << complaint(first_stands, {"bodies.gate.kind=rigid"});
+
+  // What is there is read as ever, and a goal wants the rest.
+  EXPECT_NE(
+      complaint(no_goal + "[[via]]\ncenter_of_mass_m = [5, 1, 1]\nradius_m = 1\n").find("before [goal]"),
+      std::string::npos);
+  EXPECT_NE(complaint(replaced(good, "[planner]\npreset = \"paper\"\nmax_force_n = 500\n", ""))
+                .find("s.toml:1:1: the scene lacks \"planner\""),
+            std::string::npos);
+  EXPECT_NE(complaint(no_goal, {"planner.max_force_n=-1"}).find("planner.max_force_n"), std::string::npos);
+}
+
+TEST(Script, StandsInTheSceneOrInAFileOfItsOwn) {
+  const Scene one = read_scene(good + shutter + script, "s.toml"),
+              two = read_scene(good + shutter, "s.toml", {}, {script, "c.toml"});
+  EXPECT_EQ(all_of(one), all_of(two));
+  ASSERT_EQ(two.forces.size(), 1U);
+  EXPECT_EQ(two.forces[0].body, 0);
+  EXPECT_EQ(two.forces[0].force_n, Vec3(3, 4, 5));
+  ASSERT_EQ(two.motions.size(), 1U);
+  EXPECT_EQ(two.motions[0].keyframes[1].position_m, Vec3(8, 1.5, 1.5));  // its pose's
+  EXPECT_EQ(two.motions[0].keyframes[1].axis, Vec3::UnitZ());
+  EXPECT_EQ(two.script.text, script);
+  // The file's lists follow the scene's; edits come last.
+  const std::string force = "[[forces]]\nbody = \"gate\"\nto_s = 1\nforce_n = [0, 0, 1]\n";
+  const Scene both = read_scene(good + shutter + force, "s.toml", {"forces.1.to_s=4"}, {script, "c.toml"});
+  ASSERT_EQ(both.forces.size(), 2U);
+  EXPECT_EQ(both.forces[0].body, 1);
+  EXPECT_EQ(both.forces[1].to_s, 4);
+  EXPECT_EQ(read_scene(good, "s.toml", {}, {"# nothing", "c.toml"}).forces.size(), 0U);
+}
+
+TEST(Script, ComplainsWithLineAndColumn) {
+  const std::string text = good + shutter + script;
+  const Slip slips[] = {
+      {"body = \"robot\"\nfrom", "body = \"robt\"\nfrom", "\"robt\"",
+       "it must be a body that is not scenery"},
+      {"body = \"robot\"\nfrom", "body = \"shutter\"\nfrom", "\"shutter\"\nfrom", "which no force moves"},
+      {"to_s = 2", "to_s = 0.5", "0.5\nforce_n", "forces[0].to_s is 0.5, not after from_s, 0.5"},
+      {"from_s = 0.5", "from_s = -1", "-1", "must be ≥ 0"},
+      {"[3, 4, 5]", "[3, nan, 5]", "nan", "write a finite number"},
+      {"to_s = 2\n", "", "[[forces]]", "lacks \"to_s\""},
+      {"body = \"shutter\"\nkeyframes", "body = \"gate\"\nkeyframes", "\"gate\"\nkeyframes = [{ at_s",
+       "no rigid obstacle, and goes where it is pushed"},
+      {"at_s = 3", "at_s = 1", "1, axis", "keyframe at 1 s does not come after the one at 1 s"},
+      {"at_s = 1", "at_s = 0", "0, position", "must be > 0"},
+      {"axis = [0, 0, 2]", "axis = [0, 0, 0]", "[0, 0, 0], angle", "points nowhere"},
+      {"keyframes = [{ at_s = 1, position_m = [8, 1.5, 1.2] }, { at_s = 3, axis = [0, 0, 2], angle_deg = 720 "
+       "}]",
+       "keyframes = []", "[]\n", "keyframes is empty"},
+      {"pose = { position_m = [8, 1.5, 1.5] }\n",
+       "pose = { position_m = [8, 1.5, 1.5] }\nvelocity_m_s = [1, 0, 0]\n", "[1, 0, 0]",
+       "bodies.shutter cannot be pushed, and has no velocity_m_s"},
+  };
+  for (const Slip& slip : slips) {
+    SCOPED_TRACE(fmt::format("{} → {}", slip.from, slip.to));
+    const std::string slipped = replaced(text, slip.from, slip.to), said = complaint(slipped);
+    EXPECT_THAT(said, HasSubstr(slip.words));
+    EXPECT_THAT(said, StartsWith(place(slipped, slip.at)));
+    EXPECT_THAT(said, HasSubstr(";"));
+  }
+  EXPECT_THAT(complaint(text + script.substr(script.find("[[motions]]"))), HasSubstr("has a motion already"));
+
+  // Of a file of its own the complaint names that.
+  const auto of_script = [&](const std::string& words) -> std::string {
+    try {
+      read_scene(good + shutter, "s.toml", {}, {words, "c.toml"});
+    } catch (const InputError& error) {
+      return error.what();
+    }
+    return "no complaint";
+  };
+  EXPECT_THAT(of_script(replaced(script, "to_s = 2", "to_s = 0.5")), StartsWith("c.toml:4:8: "));
+  EXPECT_THAT(of_script(replaced(script, "force_n", "force")),
+              StartsWith("c.toml:5:1: unknown key \"force\""));
+  EXPECT_THAT(of_script("[planner]\nseed = 2\n"),
+              AllOf(StartsWith("c.toml:1:"), HasSubstr("\"planner\" is not for this file")));
+  EXPECT_THAT(of_script("forces = 3\n"), StartsWith("c.toml:1:"));
+  EXPECT_THAT(of_script("forces = [\n"), StartsWith("c.toml:"));
+  for (std::size_t n = 0; n < script.size(); ++n) of_script(script.substr(0, n));  // refused or read
 }
 
 TEST(ReadScene, EveryTruncatedPrefixIsReadOrRefused) {
@@ -506,6 +639,9 @@ std::string another_value(const Key& key) {
       {"cameras[].keyframes[].target_m", "[0, 0.5, 1]"},
       {"bodies[].role", "\"free\""},
       {"planner.duration_s", "[0.3, 0.4]"},
+      {"forces[].body", "\"gate\""},
+      {"forces[].box_m", "[[0, 0, 0], [1, 2, 2]]"},
+      {"motions[].body", "\"shutter\""},
   };
   if (const auto at = particular.find(key.path); at != particular.end()) return at->second;
   switch (key.type) {
@@ -533,9 +669,6 @@ std::string another_value(const Key& key) {
       return "";
   }
 }
-
-// All that a scene says, but for its text.
-std::string all_of(const Scene& s);
 
 TEST(Keys, EveryKeyChangesTheScene) {
   const std::string file_robot = "bodies.robot.model={ file = \"a.off\" }",
@@ -580,21 +713,28 @@ TEST(Keys, EveryKeyChangesTheScene) {
       sets = {key.name() == "box_m"
                   ? "bodies.robot.parts=[{ box_m = [[0, 0, 0], [1, 1, 1]], density_kg_m3 = 1 }]"
                   : "bodies.robot.parts=[{ shell = 0, density_kg_m3 = 1 }]"};
+    if (key.parent() == "forces[]") sets = {"forces=[{ body = \"robot\", to_s = 1, force_n = [1, 0, 0] }]"};
+    if (key.path.starts_with("motions[]"))
+      sets = {"bodies.gate.kind=rigid",
+              "motions=[{ body = \"gate\", keyframes = [{ at_s = 1, angle_deg = 10 }] }]"};
     std::string path = replaced(std::string(key.path) + " ", " ", "");
     const std::string body = plate || fixed || key.path == "bodies[].kind" || key.path == "bodies[].role" ||
                                      key.path == "bodies[].triangles"
                                  ? "bodies.gate"
                                  : "bodies.robot";
-    if (path.starts_with("via[]")) path = replaced(path, "via[]", "via.0");
+    for (const char* list : {"via", "forces", "motions"})
+      if (path.starts_with(list + std::string("[]")))
+        path = replaced(path, list + std::string("[]"), list + std::string(".0"));
     if (path.starts_with("bodies[]")) path = replaced(path, "bodies[]", body);
     if (fixed && path.ends_with(".box_m")) path = replaced(path, "[]", ".1");
     if (path.find("parts[]") != path.npos) path = replaced(path, "parts[]", "parts.0");
     if (path.starts_with("cameras[]")) path = replaced(path, "cameras[]", "cameras.side");
     if (path.find("keyframes[]") != path.npos) path = replaced(path, "keyframes[]", "keyframes.0");
-    const std::string before = all_of(read_scene(good, "s", sets));
+    const std::string text = key.path == "motions[].body" ? good + shutter : good,
+                      before = all_of(read_scene(text, "s", sets));
     sets.push_back(path + "=" + another_value(key));
     SCOPED_TRACE(sets.back());
-    EXPECT_NE(all_of(read_scene(good, "s", sets)), before);
+    EXPECT_NE(all_of(read_scene(text, "s", sets)), before);
     ++leaves;
   }
   EXPECT_GT(leaves, 60);
@@ -674,11 +814,20 @@ std::string all_of(const Scene& s) {
     t += fmt::format(" {} {} {} {}", body.opacity, body.roughness, body.metallic, body.max_volume_change);
     t += fmt::format(" {}", int(body.deformation));
     t += fmt::format(" {} {}", body.fixed.walls, body.max_stretch.value_or(-1));
+    t += v(body.velocity_m_s) + v(body.angular_velocity_rad_s);
     for (const Box& box : body.fixed.boxes_m) t += b(box);
     for (const PartSpec& part : body.parts)
       t += fmt::format(" {} {} {} {}", part.shell.value_or(-1), b(part.box_m),
                        part.youngs_modulus_pa.value_or(-1), part.density_kg_m3.value_or(-1));
     t += "\n";
+  }
+  for (const ForceSpec& f : s.forces)
+    t += fmt::format("{} {} {} {} {}\n", f.body, f.from_s, f.to_s, v(f.force_n),
+                     f.box_m ? b(*f.box_m) : std::string());
+  for (const MotionSpec& m : s.motions) {
+    t += fmt::format("{}", m.body);
+    for (const MotionSpec::Keyframe& k : m.keyframes)
+      t += fmt::format(" {} {} {} {}\n", k.at_s, v(k.position_m), v(k.axis), k.angle_deg);
   }
   const PlannerSpec& p = s.planner;
   t += fmt::format("{} {} {} {} {}\n", s.robot, v(s.goal.center_of_mass_m), s.goal.radius_m,

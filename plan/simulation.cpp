@@ -1,0 +1,101 @@
+#include "plan/simulation.h"
+
+#include <cmath>
+
+#include "core/error.h"
+#include "core/progress.h"
+#include "plan/course.h"
+
+namespace limber::plan {
+
+namespace {
+
+Control nothing_for(std::int64_t steps) {
+  Control control;
+  control.steps = std::int32_t(steps);
+  return control;
+}
+
+// A simulation of no time.
+Plan begun(const System& system, double frames_per_second) {
+  Plan plan;
+  plan.settings.frames_per_second = frames_per_second;
+  plan.system_hash = system.hash();
+  plan.trajectory.frames_per_second = frames_per_second;
+  plan.trajectory.end = system.start();
+  return plan;
+}
+
+void require_earlier(const System& system, const Plan& earlier, double frames_per_second) {
+  if (!earlier.simulation) throw InputError("what is there is no simulation; simulate anew");
+  if (earlier.system_hash != system.hash())
+    throw InputError("the earlier simulation is of another world, script or start; simulate anew");
+  if (earlier.trajectory.frames_per_second != frames_per_second)
+    throw InputError(
+        fmt::format("the earlier simulation has {} frames a second, and this one {}; simulate anew",
+                    earlier.trajectory.frames_per_second, frames_per_second));
+}
+
+void put_tree(const System& system, Plan& plan) {
+  const auto center = [&](const State& state) { return Vec3f(system.robot_center(state).cast<float>()); };
+  const State start = system.start(), &end = plan.trajectory.end;
+  plan.trajectory.controls = {nothing_for(end.step - start.step)};
+  plan.tree = {};
+  plan.tree.add(start, -1, Control{}, -1, center(start));
+  plan.best_node = plan.tree.add(end, 0, plan.trajectory.controls.front(), -1, center(end));
+}
+
+}  // namespace
+
+std::int64_t steps_of_simulation(const System& system, double duration_s) {
+  const double steps = std::round(duration_s / system.dt_s()), most = 2e9;
+  if (!(steps >= 1 && steps <= most))
+    throw InputError(
+        fmt::format("a simulation of {:g} s cannot be; its duration is at least a step, {:.3g} s, and "
+                    "at most {:.3g} s",
+                    duration_s, system.dt_s(), most * system.dt_s()));
+  return std::int64_t(steps);
+}
+
+Plan simulate_for(const System& system, double duration_s, double frames_per_second,
+                  std::optional<Plan> earlier, const std::function<void(double)>& watch) {
+  const std::int64_t first_step = system.start().step,
+                     last_step = first_step + steps_of_simulation(system, duration_s);
+  if (earlier) require_earlier(system, *earlier, frames_per_second);
+  Plan plan = earlier ? std::move(*earlier) : begun(system, frames_per_second);
+  Trajectory& path = plan.trajectory;
+  if (path.end.step > last_step)
+    throw InputError(fmt::format("{:g} s are simulated already; ask for a longer duration than that",
+                                 double(path.end.step - first_step) * system.dt_s()));
+
+  Settings settings;
+  settings.frames_per_second = frames_per_second;
+  Course course;
+  course.from = path.end;
+  course.controls = {nothing_for(last_step - path.end.step)};
+  bool stopped = false;
+  try {
+    run(system, settings, {&course, 1},
+        {.settle = CourseOptions::never,
+         .keep_frames = true,
+         .ask_acceptable = false,
+         .stoppable = true,
+         .watch = [&](const State& frame) {
+           if (watch) watch(double(frame.step - first_step) * system.dt_s());
+         }});
+  } catch (const Interrupted&) {
+    stopped = true;
+  }
+  const std::int64_t shown = path.frames.empty() ? -1 : path.frames.back().step;
+  for (State& frame : course.frames)
+    if (frame.step > shown) path.frames.push_back(std::move(frame));
+  const bool whole = !stopped && course.result != Course::diverged;
+  path.end = whole ? std::move(course.end) : path.frames.back();
+  plan.simulation = Simulation{duration_s, whole     ? Simulation::whole
+                                           : stopped ? Simulation::stopped
+                                                     : Simulation::diverged};
+  put_tree(system, plan);
+  return plan;
+}
+
+}  // namespace limber::plan
