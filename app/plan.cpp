@@ -303,7 +303,8 @@ Outcome plan(const PlanOptions& options, const scenes::Scene& scene) {
   const plan::ShortcutSettings shortcuts = shortcuts_of(scene, options, earlier_summary);
   Json extra;
   std::string extra_text;
-  if (earlier_summary.contains("shortcut")) extra["shortcut"] = earlier_summary.at("shortcut");
+  for (const char* later : {"shortcut", "improve", "refine"})
+    if (earlier_summary.contains(later)) extra[later] = earlier_summary.at(later);
   if (plan.solved() && shortcuts.rounds > shortcuts.rounds_done) {
     extra["shortcut"] = plan::json_of(plan::shorten(system, plan, shortcuts));
     extra_text += text_of_shortcut(extra.at("shortcut"));

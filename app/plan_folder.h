@@ -20,6 +20,7 @@ struct PlanFolder {
   Json summary;             // as `limber plan --json` printed it
   std::uint64_t file_hash;  // of plan.npz
   Json cage_hashes;         // by body name
+  std::string version;      // of the limber that wrote it
   bool sealed;              // as plan::PlanFile
 };
 
@@ -41,6 +42,9 @@ std::map<std::string, std::string> pictures_of(const scenes::Scene&, const fem::
 
 // Throws InputError when plan.npz is missing, damaged, or not limber's.
 PlanFolder read_plan_folder(const fs::path& folder);
+
+// The first entry of plan.npz that limber would write otherwise, or not at all; "" where there is none.
+std::string odd_entry(const fs::path& folder, const PlanFolder&, const std::vector<PreparedBody>&);
 
 // Throws InputError where the plan's states, controls or frame times are none of this world: what follows
 // would reach beyond its nodes, or replay without end.

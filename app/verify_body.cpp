@@ -1,13 +1,14 @@
 #include "app/verify_body.h"
 
 #include <cmath>
+#include <optional>
+#include <set>
 
 #include "core/error.h"
 #include "core/hash.h"
 #include "core/mesh_files.h"
 #include "meshing/cage.h"
 #include "meshing/contact_check.h"
-#include "meshing/contact_shape.h"
 #include "meshing/shell_check.h"
 #include "meshing/surface_tree.h"
 
@@ -62,8 +63,8 @@ void check_cage(const std::string& name, const PreparedBody& body, const meshing
             fmt::format("dihedrals {:.1f} … {:.1f} degrees", c.min_dihedral_deg, c.max_dihedral_deg));
 }
 
-void check_shells(const std::string& name, const PreparedBody& body, const std::vector<ConvexShell>& shells,
-                  Promises& table) {
+void check_shells(const std::string& name, const PreparedBody& body, const PrepareSettings& settings,
+                  const std::vector<ConvexShell>& shells, Promises& table) {
   const meshing::ShellCheck c = meshing::check_shells(shells, body.surface);
   table.row(name + ": shells are convex", c.not_convex == 0 && !shells.empty(),
             fmt::format("{} of {} are not", c.not_convex, shells.size()));
@@ -77,17 +78,16 @@ void check_shells(const std::string& name, const PreparedBody& body, const std::
     return std::abs(said.at(key).get<double>() - value) <= rounding * value;
   };
   // Of inflated shells the report tells of those before.
-  if (said.value("inflation", 0.0) == 0)
+  if (settings.inflate == 0)
     table.row(name + ": shells stand off the surface by what is said",
               is("mean_overshoot", c.mean_overshoot) && is("max_overshoot", c.max_overshoot),
               fmt::format("mean {:.3f} %, largest {:.3f} % of the diagonal", 100 * c.mean_overshoot,
                           100 * c.max_overshoot));
-  const std::string mode = body.report.at("cage").at("mode");
   bool labelled = body.shell_from_tet.size() == std::size_t(body.cage.tets.rows());
-  if (mode == "cells")
+  if (settings.tets == 0)  // in cells
     labelled = labelled && std::count(body.shell_from_tet.begin(), body.shell_from_tet.end(), 0) ==
                                std::ptrdiff_t(body.shell_from_tet.size());
-  else if (mode != "paper")
+  else if (settings.mode != "paper")
     labelled = labelled && body.shell_from_tet == meshing::label_tets(body.cage, shells);
   for (const int shell : body.shell_from_tet) labelled = labelled && shell >= 0 && shell < int(shells.size());
   table.row(name + ": each tet of the cage is of its shell", labelled, "");
@@ -128,12 +128,7 @@ void check_binding(const std::string& name, const PreparedBody& body, Promises& 
 }
 
 void check_contact(const std::string& name, const PreparedBody& body, Promises& table) {
-  if (!body.contact.usable) {
-    const ContactShape again = meshing::make_contact_shape(body.surface, body.cage);
-    table.row(name + ": contact is by the cage, for its surface has no inside to speak of", !again.usable,
-              "");
-    return;
-  }
+  if (!body.contact.usable) return;  // which making it again must come to, too
   const meshing::ContactCheck c = meshing::check_contact_shape(body.contact, body.surface, body.cage);
   table.row(name + ": distances for contact are the surface's", c.field_fault.empty(),
             c.field_fault.empty()
@@ -145,28 +140,135 @@ void check_contact(const std::string& name, const PreparedBody& body, Promises& 
                                    : c.sample_fault);
 }
 
+// A key of the report that limber does not write there, "" where there is none.
+std::string odd_key(const Json& report, const Json& facts, const Json& making) {
+  const std::set<std::string> known{
+      "version",       "model",    "input", "found",       "left",
+      "mended",        "warnings", "files", "cpu_seconds", "peak_memory_mb_after",
+      "peak_memory_mb"};
+  for (const auto& [table, value] : report.items()) {
+    const bool of_facts = facts.contains(table), of_making = making.contains(table);
+    if (!of_facts && !of_making && !known.contains(table)) return table;
+    if (!of_facts && !of_making) continue;
+    for (const auto& [key, figure] : value.items())
+      if (!facts.value(table, Json()).contains(key) && !making.value(table, Json()).contains(key))
+        return table + "." + key;
+  }
+  return report.at("files").size() == 5 ? "" : "files";
+}
+
+bool near(double a, double b, double size) { return std::abs(a - b) <= rounding * size; }
+
+template <class A, class B>
+bool near(const Eigen::DenseBase<A>& a, const Eigen::DenseBase<B>& b, double size) {
+  return a.rows() == b.rows() && a.cols() == b.cols() &&
+         (a.size() == 0 || (a.derived() - b.derived()).cwiseAbs().maxCoeff() <= rounding * size);
+}
+
+// But for the rounding of other machines: prepare may use libm.
+bool same_shells(const std::vector<ConvexShell>& a, const std::vector<ConvexShell>& b, double size) {
+  return std::equal(a.begin(), a.end(), b.begin(), b.end(),
+                    [&](const ConvexShell& one, const ConvexShell& other) {
+                      return one.triangles.rows() == other.triangles.rows() &&
+                             one.triangles == other.triangles && near(one.vertices, other.vertices, size);
+                    });
+}
+
+bool same_contact(const ContactShape& a, const ContactShape& b, double size) {
+  if (a.usable != b.usable) return false;
+  if (!a.usable) return true;
+  const DistanceField &f = a.field, &g = b.field;
+  const auto next_to = [](int one, int other) { return std::abs(one - other) <= 1; };
+  return f.nodes == g.nodes && near(f.lower_m, g.lower_m, size) && near(f.cell_m, g.cell_m, f.cell_m) &&
+         near(f.unit_m, g.unit_m, f.unit_m) &&
+         std::equal(f.values.begin(), f.values.end(), g.values.begin(), g.values.end(), next_to) &&
+         near(a.samples.positions_m, b.samples.positions_m, size) &&
+         near(a.samples.area_m2, b.samples.area_m2, size * size);
+}
+
+// Shells, cage and contact once more, from the surface alone: what a report tells of their making, null where
+// they cannot be made.
+Json check_making(const std::string& name, const PreparedBody& body, const PrepareSettings& settings,
+                  const std::vector<ConvexShell>& shells, const std::optional<TetMesh>& made_cage,
+                  Promises& table) {
+  const std::string row = name + ": shells, cage and contact made again from the surface: the same";
+  const bool in_cells = settings.tets == 0;
+  MadeBody made;
+  try {
+    made = make_body(body.surface, settings,
+                     in_cells ? std::optional(made_cage.value_or(body.cage)) : std::nullopt);
+  } catch (const InputError& error) {
+    table.row(row, false, error.what());
+    return {};
+  }
+  const double size = bounding_box(body.surface.positions).diagonal();
+  const TetMesh& cage = made.cage.mesh;
+  std::string wrong;
+  if (!same_shells(shells, made.decomposition.shells, size))
+    wrong = "shells.obj";
+  else if (cage.tets.rows() != body.cage.tets.rows() || cage.tets != body.cage.tets ||
+           !near(cage.positions, body.cage.positions, size) ||
+           made.cage.shell_from_tet != body.shell_from_tet)
+    wrong = "cage.msh";
+  else if (!same_contact(body.contact, made.contact, size))
+    wrong = "contact.npz";
+  table.row(row, wrong.empty(), wrong.empty() ? "" : wrong + " is another");
+  return facts_of_making(made, settings);
+}
+
+// Those that prepare would take; nothing where the report's are none.
+std::optional<PrepareSettings> settings_of(const PreparedBody& body) {
+  try {
+    const PrepareSettings s = settings_of_input(body.report.at("input"));
+    const auto share = [](double x) { return x >= 0 && x <= 1; };
+    const std::set<std::string> modes{"lattice", "fast", "paper", "conform"};
+    const bool good = s.shells >= 1 && s.shells <= 1000 && share(s.concavity) && share(s.inflate) &&
+                      (s.tets == 0 || (s.tets >= 24 && s.tets <= 200'000)) && modes.contains(s.mode);
+    return good ? std::optional(s) : std::nullopt;
+  } catch (const Json::exception&) {
+    return std::nullopt;
+  }
+}
+
 }  // namespace
 
-void check_body(const std::string& name, const PreparedBody& body, const fs::path& folder, Promises& table) {
+void check_body(const std::string& name, const PreparedBody& body, const fs::path& folder,
+                const std::optional<TetMesh>& made_cage, Promises& table) {
+  const std::optional<PrepareSettings> told = settings_of(body);
+  const PrepareSettings settings = told.value_or(PrepareSettings{});
   const std::vector<ConvexShell> shells = read_obj_shells(folder / "shells.obj");
   for (const ConvexShell& shell : shells) validate(shell, (folder / "shells.obj").string());
   const meshing::Certificate certificate = meshing::certify(body.surface, body.cage);
   check_cage(name, body, certificate, table);
-  check_shells(name, body, shells, table);
+  check_shells(name, body, settings, shells, table);
   check_binding(name, body, table);
   check_contact(name, body, table);
-  const std::string wrong = first_wrong(
-      facts_of_body(body.surface, shells, body.cage, body.binding, body.contact, certificate), body.report);
+  table.row(name + ": its settings are some that limber takes", told.has_value(), "");
+  const Json making = check_making(name, body, settings, shells, made_cage, table);
+  const Json facts = facts_of_body(body.surface, shells, body.cage, body.binding, body.contact, certificate);
+  std::string wrong = first_wrong(facts, body.report);
+  if (wrong.empty() && !making.is_null()) wrong = first_wrong(making, body.report);
+  if (wrong.empty() && !making.is_null()) wrong = odd_key(body.report, facts, making);
   table.row(name + ": report.json tells of these files", wrong.empty(),
             wrong.empty() ? "" : wrong + " is another's");
 }
 
-void check_origin(const std::string& name, const Origin& origin, Promises& table) {
+void check_origin(const std::string& name, const Origin& origin, bool must_be_here, Promises& table) {
   table.row(name + ": made as the scene says", origin.placed_so, "");
-  if (origin.same_surface)
-    table.row(name + ": surface is the scene's model", *origin.same_surface, "");
+  if (origin.same_surface || must_be_here)
+    table.row(name + ": surface is the scene's model", origin.same_surface.value_or(false),
+              origin.same_surface ? "" : "its model file is not here, or is another");
   else
     table.measured(name + ": surface", "its model file is not here to be compared with");
+}
+
+void check_goal_cage(GoalCage found, bool must_be_here, Promises& table) {
+  if (found == GoalCage::none_asked) return;
+  if (found == GoalCage::not_here && !must_be_here)
+    table.measured("goal.shape.cage", "its file is not here to be compared with");
+  else
+    table.row("the goal's shape is goal.shape.cage", found == GoalCage::same,
+              found == GoalCage::not_here ? "its file is not here" : "");
 }
 
 }  // namespace limber::app

@@ -9,8 +9,8 @@ namespace limber::app {
 
 // Replays the path and searches anew, by what the scene says. `figures` are overwritten by those of the
 // replay. Throws Interrupted after a stop signal.
-void check_plan(const PlanFolder&, const std::vector<PreparedBody>&, const fem::World&,
-                MotionFigures& figures, Promises&);
+void check_plan(const fs::path& folder, const PlanFolder&, const std::vector<PreparedBody>&,
+                const fem::World&, MotionFigures& figures, Promises&);
 
 // That the folder's other files show this plan: manifest.json, tree.svg, volume.svg, volume.png.
 void check_pictures(const fs::path& folder, const PlanFolder&, const fem::World&, const MotionFigures&,
