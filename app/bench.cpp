@@ -250,8 +250,11 @@ Outcome bench(const BenchOptions& options) {
     std::string lines;
     for (const Json& record : records) lines += text_of(record) + "\n";
     write_file(options.out / "runs.jsonl", lines);
+    write_file(options.out / "bench.html", page_of_bench(records, report));
     report["runs"] = (options.out / "runs.jsonl").string();
-    text += fmt::format("{} runs in {}\n", records.size(), (options.out / "runs.jsonl").string());
+    report["page"] = (options.out / "bench.html").string();
+    text += fmt::format("{} runs in {}, curves and tables in {}\n", records.size(),
+                        (options.out / "runs.jsonl").string(), (options.out / "bench.html").string());
   }
   if (options.ompl_log) {
     for (const fs::path& file : write_ompl_logs(records, *options.ompl_log)) {

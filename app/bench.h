@@ -27,6 +27,21 @@ Quartiles quartiles(std::vector<double> values);
 Json report_of(const RunRecords&);
 std::string text_of_report(const Json& report);
 
+// One page in HTML: the tables, and for each scene the share of its runs that are solved over iterations and
+// over CPU time.
+std::string page_of_bench(const RunRecords&, const Json& report);
+
+// What searches would take on average that behave as these runs did, in iterations; an unsolved run is one
+// that was given up after its own. NaN where none is solved.
+struct Expected {
+  double one_search = 0;     // and the next, until one is solved
+  double restart_after = 0;  // the number after which to give one up, of those at which a run was solved, …
+  double with_restarts = 0;  // … for which this is least
+  double quickest_of_8 = 0;  // of 8 different runs the least; NaN with fewer runs, or fewer solved than would
+                             // always have one among 8
+};
+Expected expected_iterations(const RunRecords& of_one_group);
+
 // The log that ompl_benchmark_statistics.py and Planner Arena read, of one scene, its presets as planners.
 // `date` as in "2026-01-31 12:00:00".
 std::string ompl_log(const RunRecords& of_one_scene, const std::string& date);

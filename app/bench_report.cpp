@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <set>
 
@@ -76,12 +77,21 @@ Json report_of_group(const std::vector<const Json*>& runs) {
   const Json gap_median = medians.empty() ? Json() : Json(quartiles(medians).median);
   std::int64_t inverted = 0;
   for (const Json* run : solved) inverted += run->at("inverted_tets").get<std::int64_t>();
+  RunRecords own;
+  for (const Json* run : runs) own.push_back(*run);
+  const Expected expected = expected_iterations(own);
+  const auto or_null = [](double value) { return std::isfinite(value) ? Json(value) : Json(); };
   return {{"scene", runs.front()->at("scene")},
           {"preset", runs.front()->at("preset")},
           {"runs", runs.size()},
           {"solved", solved.size()},
           {"unsolved_seeds", unsolved},
           {"iterations", spread(runs, "iterations")},
+          {"expected",
+           {{"one_search", or_null(expected.one_search)},
+            {"restart_after", or_null(expected.restart_after)},
+            {"with_restarts", or_null(expected.with_restarts)},
+            {"quickest_of_8", or_null(expected.quickest_of_8)}}},
           {"cpu_s", spread(runs, "cpu_s")},
           {"wall_s", spread(runs, "wall_s")},
           {"motion_s", spread(solved, "motion_s")},
@@ -172,6 +182,49 @@ Quartiles quartiles(std::vector<double> values) {
     return values[below] + (place - double(below)) * (values[above] - values[below]);
   };
   return {at(0.25), at(0.5), at(0.75)};
+}
+
+Expected expected_iterations(const RunRecords& runs) {
+  struct Run {
+    double iterations;
+    bool solved;
+  };
+  std::vector<Run> ordered;
+  for (const Json& run : runs)
+    ordered.push_back({run.at("iterations").get<double>(), run.at("solved").get<bool>()});
+  std::sort(ordered.begin(), ordered.end(),
+            [](const Run& a, const Run& b) { return a.iterations < b.iterations; });
+  const auto with_limit = [&](double limit) {
+    double sum = 0, solved = 0;
+    for (const Run& run : ordered) {
+      sum += std::min(run.iterations, limit);
+      solved += run.solved && run.iterations <= limit ? 1 : 0;
+    }
+    return sum / solved;
+  };
+  constexpr double none = std::numeric_limits<double>::quiet_NaN();
+  Expected expected{none, none, none, none};
+  if (std::none_of(ordered.begin(), ordered.end(), [](const Run& run) { return run.solved; }))
+    return expected;
+  expected.one_search = with_limit(std::numeric_limits<double>::infinity());
+  for (const Run& run : ordered)
+    if (const double takes = with_limit(run.iterations); run.solved && !(takes >= expected.with_restarts))
+      expected.restart_after = run.iterations, expected.with_restarts = takes;
+
+  // That the k-th of n is the least of 8 has the probability C(n − 1 − k, 7) / C(n, 8).
+  std::vector<double> solved;
+  for (const Run& run : ordered)
+    if (run.solved) solved.push_back(run.iterations);
+  const double n = double(ordered.size());
+  if (n < 8 || n - double(solved.size()) >= 8) return expected;
+  double sum = 0, before_none = 1;  // the probability that none of the k first is among the 8
+  for (std::size_t k = 0; k < solved.size(); ++k) {
+    const double here = before_none * std::min(1.0, 8 / (n - double(k)));
+    sum += here * solved[k];
+    before_none -= here;
+  }
+  expected.quickest_of_8 = sum;
+  return expected;
 }
 
 Json report_of(const RunRecords& records) {

@@ -32,7 +32,8 @@ struct PrepareSettings {
 // Where a body comes from. `identity` holds all that load() and made_cage() depend on: when it and the
 // settings are those of the folder's report, the folder is up to date.
 struct BodySource {
-  std::string model;  // a file's name, or a word for a made model
+  std::string model;    // a file's name, or a word for a made model
+  std::string warning;  // for whoever prepares it, not for whoever looks at it again; else empty
   Json identity;
   std::function<meshing::ImportedModel()> load;
   std::function<std::optional<TetMesh>()> made_cage = [] {

@@ -119,6 +119,12 @@ void add_plan(CLI::App& command, PlanOptions& options) {
   command.add_option("--seed", options.seed, "seed of the random numbers, 0 … 2^53; default: the scene's")
       ->check(within(0.0, 0x1p53));
   command
+      .add_option("--portfolio", options.portfolio,
+                  "this many searches in turns, with the seed and those after it, 2 … 1000; the one with the "
+                  "fewest iterations wins")
+      ->check(CLI::Range(2, 1000))
+      ->type_name("N");
+  command
       .add_option("--preset", options.preset,
                   "paper: Algorithm 1 of Rodriguez, Lien and Amato 2006; fast: what we found to be better; "
                   "default: the scene's")

@@ -54,6 +54,7 @@ struct PlanOptions {
   SceneOptions scene;
   fs::path out;
   std::optional<std::int64_t> seed, iterations;
+  int portfolio = 1;   // searches, with this seed and those after it, of which the quickest wins
   std::string preset;  // empty: the scene's
   double time_limit_s = std::numeric_limits<double>::infinity();
   int in_flight = 0;  // 0: chosen from threads and lanes

@@ -16,6 +16,7 @@
 #include "core/temporary_files.h"
 #include "core/threads.h"
 #include "plan/anytime.h"
+#include "plan/portfolio.h"
 #include "scenes/library.h"
 
 namespace limber::app {
@@ -63,6 +64,14 @@ std::string text_of_shortcut(const Json& report) {
       report.at("accepted").get<int>(), report.at("rounds").get<int>(), report.at("cpu_s").get<double>(),
       change("duration_s", 1), change("effort_n_s", 1), change("strain_energy_j", 1),
       change("volume_change", 100));
+}
+
+std::string text_of_portfolio(const plan::PortfolioReport& report, const plan::Plan& plan) {
+  const std::uint64_t first = report.searches.front().seed, last = report.searches.back().seed;
+  return fmt::format(
+      "  portfolio    seeds {} to {}, {} iterations in all, {:.2f} CPU s, {:.2f} s; {} seed {}\n", first,
+      last, report.iterations, report.cpu_s, report.wall_s,
+      plan.solved() ? "the quickest is" : "none solves it, the nearest is", plan.settings.seed);
 }
 
 std::string text_of_improvements(const plan::AnytimeReport& report) {
@@ -280,6 +289,10 @@ Outcome plan(const PlanOptions& options, const scenes::Scene& scene) {
   const FemSystem system(world, goal_rules_of(scene));
   const plan::Settings settings = settings_of(scene, options);
   const fs::path file = options.out / "plan.npz";
+  const bool several = options.portfolio > 1;
+  if (several && (options.resume || options.stats))
+    throw InputError(fmt::format("--portfolio is of several searches, {} of one; leave one of the two out",
+                                 options.resume ? "--resume" : "--stats"));
 
   std::optional<plan::Plan> earlier;
   Json earlier_summary;
@@ -295,9 +308,12 @@ Outcome plan(const PlanOptions& options, const scenes::Scene& scene) {
   }
   std::optional<SearchLog> search_log;
   if (options.stats) search_log.emplace(*options.stats, earlier ? earlier->statistics.iterations : 0);
-  plan::Plan plan = plan::plan(system, settings, std::move(earlier), [&](const plan::Moment& moment) {
-    if (search_log) search_log->add(moment);
-  });
+  plan::PortfolioReport searches;
+  plan::Plan plan = several
+                        ? plan::portfolio(system, settings, options.portfolio, &searches)
+                        : plan::plan(system, settings, std::move(earlier), [&](const plan::Moment& moment) {
+                            if (search_log) search_log->add(moment);
+                          });
   if (search_log) search_log->finish();
 
   const plan::ShortcutSettings shortcuts = shortcuts_of(scene, options, earlier_summary);
@@ -305,6 +321,10 @@ Outcome plan(const PlanOptions& options, const scenes::Scene& scene) {
   std::string extra_text;
   for (const char* later : {"shortcut", "improve", "refine"})
     if (earlier_summary.contains(later)) extra[later] = earlier_summary.at(later);
+  if (several) {
+    extra["portfolio"] = plan::json_of(searches);
+    extra_text += text_of_portfolio(searches, plan);
+  }
   if (plan.solved() && shortcuts.rounds > shortcuts.rounds_done) {
     extra["shortcut"] = plan::json_of(plan::shorten(system, plan, shortcuts));
     extra_text += text_of_shortcut(extra.at("shortcut"));
@@ -361,7 +381,13 @@ bool plan_is_up_to_date(const PlanOptions& options, const scenes::Scene& scene) 
     const std::vector<PreparedBody> bodies = prepare_bodies(scene, options.scene.data, options.out);
     const PlanFolder folder = read_plan_folder(options.out);
     const fem::World world = build_world(scene, bodies, State(folder.plan.tree.states[0]).positions);
-    const plan::Settings settings = settings_of(scene, options);
+    plan::Settings settings = settings_of(scene, options);
+    const Json searches = folder.summary.value("portfolio", Json::object()).value("searches", Json::array());
+    if (options.portfolio > 1
+            ? searches.size() != std::size_t(options.portfolio) || searches.at(0).at("seed") != settings.seed
+            : !searches.empty())
+      return false;
+    if (!searches.empty()) settings.seed = folder.plan.settings.seed;
     return folder.plan.system_hash == FemSystem(world, goal_rules_of(scene)).hash() &&
            plan::first_difference(folder.plan.settings, settings).empty() && finished(folder.plan) &&
            (folder.plan.solved() || folder.plan.settings.max_iterations >= settings.max_iterations) &&

@@ -7,6 +7,7 @@
 #include "app/commands.h"
 #include "app/fem_system.h"
 #include "app/manifest.h"
+#include "app/page.h"
 #include "app/plan_folder.h"
 #include "app/report_motion.h"
 #include "app/scene_world.h"
@@ -24,7 +25,6 @@
 namespace limber::app {
 
 // app/report/, made part of the program by cmake/limber_embed.cmake.
-extern const char* const report_css;
 extern const char* const report_viewer;
 extern const char* const report_script;
 
@@ -32,17 +32,6 @@ namespace {
 
 // A film beyond this makes a page that no longer opens at once.
 constexpr std::uintmax_t largest_film_bytes = 8'000'000;
-
-std::string escaped(const std::string& text) {
-  std::string html;
-  for (const char c : text)
-    html += c == '&'   ? "&amp;"
-            : c == '<' ? "&lt;"
-            : c == '>' ? "&gt;"
-            : c == '"' ? "&quot;"
-                       : std::string(1, c);
-  return html;
-}
 
 std::string base64(std::string_view bytes) {
   constexpr const char* letters = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
@@ -61,9 +50,6 @@ std::string base64(std::string_view bytes) {
 Json json_of(const Vec3& v) { return {v.x(), v.y(), v.z()}; }
 Json json_of(const Box& box) { return {json_of(box.lower), json_of(box.upper)}; }
 
-// Within a page: the declaration that begins an SVG file goes.
-std::string inlined(const std::string& svg) { return svg.substr(svg.find("<svg")); }
-
 struct Findings {
   const PlanFolder& planned;
   const std::vector<PreparedBody>& bodies;
@@ -79,49 +65,8 @@ struct Findings {
   const std::vector<State>& frames() const { return plan().trajectory.frames; }
 };
 
-class Page {
- public:
-  template <class... Arguments>
-  void add(fmt::format_string<Arguments...> form, Arguments&&... arguments) {
-    fmt::format_to(std::back_inserter(html_), form, std::forward<Arguments>(arguments)...);
-  }
-  void add_text(std::string_view text) { html_ += text; }
-
-  // Head, then rows; of a cell that begins with a digit or a sign the whole column is of numbers.
-  void table(const std::vector<std::string>& head, const std::vector<std::vector<std::string>>& rows) {
-    std::vector<const char*> classes(head.size(), "");
-    for (std::size_t c = 0; c < head.size() && !rows.empty(); ++c)
-      if (!rows[0][c].empty() && std::string("0123456789-−").find(rows[0][c][0]) != std::string::npos)
-        classes[c] = " class=\"number\"";
-    add("<div class=\"card wide\"><table>\n<tr>");
-    for (std::size_t c = 0; c < head.size(); ++c) add("<th{}>{}</th>", classes[c], escaped(head[c]));
-    add("</tr>\n");
-    for (const std::vector<std::string>& row : rows) {
-      add("<tr>");
-      for (std::size_t c = 0; c < row.size(); ++c) add("<td{}>{}</td>", classes[c], escaped(row[c]));
-      add("</tr>\n");
-    }
-    add("</table></div>\n");
-  }
-  const std::string& html() const { return html_; }
-
- private:
-  std::string html_;
-};
-
 void begin(const Findings& f, Page& page) {
-  // Nothing may be fetched from anywhere, says the page itself.
-  page.add(
-      "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n"
-      "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n"
-      "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; style-src 'unsafe-inline'; "
-      "script-src 'unsafe-inline'; img-src data:; media-src data:\">\n"
-      "<meta name=\"generator\" content=\"limber {}\">\n<link rel=\"icon\" href=\"data:,\">\n<title>{}: "
-      "limber report</title>\n<style>\n",
-      version, escaped(f.scene().name));
-  page.add_text(report_css);
-  page.add("</style>\n</head>\n<body>\n<main>\n<h1>{}</h1>\n<p class=\"lead\">{}</p>\n",
-           escaped(f.scene().name), escaped(f.scene().description));
+  page.begin(f.scene().name, f.scene().name + ": limber report", f.scene().description);
 }
 
 void summary(const Findings& f, Page& page) {

@@ -53,8 +53,8 @@ BodySource source_of(const scenes::Scene& scene, const scenes::BodySpec& body,
       throw InputError(fmt::format("scene {}: body {}: {}", scene.name, body.name,
                                    scenes::how_to_get_model(file->file, folders)));
     if (!path)
-      log::warn("body {}: {} The made model \"{}\" takes its place.", body.name,
-                scenes::how_to_get_model(file->file, folders), file->made);
+      source.warning = fmt::format("body {}: {}. The made model \"{}\" takes its place.", body.name,
+                                   scenes::how_to_get_model(file->file, folders), file->made);
   }
   if (path) {
     source.model = path->filename().string();
@@ -92,12 +92,13 @@ fs::path scenery_file(const fs::path& work_folder, const scenes::BodySpec& body,
   return work_folder / "scenery" / (body.name + extension);
 }
 
-// A model that is not found leaves an empty mesh: without scenery a scene is still what it is.
+// A model that is not found loads an empty mesh: without scenery a scene is still what it is.
 BodySource source_of_scenery(const scenes::Scene& scene, const scenes::BodySpec& body,
                              const std::vector<fs::path>& data) {
   BodySource source;
   try {
     source = source_of(scene, body, data);
+    if (!source.warning.empty()) log::warn("{}", source.warning);
   } catch (const InputError& error) {
     log::warn("{}. It is left out of the pictures.", error.what());
     source.model = "nothing";
@@ -113,7 +114,16 @@ SurfaceMesh make_scenery(const scenes::BodySpec& body, const BodySource& source)
   return surface;
 }
 
-// NAME.ply, and beside it NAME.json, which says where it comes from.
+// Of a scenery's NAME.json: whether its model was found.
+bool was_found(const Json& said) {
+  return !said.is_object() || !said.contains("input") || said.at("input").contains("model");
+}
+Json hash_of_scenery(const fs::path& mesh, const Json& said) {
+  return was_found(said) ? Json(hex(hash_of(std::string_view(read_file(mesh))))) : Json();
+}
+
+// NAME.ply, and beside it NAME.json, which says where it comes from. Of a model that was not found there is
+// no mesh, and the hash is null.
 void prepare_scenery(const scenes::Scene& scene, const scenes::BodySpec& body,
                      const std::vector<fs::path>& data, const fs::path& work_folder) {
   const BodySource source = source_of_scenery(scene, body, data);
@@ -122,17 +132,21 @@ void prepare_scenery(const scenes::Scene& scene, const scenes::BodySpec& body,
   try {
     const Json made = read_json(origin);
     if (made.at("version") == version && made.at("input") == source.identity &&
-        made.at("hash") == hex(hash_of(std::string_view(read_file(mesh)))))
+        made.at("hash") == hash_of_scenery(mesh, made))
       return;
   } catch (const InputError&) {
   } catch (const Json::exception&) {
   }
   log::info("{}: reading {}", mesh.string(), source.model);
   make_folder(mesh.parent_path());
-  write_ply(mesh, make_scenery(body, source));
-  write_json(origin, {{"version", version},
-                      {"input", source.identity},
-                      {"hash", hex(hash_of(std::string_view(read_file(mesh))))}});
+  const Json input = {{"version", version}, {"input", source.identity}};
+  if (was_found(input))
+    write_ply(mesh, make_scenery(body, source));
+  else
+    fs::remove(mesh);
+  Json told = input;
+  told["hash"] = hash_of_scenery(mesh, input);
+  write_json(origin, told);
 }
 
 }  // namespace
@@ -179,6 +193,7 @@ std::vector<PreparedBody> prepare_bodies(const scenes::Scene& scene, const std::
   for (const scenes::BodySpec& body : scene.bodies) {
     throw_if_stopped();
     const BodySource source = source_of(scene, body, data);
+    if (!source.warning.empty()) log::warn("{}", source.warning);
     prepare_body(source, settings_of(body), body_folder(work_folder, body));
   }
   keep_goal_cage(scene, data, work_folder);
@@ -192,6 +207,7 @@ std::vector<PreparedBody> prepare_bodies(const scenes::Scene& scene, const std::
 LoadedModel load_model(const scenes::Scene& scene, const scenes::BodySpec& body,
                        const std::vector<fs::path>& data) {
   const BodySource source = source_of(scene, body, data);
+  if (!source.warning.empty()) log::warn("{}", source.warning);
   return {source.model, source.load(), source.made_cage()};
 }
 
@@ -236,11 +252,20 @@ Origin origin_of_scenery(const scenes::Scene& scene, const scenes::BodySpec& bod
   Origin origin;
   const fs::path mesh = scenery_file(work_folder, body, ".ply");
   const Json said = read_json(scenery_file(work_folder, body, ".json"));
+  if (!was_found(said)) {
+    // Only a file is ever not found.
+    const auto* file = std::get_if<scenes::FileModel>(&body.model);
+    origin.placed_so = file && file->made.empty() &&
+                       said == Json{{"version", said.value("version", "")},
+                                    {"input", {{"triangles", body.triangles}}},
+                                    {"hash", Json()}} &&
+                       !fs::exists(mesh);
+    return origin;
+  }
   try {
     Json identity = identity_of(body, said.at("input").at("model").at("source").get<std::string>());
     identity["triangles"] = body.triangles;
-    origin.placed_so =
-        said.at("input") == identity && said.at("hash") == hex(hash_of(std::string_view(read_file(mesh))));
+    origin.placed_so = said.at("input") == identity && said.at("hash") == hash_of_scenery(mesh, said);
     if (const auto* file = std::get_if<scenes::FileModel>(&body.model);
         file && !scenes::find_model(file->file, with(data, scene.folder)))
       return origin;
@@ -248,11 +273,7 @@ Origin origin_of_scenery(const scenes::Scene& scene, const scenes::BodySpec& bod
     if (found.identity == said.at("input"))
       origin.same_surface = same_surface(make_scenery(body, found), read_ply(mesh));
   } catch (const Json::exception&) {
-    // Of a model that was not found, no source is told.
-    const auto* file = std::get_if<scenes::FileModel>(&body.model);
-    origin.placed_so = file && file->made.empty() && said.is_object() &&
-                       !said.value("input", Json::object()).contains("model") &&
-                       read_ply(mesh).positions.rows() == 0;
+    origin.placed_so = false;
   }
   return origin;
 }
@@ -285,7 +306,8 @@ std::vector<SurfaceMesh> read_scenery(const scenes::Scene& scene, const fs::path
   for (const scenes::BodySpec& body : scene.scenery) {
     const fs::path file = scenery_file(work_folder, body, ".ply");
     try {
-      meshes.push_back(read_ply(file));
+      const Json said = read_json(scenery_file(work_folder, body, ".json"));
+      meshes.push_back(was_found(said) ? read_ply(file) : SurfaceMesh{});
     } catch (const InputError& error) {
       throw InputError(fmt::format("{}; make it anew with limber plan", error.what()));
     }

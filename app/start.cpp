@@ -101,7 +101,7 @@ double write_still(const Start& start, const std::string& camera, std::pair<int,
   if (file.extension() != ".png")
     throw InputError(fmt::format("{}: a still is a PNG; write for example still.png", file.string()));
   plan::Plan plan;  // that never left the start
-  plan.trajectory.frames = {fem::rest_state(start.world)};
+  plan.trajectory.frames = {fem::start_state(start.world)};
   scenes::Scene scene = start.scene;
   if (!start.prepared) scene.film.cages = scene.film.side_by_side = false;
   Output output;

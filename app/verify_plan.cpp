@@ -338,6 +338,30 @@ std::string wrong_of_later(const Json& summary, const plan::Plan& plan, const Js
   return "";
 }
 
+// That a portfolio tells of this plan, and of no search that would have won instead. The others are not done
+// again.
+bool is_quickest(const plan::Plan& plan, const Json& portfolio) try {
+  const Json& searches = portfolio.at("searches");
+  bool own = false;
+  std::uint64_t seed = searches.at(0).at("seed").get<std::uint64_t>();
+  std::int64_t sum = 0;
+  for (const Json& search : searches) {
+    const std::int64_t iterations = search.at("iterations").get<std::int64_t>();
+    const bool solved = search.at("solved").get<bool>(), earlier = seed < plan.settings.seed;
+    if (search.at("seed") != seed) return false;
+    if (seed++ == plan.settings.seed) {
+      own = solved == plan.solved() && iterations == plan.statistics.iterations;
+    } else if (solved && (!plan.solved() || iterations < plan.statistics.iterations ||
+                          (earlier && iterations == plan.statistics.iterations))) {
+      return false;
+    }
+    sum += iterations;
+  }
+  return own && portfolio.at("iterations") == sum;
+} catch (const Json::exception&) {
+  return false;
+}
+
 // Its outcome, its figures and what its summary tells, worked out anew.
 void check_claims(const PlanFolder& planned, const fem::World& world, const FemSystem& system,
                   const plan::Settings& settings, const MotionFigures& figures, Promises& table) {
@@ -358,8 +382,11 @@ void check_claims(const PlanFolder& planned, const fem::World& world, const FemS
         !within.empty())
       wrong = "summary." + key + (within == "." ? "" : "." + within);
   for (const auto& [key, value] : planned.summary.items())
-    if (!facts.contains(key) && key != "dynamics" && key != "shortcut" && key != "improve" && key != "refine")
+    if (!facts.contains(key) && key != "dynamics" && key != "shortcut" && key != "improve" &&
+        key != "refine" && key != "portfolio")
       wrong = "summary." + key;
+  if (planned.summary.contains("portfolio") && !is_quickest(plan, planned.summary.at("portfolio")))
+    wrong = "summary.portfolio";
   std::vector<Control> controls = plan.trajectory.controls;
   if (plan.trajectory.settle_steps > 0) controls.pop_back();
   std::int64_t tets = 0;

@@ -16,7 +16,7 @@ struct ContactShapeSettings {
   int cells = 64;                       // of the field along the longest edge, to begin with; 8 … 1000
   int most_cells = 160;                 // where that is not good enough
   std::int64_t most_nodes = 3'000'000;  // of the field; 1,000 or more
-  double field_error = 0.0025;          // distance that the field may have on 99 % of the surface
+  double field_error = 0.0015;          // distance that the field may have on 99 % of the surface
   double missed_depth = 0.005;          // of a flat body, between samples of a face that bends
   double least_spacing = 0.012;         // of samples, over size
   double most_spacing = 0.04;           // where the surface bends

@@ -99,7 +99,8 @@ std::optional<fs::path> find_model(const std::string& file, const std::vector<fs
 
 std::string how_to_get_model(const std::string& file, const std::vector<fs::path>& folders) {
   std::vector<std::string> searched;
-  for (const fs::path& folder : folders) searched.push_back(folder.string());
+  for (const fs::path& folder : folders)
+    searched.push_back(folder.empty() ? "the folder of the scene" : folder.string());
   searched.push_back(model_cache().string());
   std::string text = fmt::format("model {} was not found in {}", file, fmt::join(searched, ", "));
   for (const fs::path& folder : folders)

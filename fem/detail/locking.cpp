@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <map>
+#include <memory>
 #include <utility>
 
 #include "core/random.h"
@@ -152,6 +153,34 @@ class Quadratic {
 
   // Values at the mesh's nodes → at this one's.
   Sparse from_mesh() const { return interpolation(middles_, mesh_nodes_); }
+  // Values at this one's nodes → at those of `fine`, whose mesh is this one's, refined: the same functions.
+  Sparse to_refined(const Quadratic& fine) const {
+    Triplets entries;
+    for (int n = 0; n < fine.mesh_nodes_; ++n) entries.emplace_back(n, n, 1.0);
+    std::vector<bool> done(fine.freedoms_.first.size(), false);
+    for (std::size_t part = 0; part < fine.elements_.size(); ++part) {
+      const Element &e = elements_[part / 8], &of_fine = fine.elements_[part];
+      const auto place = [&](int node) {  // barycentric
+        const int a = int(std::find(e.node, e.node + 10, node) - e.node);
+        if (a < 4) return Eigen::Vector4d(Eigen::Vector4d::Unit(a));
+        const auto [i, j] = tet_edges[a - 4];
+        return Eigen::Vector4d(0.5 * (Eigen::Vector4d::Unit(i) + Eigen::Vector4d::Unit(j)));
+      };
+      for (int k = 0; k < 6; ++k) {
+        const int middle = of_fine.node[4 + k];
+        if (done[std::size_t(middle)]) continue;
+        done[std::size_t(middle)] = true;
+        const Eigen::Vector4d at =
+            0.5 * (place(of_fine.node[tet_edges[k][0]]) + place(of_fine.node[tet_edges[k][1]]));
+        for (int i = 0; i < 4; ++i)
+          if (at[i] != 0 && at[i] != 0.5) entries.emplace_back(middle, e.node[i], at[i] * (2 * at[i] - 1));
+        for (int m = 0; m < 6; ++m)
+          if (const double w = 4 * at[tet_edges[m][0]] * at[tet_edges[m][1]]; w != 0)
+            entries.emplace_back(middle, e.node[4 + m], w);
+      }
+    }
+    return matrix_of(entries, int(fine.freedoms_.first.size()), int(freedoms_.first.size()));
+  }
   const Freedoms& freedoms() const { return freedoms_; }
 
   // Of a force a volume that is given at the mesh's nodes (N × 3).
@@ -187,6 +216,24 @@ class Quadratic {
       for (int a = 0; a < 10; ++a) sum.row(e.node[a]) += force.row(a);
     }
     return freedoms_.from_nodes(sum);
+  }
+  // K.
+  Sparse stiffness() const {
+    Triplets entries;
+    for (const Element& e : elements_)
+      for (int a = 0; a < 10; ++a)
+        for (int b = 0; b < 10; ++b) {
+          Eigen::Matrix3d block = Eigen::Matrix3d::Zero();
+          for (int point = 0; point < 4; ++point) {
+            const Nodal g = gradients(e.shape, point);
+            const Vec3 ga = g.row(a), gb = g.row(b);
+            block += e.shape.volume / 4 *
+                     (e.lame.lambda * ga * gb.transpose() +
+                      e.lame.mu * (gb * ga.transpose() + ga.dot(gb) * Eigen::Matrix3d::Identity()));
+          }
+          freedoms_.add(entries, e.node[a], e.node[b], block);
+        }
+    return matrix_of(entries, freedoms_.count, freedoms_.count);
   }
   Vector diagonal() const {
     Points sum = Points::Zero(Eigen::Index(freedoms_.first.size()), 3);
@@ -272,27 +319,6 @@ Eigen::MatrixXd softest_modes(const Sparse& k, const Solver& solver, const Vecto
   return x.leftCols(std::min(columns, count));
 }
 
-// How far a load moves the quadratic tets (the work it does), by conjugate gradients; preconditioner: the
-// diagonal, and the coarse mesh's answer. What is missing falls with the square of the residual.
-double compliance(const Quadratic& reference, const Sparse& from_coarse, const Solver& coarse,
-                  const Vector& load, double hold) {
-  constexpr int most = 500;
-  const Vector diagonal = reference.diagonal();
-  const double enough = 1e-3 * load.norm();
-  Vector u = Vector::Zero(load.size()), r = load, p;
-  double rz = 0;
-  for (int i = 0; i < most && r.norm() > enough; ++i) {
-    const Vector z =
-        0.5 * r.cwiseQuotient(diagonal) + from_coarse * coarse.solve(from_coarse.transpose() * r);
-    const double before = std::exchange(rz, r.dot(z));
-    p = i == 0 ? z : Vector(z + rz / before * p);
-    const Vector q = reference.forces(p) + hold * diagonal.cwiseProduct(p);
-    const double step = rz / p.dot(q);
-    u += step * p, r -= step * q;
-  }
-  return load.dot(u);
-}
-
 // The six rigid motions as fields (N × 3).
 std::vector<Points> rigid_motions(const Points& x) {
   std::vector<Points> motions;
@@ -308,7 +334,8 @@ std::vector<Points> rigid_motions(const Points& x) {
 }
 
 // The material's answer at one fineness.
-struct Level {
+class Level {
+ public:
   Sparse to_mesh;  // values at the cage's nodes → at those of the mesh whose tets are quadratic
   Quadratic tets;
   Sparse from_coarse;  // what may move of the cage → of this
@@ -318,6 +345,41 @@ struct Level {
       : to_mesh(interpolate),
         tets(mesh, fixed, of_tet),
         from_coarse(over_axes(tets.from_mesh() * to_mesh, tets.freedoms(), coarse)) {}
+
+  // From now on all is solved by elimination. For thousands of freedoms.
+  bool eliminate(double hold) {
+    Sparse stiffness = tets.stiffness();
+    stiffness += hold * Sparse(stiffness.diagonal().asDiagonal());
+    whole_ = std::make_unique<Solver>(stiffness);
+    return whole_->info() == Eigen::Success;
+  }
+  // How far a load moves the quadratic tets (the work it does): by elimination; or by conjugate gradients, to
+  // which the diagonal and the answer of what is coarser show the way: the level below, whose tets this one's
+  // are cut from, or else the cage. What is missing falls with the square of the residual.
+  double compliance(const Vector& load, double hold, const Solver& cage, const Level* below) const {
+    constexpr int most = 2000;
+    if (whole_) return load.dot(whole_->solve(load));
+    const Sparse from = below
+                            ? over_axes(below->tets.to_refined(tets), tets.freedoms(), below->tets.freedoms())
+                            : from_coarse;
+    const Solver& coarser = below ? *below->whole_ : cage;
+    const Vector diagonal = tets.diagonal();
+    const double enough = 1e-3 * load.norm();
+    Vector u = Vector::Zero(load.size()), r = load, p;
+    double rz = 0;
+    for (int i = 0; i < most && r.norm() > enough; ++i) {
+      const Vector z = 0.5 * r.cwiseQuotient(diagonal) + from * coarser.solve(from.transpose() * r);
+      const double before = std::exchange(rz, r.dot(z));
+      p = i == 0 ? z : Vector(z + rz / before * p);
+      const Vector q = tets.forces(p) + hold * diagonal.cwiseProduct(p);
+      const double step = rz / p.dot(q);
+      u += step * p, r -= step * q;
+    }
+    return load.dot(u);
+  }
+
+ private:
+  std::unique_ptr<Solver> whole_;
 };
 
 // Takes rigid motions out of a force field (N × 3 at the cage's nodes) until its load moves nothing as a
@@ -375,18 +437,20 @@ double locking_share(const TetMesh& rest, const std::vector<bool>& fixed, const 
     for (const Lame& lame : of_tet) of_part.insert(of_part.end(), 8, lame);
     levels.emplace_back(refined(rest, middles), interpolation(middles, nodes),
                         fixed_with_middles(fixed, middles), of_part, coarse);
+    if (!levels.front().eliminate(hold)) return 1;
   }
 
   double coarse_sum = 0, reference_sum = 0;
   for (const Points& field : fields) {
     double coarse_gives = 0, reference_gives = 0, before = 0;
+    const Level* below = nullptr;
     for (const Level& level : levels) {
       const Points force = balanced(level, coarse, rigid, field);
       const Vector load = level.tets.load(level.to_mesh * force);
       const Vector on_coarse = level.from_coarse.transpose() * load;
       const double size = on_coarse.dot(coarse.from_nodes(force));
-      before = std::exchange(reference_gives,
-                             compliance(level.tets, level.from_coarse, solver, load, hold) / size);
+      before = std::exchange(reference_gives, level.compliance(load, hold, solver, below) / size);
+      below = &level;
       coarse_gives = on_coarse.dot(solver.solve(on_coarse)) / size;
     }
     if (levels.size() > 1) reference_gives += still_missing * (reference_gives - before);

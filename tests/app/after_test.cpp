@@ -42,6 +42,36 @@ TEST_F(Program_slow, ImprovingKeepsTheBestPathWithinItsIterations) {
   EXPECT_EQ(limber_program({"verify", out("more")}).code, exit_done);
 }
 
+TEST_F(Program_slow, APortfolioIsThePlanOfItsQuickestSeed) {
+  const Result several = limber_program({"run", scene(), "-o", out(), "--portfolio", "3", "--json"});
+  ASSERT_EQ(several.code, exit_done) << several.err;
+  const Json report = several.json().at("plan").at("portfolio");
+  int quickest = 0;
+  std::int64_t fewest = 1000000;
+  std::vector<std::string> trajectories;
+  for (int seed = 1; seed <= 3; ++seed) {
+    const Json one =
+        limber_program({"plan", scene(), "-o", out("one"), "--seed", std::to_string(seed), "--json"}).json();
+    trajectories.push_back(one.at("trajectory_hash"));
+    const std::int64_t iterations = one.at("statistics").at("iterations");
+    if (iterations < fewest) quickest = seed, fewest = iterations;
+  }
+  EXPECT_EQ(several.json().at("plan").at("seed"), quickest);
+  EXPECT_EQ(several.json().at("plan").at("trajectory_hash"), trajectories[std::size_t(quickest - 1)]);
+  EXPECT_EQ(report.at("searches").size(), 3u);
+  EXPECT_EQ(limber_program({"verify", out()}).code, exit_done);
+
+  // It is there already; with one search more it is another.
+  const std::string before = read_file(fs::path(out()) / "plan.npz");
+  const Result again = limber_program({"run", scene(), "-o", out(), "--portfolio", "3"});
+  EXPECT_EQ(again.code, exit_done);
+  EXPECT_EQ(read_file(fs::path(out()) / "plan.npz"), before);
+  EXPECT_EQ(again.err.find("search"), std::string::npos) << again.err;
+  EXPECT_EQ(limber_program({"plan", scene(), "-o", out(), "--portfolio", "3", "--resume"}).code,
+            exit_bad_input);
+  EXPECT_EQ(limber_program({"plan", scene(), "-o", out(), "--portfolio", "1"}).code, exit_bad_input);
+}
+
 TEST_F(Program_slow, APlanThatIsNotPerturbedIsItself) {
   ASSERT_EQ(limber_program({"plan", scene(), "-o", out()}).code, exit_done);
   const Json exact = limber_program({"robust", out(), "-n", "5", "--materials", "0", "--forces", "0",

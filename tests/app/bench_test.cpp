@@ -3,6 +3,8 @@
 
 #include <signal.h>
 
+#include <bit>
+#include <cmath>
 #include <map>
 #include <set>
 #include <sstream>
@@ -93,6 +95,48 @@ TEST(BenchReport, UnsolvedRunsCountInTheSearchAndNotInTheMotion) {
   const std::string text = text_of_report(report);
   for (const char* words : {"2/3", "15 20 60", "91.50", "fast: not solved with seeds 3"})
     EXPECT_NE(text.find(words), std::string::npos) << words << " in\n" << text;
+}
+
+// By hand: given up after 20, three of four runs are solved within 10 + 20 + 15 + 20 iterations.
+TEST(BenchReport, RestartsAndPortfoliosAreReckonedFromTheRuns) {
+  RunRecords runs{record("fast", 1, true, 10, 2), record("fast", 2, true, 20, 4),
+                  record("fast", 3, false, 500, 50), record("fast", 4, true, 15, 4)};
+  const Expected few = expected_iterations(runs);
+  EXPECT_NEAR(few.one_search, (10 + 20 + 500 + 15) / 3.0, 1e-12);
+  EXPECT_EQ(few.restart_after, 20);
+  EXPECT_NEAR(few.with_restarts, 65 / 3.0, 1e-12);
+  EXPECT_TRUE(std::isnan(few.quickest_of_8));
+  EXPECT_TRUE(std::isnan(expected_iterations({record("fast", 3, false, 500, 50)}).one_search));
+
+  // Of twelve the quickest of all choices of eight; the choices are gone through one by one.
+  runs.clear();
+  const std::vector<int> took{31, 7, 90, 12, 55, 43, 18, 200, 77, 26, 140, 64};
+  for (int k = 0; k < 12; ++k) runs.push_back(record("fast", k + 1, k != 7, took[std::size_t(k)], 1));
+  double sum = 0;
+  int choices = 0;
+  for (unsigned choice = 0; choice < 1u << 12; ++choice) {
+    if (std::popcount(choice) != 8) continue;
+    int least = 1000;
+    for (int k = 0; k < 12; ++k)
+      if (choice >> k & 1 && k != 7) least = std::min(least, took[std::size_t(k)]);
+    sum += least, ++choices;
+  }
+  EXPECT_NEAR(expected_iterations(runs).quickest_of_8, sum / choices, 1e-9);
+}
+
+// The stairs end where the share of the solved runs is, and the page fetches nothing.
+TEST(BenchReport, ThePageHasAPlotOfEachSceneAndAllItsTables) {
+  const RunRecords runs{record("fast", 1, true, 10, 2), record("fast", 2, false, 20, 4),
+                        record("paper", 1, true, 30, 1)};
+  const std::string page = page_of_bench(runs, report_of(runs));
+  for (const char* words : {"<h2>made</h2>", "1 of 2", "1 of 1", "iterations", "CPU s of the search",
+                            ">fast<", ">paper<", "</html>"})
+    EXPECT_NE(page.find(words), std::string::npos) << words;
+  EXPECT_EQ(page.find("src="), std::string::npos);
+  EXPECT_EQ(page.find("<script"), std::string::npos);
+  std::size_t plots = 0;
+  for (std::size_t at = page.find("<svg"); at != std::string::npos; at = page.find("<svg", at + 1)) ++plots;
+  EXPECT_EQ(plots, 2u);
 }
 
 // Reads the log by the rules of OMPL's page "How to Benchmark Planners" and of its ompl_benchmark_statistics

@@ -163,6 +163,27 @@ TEST_F(SlowMotion_slow, SceneryIsSeenAndOtherCamerasHaveTheirOwnFilm) {
   EXPECT_THAT(broken.err, HasSubstr("limber plan"));
 }
 
+class WithoutScenery_slow : public Filmed {
+ protected:
+  std::string text() const override {
+    return small_scene + std::string(
+                             "[[bodies]]\nname = \"veil\"\nrole = \"scenery\"\n"
+                             "model = { file = \"nowhere.obj\" }\n");
+  }
+};
+
+TEST_F(WithoutScenery_slow, AModelThatIsNotFoundIsLeftOutAndTheRestIsAsWithoutIt) {
+  const render::Image8 seen = frame_3({});
+  const Result proved = limber_program({"verify", out()});
+  EXPECT_EQ(proved.code, exit_done) << proved.out << proved.err;
+  EXPECT_EQ(proved.err, "");
+  const Result again = limber_program({"plan", scene(text()), "-o", out()});
+  EXPECT_THAT(again.err, HasSubstr("nowhere.obj was not found in "));
+  EXPECT_THAT(again.err, HasSubstr(". It is left out of the pictures."));
+  ASSERT_EQ(limber_program({"plan", scene(), "-o", out()}).code, exit_done);
+  EXPECT_EQ(frame_3({}), seen);
+}
+
 std::vector<Json> events_of(const std::string& text) {
   std::vector<Json> events;
   std::istringstream lines(text);

@@ -117,29 +117,37 @@ int count_contact_steps(const fem::World& world, const Cases& cases, const std::
   return steps;
 }
 
-TEST(Identity, EverySceneHasTheSameBitsEverywhere) {
+// One test a scene, by its name.
+class Identity : public testing::TestWithParam<std::string> {};
+std::vector<std::string> names_of_scenes() {
+  std::vector<std::string> names;
+  for (const scenes::KnownScene& scene : scenes::known_scenes()) names.push_back(scene.name);
+  return names;
+}
+
+TEST_P(Identity, OfASceneIsTheSameBitsEverywhere) {
   TemporaryFolder folder;
   ::setenv("LIMBER_MODELS", folder.path().c_str(), 1);  // the made models, on every machine
   std::vector<std::pair<fem::InstructionSet, const char*>> sets{{fem::InstructionSet::sse2, "SSE2"}};
   if (__builtin_cpu_supports("avx2")) sets.push_back({fem::InstructionSet::avx2, "AVX2"});
   if (__builtin_cpu_supports("avx512bw")) sets.push_back({fem::InstructionSet::avx512, "AVX-512"});
-  for (const scenes::KnownScene& known : scenes::known_scenes()) {
-    SCOPED_TRACE(known.name);
-    const scenes::Scene scene = scenes::read_scene_file(known.file);
-    const fem::World world = build_world(scene, prepare_bodies(scene, {}, folder / known.name));
-    const Cases cases = pressed_cases(world, scene);
-    const std::vector<State> alone = ends(world, cases, 0, rollouts, 1, fem::InstructionSet::automatic);
-    EXPECT_NE(alone[0], alone[4]);
-    const int contact_steps = count_contact_steps(world, cases, alone);
-    EXPECT_GE(contact_steps, least_contact_steps);
-    fmt::print("{}: {} steps in contact\n", known.name, contact_steps);
-    for (const int lanes : {1, 4, 8, 16}) {
-      for (const auto& [set, name] : sets)
-        EXPECT_TRUE(ends(world, cases, 0, rollouts, lanes, set) == alone) << lanes << " lanes, " << name;
-      EXPECT_TRUE(ends_of_two_threads(world, cases, lanes) == alone) << lanes << " lanes, two threads";
-    }
+  const scenes::Scene scene = scenes::read_scene_file(scenes::find_scene(GetParam()));
+  const fem::World world = build_world(scene, prepare_bodies(scene, {}, folder.path()));
+  const Cases cases = pressed_cases(world, scene);
+  const std::vector<State> alone = ends(world, cases, 0, rollouts, 1, fem::InstructionSet::automatic);
+  EXPECT_NE(alone[0], alone[4]);
+  const int contact_steps = count_contact_steps(world, cases, alone);
+  EXPECT_GE(contact_steps, least_contact_steps);
+  fmt::print("{}: {} steps in contact\n", GetParam(), contact_steps);
+  for (const int lanes : {1, 4, 8, 16}) {
+    for (const auto& [set, name] : sets)
+      EXPECT_TRUE(ends(world, cases, 0, rollouts, lanes, set) == alone) << lanes << " lanes, " << name;
+    EXPECT_TRUE(ends_of_two_threads(world, cases, lanes) == alone) << lanes << " lanes, two threads";
   }
 }
+
+INSTANTIATE_TEST_SUITE_P(Of, Identity, testing::ValuesIn(names_of_scenes()),
+                         [](const auto& name) { return name.param; });
 
 }  // namespace
 }  // namespace limber::app

@@ -15,8 +15,9 @@ class SceneCheck : public Program {
   // Touched at fine surfaces.
   static std::string fast() { return replaced("preset = \"paper\"", "preset = \"fast\""); }
 };
+using SceneCheck_slow = SceneCheck;  // stays out of the sanitizer runs
 
-TEST_F(SceneCheck, TheTimeStepOfCellsIsThatOfThePlan) {
+TEST_F(SceneCheck_slow, TheTimeStepOfCellsIsThatOfThePlan) {
   for (const std::string& text : {std::string(small_scene), fast()}) {
     const Json checked = limber_program({"scene", "check", scene(text), "--json"}).json();
     EXPECT_TRUE(checked.at("can_be_planned"));
@@ -69,7 +70,7 @@ TEST_F(SceneCheck, ModelsThatAreMissingAreAllNamed) {
 }
 
 // The robot's box reaches from x − 0.3 to x + 0.3, the block begins at x = 1.8 and is 0.9 high.
-TEST_F(SceneCheck, OverlapsAndGapsAtTheStartAreThoseOfTheBoxes) {
+TEST_F(SceneCheck_slow, OverlapsAndGapsAtTheStartAreThoseOfTheBoxes) {
   const auto placed = [&](double gap) {
     return with(fast(), "position_m = [0.6, 1, 1.3]", fmt::format("position_m = [{}, 1, 0.5]", 1.5 - gap));
   };
@@ -95,7 +96,7 @@ TEST_F(SceneCheck, OverlapsAndGapsAtTheStartAreThoseOfTheBoxes) {
   EXPECT_EQ(apart.at("gaps_below_offset").size(), 0u);
 }
 
-TEST_F(SceneCheck, OfARobotThatIsThereItSaysSo) {
+TEST_F(SceneCheck_slow, OfARobotThatIsThereItSaysSo) {
   const std::string there =
       scene(with(small_scene, "center_of_mass_m = [3.2, 1, 1]", "center_of_mass_m = [0.7, 1, 1.3]"));
   for (const std::vector<std::string>& words : {std::vector<std::string>{"scene", "check", there, "--json"},
@@ -109,7 +110,7 @@ TEST_F(SceneCheck, OfARobotThatIsThereItSaysSo) {
   EXPECT_EQ(away.at("warnings").size(), 0u) << away.dump(2);
 }
 
-TEST_F(SceneCheck, InAWorkFolderItPreparesAndTries) {
+TEST_F(SceneCheck_slow, InAWorkFolderItPreparesAndTries) {
   const Result result = limber_program({"scene", "check", scene(), "--work", out(), "--json"});
   ASSERT_EQ(result.code, exit_done) << result.err;
   EXPECT_GT(result.json().at("estimate").at("plan").at("tried_iterations").get<int>(), 0);
@@ -158,7 +159,7 @@ TEST_F(SceneCheck, InfoTellsASceneWithoutItsModels) {
 }
 
 // Names of files are bytes; what is told of them is text.
-TEST_F(SceneCheck, AModelWhoseNameIsNoUtf8IsPrepared) {
+TEST_F(SceneCheck_slow, AModelWhoseNameIsNoUtf8IsPrepared) {
   const std::string model = out("caf\xe9.obj");
   std::ofstream(model) << "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n";
   const Result prepared = limber_program({"prepare", model, "-o", out(), "--tets", "60", "--json"});
