@@ -166,8 +166,6 @@ PrepareSettings settings_of_input(const Json& input) {
           s.at("exact").get<bool>(), s.at("tets").get<int>(),         s.at("mode").get<std::string>()};
 }
 
-namespace {
-
 meshing::Decomposition make_shells(const SurfaceMesh& surface, const PrepareSettings& settings) {
   return meshing::decompose(surface, {.max_shells = settings.shells,
                                       .max_concavity = settings.concavity,
@@ -183,19 +181,6 @@ meshing::Cage make_cage(const SurfaceMesh& surface, const std::vector<ConvexShel
   cage.mesh = std::move(*made_cage);
   cage.shell_from_tet.assign(std::size_t(cage.mesh.tets.rows()), 0);
   return cage;
-}
-
-}  // namespace
-
-MadeBody make_body(const SurfaceMesh& surface, const PrepareSettings& settings,
-                   std::optional<TetMesh> made_cage) {
-  MadeBody made;
-  made.decomposition = make_shells(surface, settings);
-  throw_if_stopped();
-  made.cage = make_cage(surface, made.decomposition.shells, settings, std::move(made_cage));
-  throw_if_stopped();
-  made.contact = meshing::make_contact_shape(surface, made.cage.mesh, {}, &made.contact_report);
-  return made;
 }
 
 Json facts_of_making(const MadeBody& made, const PrepareSettings& settings) {

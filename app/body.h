@@ -47,14 +47,17 @@ Json input_of(const Json& identity, const PrepareSettings&);
 // The settings of such an input. Throws Json::exception where it is none.
 PrepareSettings settings_of_input(const Json& input);
 
-// Shells, cage and contact of a surface; `made_cage` is that of a body in cells.
+// A body's shells, cage and contact, made from its surface and those before; `made_cage` is that of a body in
+// cells.
 struct MadeBody {
   meshing::Decomposition decomposition;
   meshing::Cage cage;
   ContactShape contact;
   meshing::ContactShapeReport contact_report;
 };
-MadeBody make_body(const SurfaceMesh&, const PrepareSettings&, std::optional<TetMesh> made_cage);
+meshing::Decomposition make_shells(const SurfaceMesh&, const PrepareSettings&);
+meshing::Cage make_cage(const SurfaceMesh&, const std::vector<ConvexShell>&, const PrepareSettings&,
+                        std::optional<TetMesh> made_cage);
 // What a report tells of their making: tables within "shells", "cage" and "contact".
 Json facts_of_making(const MadeBody&, const PrepareSettings&);
 

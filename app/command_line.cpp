@@ -446,6 +446,9 @@ int run_command_line(int argc, const char* const* argv) {
           "for beside it and in --data, and must be found")
       ->type_name("SCENE");
   add_edits(verify_command, verify_options.scene.sets, verify_options.scene.data);
+  verify_command.add_flag("--remake", verify_options.remake,
+                          "make the convex shells of large bodies (over 20,000 triangles) again, too, and "
+                          "compare; else they are only checked against what shells must be");
   verify_command.callback([&] { chosen = [&] { return verify(verify_options); }; });
 
   std::optional<fs::path> page;

@@ -135,6 +135,7 @@ struct VerifyOptions {
   fs::path folder;
   std::optional<fs::path> observables;  // of a work folder: also a CSV with the figures of every frame
   SceneOptions scene;                   // the one that the plan must be of; none where its `scene` is empty
+  bool remake = false;                  // of large bodies shells are made again, too
 };
 Outcome verify(const VerifyOptions&);
 

@@ -50,7 +50,8 @@ Outcome outcome_of(const Promises& table, const Json& motion, const Json& scene)
 
 Outcome verify_plan(const fs::path& folder, const PlanFolder& planned,
                     const std::vector<PreparedBody>& bodies, const fem::World& world, MotionFigures& figures,
-                    const std::optional<TrustedScene>& trusted) {
+                    const VerifyDepth& depth) {
+  const std::optional<TrustedScene>& trusted = depth.trusted;
   const NothingToKeep nothing_to_keep;
   Promises table;
   scenes::Scene scene = planned.scene;
@@ -66,7 +67,7 @@ Outcome verify_plan(const fs::path& folder, const PlanFolder& planned,
     const scenes::BodySpec& body = scene.bodies[b];
     const Origin origin = origin_of(scene, body, data, bodies[b]);
     check_origin(body.name, origin, trusted.has_value(), table);
-    check_body(body.name, bodies[b], body_folder(folder, body), origin.made_cage, table);
+    check_body(body.name, bodies[b], body_folder(folder, body), origin.made_cage, depth.remake, table);
   }
   for (const scenes::BodySpec& body : scene.scenery)
     check_origin(body.name, origin_of_scenery(scene, body, data, folder), trusted.has_value(), table);
@@ -95,7 +96,7 @@ Outcome verify(const VerifyOptions& options) {
     const std::vector<PreparedBody> bodies = read_bodies_of(planned, folder);
     const fem::World world = build_world(planned.scene, bodies);
     MotionFigures figures;
-    const Outcome outcome = verify_plan(folder, planned, bodies, world, figures, trusted);
+    const Outcome outcome = verify_plan(folder, planned, bodies, world, figures, {trusted, options.remake});
     if (options.observables) write_observables(*options.observables, world, figures);
     return outcome;
   }
@@ -106,7 +107,7 @@ Outcome verify(const VerifyOptions& options) {
                       "and --scene out",
                       folder.string()));
     Promises table;
-    check_body("body", read_body(folder), folder, std::nullopt, table);
+    check_body("body", read_body(folder), folder, std::nullopt, options.remake, table);
     return outcome_of(table, {}, {});
   }
   throw InputError(

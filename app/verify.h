@@ -21,10 +21,15 @@ struct TrustedScene {
   std::vector<fs::path> data;
 };
 
+// What is asked beyond what the files say.
+struct VerifyDepth {
+  std::optional<TrustedScene> trusted;
+  bool remake = false;  // shells, too, are made again, whatever that costs
+};
+
 // Checks every promise of a work folder, as `limber verify` prints them; `figures` are overwritten by those
 // of the replay.
 Outcome verify_plan(const fs::path& folder, const PlanFolder&, const std::vector<PreparedBody>&,
-                    const fem::World&, MotionFigures& figures,
-                    const std::optional<TrustedScene>& trusted = std::nullopt);
+                    const fem::World&, MotionFigures& figures, const VerifyDepth& = {});
 
 }  // namespace limber::app

@@ -3,6 +3,7 @@
 // name each. A new promise wants its mutations here: one line in the list of its file.
 #include <Eigen/LU>
 #include <map>
+#include <numbers>
 
 #include "app/fem_system.h"
 #include "app/manifest.h"
@@ -567,12 +568,11 @@ List of_bodies() {
     s.positions_m.conservativeResize(half, 3), s.weights.conservativeResize(half, 4);
     s.tet_from_sample.conservativeResize(half), s.area_m2.conservativeResize(half);
   });
-  add(ball, "contact by the cage", "ball: shells, cage and contact made again",
-      [](PreparedBody& body, auto&) {
-        SurfaceSamples& s = body.contact.samples;
-        body.contact.usable = false;
-        s.positions_m.resize(0, 3), s.weights.resize(0, 4), s.tet_from_sample.resize(0), s.area_m2.resize(0);
-      });
+  add(ball, "contact by the cage", "ball: contact made again", [](PreparedBody& body, auto&) {
+    SurfaceSamples& s = body.contact.samples;
+    body.contact.usable = false;
+    s.positions_m.resize(0, 3), s.weights.resize(0, 4), s.tet_from_sample.resize(0), s.area_m2.resize(0);
+  });
   return list;
 }
 
@@ -774,7 +774,8 @@ List of_zeros() {
 // Bodies that fit together and are not those that the scene's text leads to. `anew`: planned in.
 List of_other_bodies() {
   List list;
-  const std::string again = ": shells, cage and contact made again";
+  const std::string shells_again = "block: shells made again", cage_again = "ball: cage made again",
+                    contact_again = "ball: contact made again";
   const auto plan_anew = [](Mutant& m) {
     TemporaryFolder text;
     std::ofstream(text / "scene.toml") << m.planned.scene.text;
@@ -790,7 +791,7 @@ List of_other_bodies() {
                       anew ? plan_anew(m) : m.write_plan();
                     }});
   };
-  add(ball, "no samples at the front", "ball" + again, true, [](Mutant& m) {
+  add(ball, "no samples at the front", contact_again, true, [](Mutant& m) {
     SurfaceSamples& s = m.bodies[ball].contact.samples;
     Eigen::Index tip = 0, left = 0;
     s.positions_m.col(0).maxCoeff(&tip);
@@ -805,20 +806,20 @@ List of_other_bodies() {
     s.tet_from_sample.conservativeResize(left), s.area_m2.conservativeResize(left);
     s.area_m2 *= all / s.area_m2.sum();
   });
-  add(ball, "samples that stand for more at the back", "ball" + again, true, [](Mutant& m) {
+  add(ball, "samples that stand for more at the back", contact_again, true, [](Mutant& m) {
     SurfaceSamples& s = m.bodies[ball].contact.samples;
     const double all = s.area_m2.sum(), middle = s.positions_m.col(0).mean();
     for (Eigen::Index i = 0; i < s.area_m2.size(); ++i)
       s.area_m2[i] *= s.positions_m(i, 0) > middle ? 0.7 : 1.3;
     s.area_m2 *= all / s.area_m2.sum();
   });
-  add(ball, "all distances larger by less than a cell", "ball" + again, true, [](Mutant& m) {
+  add(ball, "all distances larger by less than a cell", contact_again, true, [](Mutant& m) {
     DistanceField& field = m.bodies[ball].contact.field;
     const int by = int(0.9 * field.cell_m / field.unit_m);
     for (std::int16_t& v : field.values) v = std::int16_t(std::min(32000, v + by));
     m.bodies[ball].contact.least_weight = meshing::least_weights(field, m.bodies[ball].cage);
   });
-  add(ball, "a cage that is a little larger", "ball" + again, true, [](Mutant& m) {
+  add(ball, "a cage that is a little larger", cage_again, true, [](Mutant& m) {
     PreparedBody& body = m.bodies[ball];
     const Eigen::RowVector3d middle = body.cage.positions.colwise().mean();
     body.cage.positions = ((body.cage.positions.rowwise() - middle) * 1.02).rowwise() + middle;
@@ -846,9 +847,9 @@ List of_other_bodies() {
     scale(m, 1.3), label(m);
     m.bodies[block].report["shells"]["inflation"] = 1e-9;
   });
-  add(block, "small shells, and what they do not cover is told", "block" + again, false,
+  add(block, "small shells, and what they do not cover is told", shells_again, false,
       [=](Mutant& m) { scale(m, 0.1), label(m), tell_honestly(m); });
-  add(block, "one shell, the hull, and how it stands off is told", "block" + again, false, [=](Mutant& m) {
+  add(block, "one shell, the hull, and how it stands off is told", shells_again, false, [=](Mutant& m) {
     m.shells[block] = {meshing::convex_hull(m.bodies[block].surface.positions)};
     label(m), tell_honestly(m);
   });
@@ -1065,6 +1066,63 @@ TEST_F(Mutations_slow, OfWhatNobodyReads) { expect_named(of_what_nobody_reads())
 TEST_F(Mutations_slow, OfZeros) { expect_named(of_zeros()); }
 TEST_F(Mutations_slow, OfOtherBodies) { expect_named(of_other_bodies()); }
 TEST_F(Mutations_slow, OfLaterOnes) { expect_named(of_later_ones()); }
+
+// Shells of large bodies are made again for those who ask for it.
+TEST(LargeMutations_slow, OfShellsThatStandOffTooFar) {
+  const TemporaryFolder folder;
+  const std::string model = (folder / "ball.obj").string(), body = (folder / "ball").string();
+  std::string obj;
+  constexpr int rings = 101, sectors = 101;  // 20,200 triangles
+  for (int r = 0; r < rings; ++r)
+    for (int s = 0; s < sectors; ++s) {
+      const double down = std::numbers::pi * (r + 0.5) / rings, round = 2 * std::numbers::pi * s / sectors;
+      obj += fmt::format("v {} {} {}\n", std::sin(down) * std::cos(round), std::sin(down) * std::sin(round),
+                         std::cos(down));
+    }
+  obj += "v 0 0 1\nv 0 0 -1\n";
+  for (int s = 0; s < sectors; ++s) {
+    const int next = (s + 1) % sectors, last = (rings - 1) * sectors;
+    obj += fmt::format("f {} {} {}\n", rings * sectors + 1, s + 1, next + 1);
+    obj += fmt::format("f {} {} {}\n", rings * sectors + 2, last + next + 1, last + s + 1);
+    for (int at = 0; at < last; at += sectors) {
+      obj += fmt::format("f {} {} {}\n", at + s + 1, at + sectors + s + 1, at + next + 1);
+      obj += fmt::format("f {} {} {}\n", at + next + 1, at + sectors + s + 1, at + sectors + next + 1);
+    }
+  }
+  write_file(model, obj);
+  ASSERT_EQ(limber_program({"prepare", model, "-o", body, "--tets", "48"}).code, exit_done);
+  const auto verified = [&](bool remake) {
+    std::vector<std::string> words{"verify", body};
+    if (remake) words.push_back("--remake");
+    return limber_program(words);
+  };
+  for (const bool remake : {false, true}) {
+    const Result good = verified(remake);
+    EXPECT_EQ(good.code, exit_done) << good.out << good.err;
+    EXPECT_EQ(good.out.find("made again; --remake") == std::string::npos, remake) << good.out;
+  }
+
+  const SurfaceMesh surface = read_ply(folder / "ball" / "surface.ply");
+  std::vector<ConvexShell> shells = read_obj_shells(folder / "ball" / "shells.obj");
+  shells.at(0).vertices *= 1.5;
+  write_obj(folder / "ball" / "shells.obj", shells);
+  Json report = read_json(folder / "ball" / "report.json");
+  const meshing::ShellCheck c = meshing::check_shells(shells, surface);
+  report["shells"].update(
+      {{"mean_overshoot", c.mean_overshoot},
+       {"max_overshoot", c.max_overshoot},
+       {"sum_of_volumes_m3", volume(SurfaceMesh{shells[0].vertices, shells[0].triangles})}});
+  report["files"]["shells.obj"] = hex(hash_of(std::string_view(read_file(folder / "ball" / "shells.obj"))));
+  write_json(folder / "ball" / "report.json", report);
+  EXPECT_EQ(verified(false).code, exit_done) << verified(false).out;
+  const Result named = verified(true);
+  EXPECT_EQ(named.code, exit_defect);
+  EXPECT_NE(named.out.find("BROKEN  body: shells made again"), std::string::npos) << named.out;
+
+  report["shells"]["stopped_by"] = "count";
+  write_json(folder / "ball" / "report.json", report);
+  EXPECT_NE(verified(false).out.find("BROKEN  body: report.json tells"), std::string::npos);
+}
 
 // A plan of another scene is a plan: whoever knows which scene it should be of says so.
 TEST_F(Mutations_slow, OfAnotherScene) {
