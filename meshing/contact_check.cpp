@@ -110,7 +110,8 @@ class Checker {
                                            0, field.nodes[std::size_t(axis)] - 1);
       check_node(at);
     }
-    c_.steepest = steepest_of(field);
+    // Where it is a guess what is inside, the field may change its sign without coming near to 0.
+    if (closed_) c_.steepest = steepest_of(field);
   }
 
   bool in_a_tet(const Vec3& p) const {

@@ -1067,12 +1067,9 @@ TEST_F(Mutations_slow, OfZeros) { expect_named(of_zeros()); }
 TEST_F(Mutations_slow, OfOtherBodies) { expect_named(of_other_bodies()); }
 TEST_F(Mutations_slow, OfLaterOnes) { expect_named(of_later_ones()); }
 
-// Shells of large bodies are made again for those who ask for it.
-TEST(LargeMutations_slow, OfShellsThatStandOffTooFar) {
-  const TemporaryFolder folder;
-  const std::string model = (folder / "ball.obj").string(), body = (folder / "ball").string();
+// A ball of 2 · rings · sectors triangles.
+std::string ball_obj(int rings, int sectors) {
   std::string obj;
-  constexpr int rings = 101, sectors = 101;  // 20,200 triangles
   for (int r = 0; r < rings; ++r)
     for (int s = 0; s < sectors; ++s) {
       const double down = std::numbers::pi * (r + 0.5) / rings, round = 2 * std::numbers::pi * s / sectors;
@@ -1080,8 +1077,9 @@ TEST(LargeMutations_slow, OfShellsThatStandOffTooFar) {
                          std::cos(down));
     }
   obj += "v 0 0 1\nv 0 0 -1\n";
+  const int last = (rings - 1) * sectors;
   for (int s = 0; s < sectors; ++s) {
-    const int next = (s + 1) % sectors, last = (rings - 1) * sectors;
+    const int next = (s + 1) % sectors;
     obj += fmt::format("f {} {} {}\n", rings * sectors + 1, s + 1, next + 1);
     obj += fmt::format("f {} {} {}\n", rings * sectors + 2, last + next + 1, last + s + 1);
     for (int at = 0; at < last; at += sectors) {
@@ -1089,7 +1087,48 @@ TEST(LargeMutations_slow, OfShellsThatStandOffTooFar) {
       obj += fmt::format("f {} {} {}\n", at + next + 1, at + sectors + s + 1, at + sectors + next + 1);
     }
   }
-  write_file(model, obj);
+  return obj;
+}
+
+// What a cage does not promise is told, and the cage is still the one that is made so.
+TEST(BodyMutations_slow, OfACageThatNeedNotEnclose) {
+  for (const char* mode : {"conform", "paper"}) {
+    SCOPED_TRACE(mode);
+    const TemporaryFolder folder;
+    const std::string model = (folder / "ball.obj").string(), body = (folder / "ball").string();
+    write_file(model, ball_obj(15, 20));
+    ASSERT_EQ(limber_program({"prepare", model, "-o", body, "--tets", "100", "--mode", mode}).code,
+              exit_done);
+    const Result good = limber_program({"verify", body});
+    EXPECT_EQ(good.code, exit_done) << good.out << good.err;
+    EXPECT_NE(good.out.find("found   body: no vertex outside the cage"), std::string::npos) << good.out;
+
+    PreparedBody other = read_body(folder / "ball");
+    const fs::path at = folder / "ball";
+    other.cage.positions(3, 0) += 1e-3;
+    const std::vector<ConvexShell> shells = read_obj_shells(at / "shells.obj");
+    other.binding = ffd::bind(other.surface, other.cage);
+    other.contact = meshing::make_contact_shape(other.surface, other.cage);
+    write_msh(at / "cage.msh", other.cage, other.shell_from_tet);
+    ffd::write_binding(at / "binding.npz", other.binding, other.surface, other.cage);
+    write_contact_shape(at / "contact.npz", other.contact, other.surface, other.cage);
+    const Json facts = facts_of_body(other.surface, shells, other.cage, other.binding, other.contact,
+                                     meshing::certify(other.surface, other.cage));
+    for (const auto& [table, figures] : facts.items()) other.report[table].update(figures);
+    for (const auto& [name, hash] : other.report.at("files").items())
+      other.report["files"][name] = hex(hash_of(std::string_view(read_file(at / name))));
+    write_json(at / "report.json", other.report);
+    const Result named = limber_program({"verify", body});
+    EXPECT_EQ(named.code, exit_defect);
+    EXPECT_NE(named.out.find("BROKEN  body: cage made again"), std::string::npos) << named.out;
+  }
+}
+
+// Shells of large bodies are made again for those who ask for it.
+TEST(BodyMutations_slow, OfShellsThatStandOffTooFar) {
+  const TemporaryFolder folder;
+  const std::string model = (folder / "ball.obj").string(), body = (folder / "ball").string();
+  write_file(model, ball_obj(101, 101));  // 20,402 triangles
   ASSERT_EQ(limber_program({"prepare", model, "-o", body, "--tets", "48"}).code, exit_done);
   const auto verified = [&](bool remake) {
     std::vector<std::string> words{"verify", body};
