@@ -1129,7 +1129,7 @@ TEST(BodyMutations_slow, OfShellsThatStandOffTooFar) {
   const TemporaryFolder folder;
   const std::string model = (folder / "ball.obj").string(), body = (folder / "ball").string();
   write_file(model, ball_obj(101, 101));  // 20,402 triangles
-  ASSERT_EQ(limber_program({"prepare", model, "-o", body, "--tets", "48"}).code, exit_done);
+  ASSERT_EQ(limber_program({"prepare", model, "-o", body, "--tets", "60"}).code, exit_done);
   const auto verified = [&](bool remake) {
     std::vector<std::string> words{"verify", body};
     if (remake) words.push_back("--remake");
