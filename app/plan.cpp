@@ -296,11 +296,13 @@ Outcome plan(const PlanOptions& options, const scenes::Scene& scene) {
 
   std::optional<plan::Plan> earlier;
   Json earlier_summary;
+  int nodes_kept = 0;  // in the file
   if (options.resume) {
     PlanFolder folder = read_plan_folder(options.out);
     if (folder.plan.system_hash == system.hash()) require_of_world(folder.plan, world, options.out);
     earlier = std::move(folder.plan);
     earlier_summary = std::move(folder.summary);
+    nodes_kept = earlier->tree.size();
     if (earlier->system_hash != system.hash())
       throw InputError(fmt::format(
           "{}: was made for another world than this scene's; plan anew without --resume", file.string()));
@@ -334,6 +336,11 @@ Outcome plan(const PlanOptions& options, const scenes::Scene& scene) {
         plan::improve(system, plan, {.cost = shortcuts.cost, .shortcut_rounds = shortcuts.rounds});
     extra["improve"] = plan::json_of(report);
     extra_text += text_of_improvements(report);
+  }
+  // Whatever comes of a search, of shortcuts or of better paths is in the tree.
+  if (stop_signal() != 0 && plan.tree.size() == nodes_kept) {
+    log::info("{}: is as it was; go on with --resume", file.string());
+    throw_if_stopped();
   }
   const Outcome outcome = keep_plan(options.out, scene, bodies, world, system, plan, extra, extra_text);
   if (stop_signal() != 0) {
