@@ -14,10 +14,6 @@
 #include "core/temporary_files.h"
 #include "core/version.h"
 #include "ffd/binding_file.h"
-#include "meshing/cage.h"
-#include "meshing/certificate.h"
-#include "meshing/contact_shape.h"
-#include "meshing/decompose.h"
 #include "meshing/quality.h"
 
 namespace limber::app {
@@ -164,6 +160,50 @@ Json input_of(const Json& identity, const PrepareSettings& settings) {
             {"most_samples", c.most_samples}}}};
 }
 
+PrepareSettings settings_of_input(const Json& input) {
+  const Json& s = input.at("settings");
+  return {s.at("shells").get<int>(), s.at("concavity").get<double>(), s.at("inflate").get<double>(),
+          s.at("exact").get<bool>(), s.at("tets").get<int>(),         s.at("mode").get<std::string>()};
+}
+
+meshing::Decomposition make_shells(const SurfaceMesh& surface, const PrepareSettings& settings) {
+  return meshing::decompose(surface, {.max_shells = settings.shells,
+                                      .max_concavity = settings.concavity,
+                                      .inflation = settings.inflate,
+                                      .exact = settings.exact});
+}
+
+meshing::Cage make_cage(const SurfaceMesh& surface, const std::vector<ConvexShell>& shells,
+                        const PrepareSettings& settings, std::optional<TetMesh> made_cage) {
+  if (!made_cage)
+    return meshing::build_cage(surface, shells, {.mode = mode_of(settings.mode), .tets = settings.tets});
+  meshing::Cage cage;
+  cage.mesh = std::move(*made_cage);
+  cage.shell_from_tet.assign(std::size_t(cage.mesh.tets.rows()), 0);
+  return cage;
+}
+
+Json facts_of_making(const MadeBody& made, const PrepareSettings& settings) {
+  const meshing::Decomposition& d = made.decomposition;
+  const bool in_cells = settings.tets == 0;
+  Json facts;
+  facts["shells"] = {{"stopped_by", d.stopped_by},
+                     {"inflation", settings.inflate},
+                     {"sum_of_volumes_m3", d.sum_of_hull_volumes},
+                     {"mean_overshoot", d.mean_overshoot},
+                     {"max_overshoot", d.max_overshoot},
+                     {"vertices_uncovered", d.vertices_uncovered},
+                     {"triangles_uncovered", d.triangles_uncovered},
+                     {"neighbours", d.neighbours}};
+  facts["cage"] = {{"mode", in_cells ? "cells" : settings.mode},
+                   {"volume_ratio", made.cage.volume_ratio},
+                   {"glued_share", made.cage.glued_share}};
+  facts["contact"] = {{"cells", made.contact_report.cells},
+                      {"characteristic_m", made.contact_report.characteristic_m},
+                      {"open_share", made.contact_report.open_share}};
+  return facts;
+}
+
 Json prepare_body(const BodySource& source, const PrepareSettings& settings, const fs::path& folder) {
   const Json input = input_of(source.identity, settings);
   if (up_to_date(folder, input)) {
@@ -184,24 +224,14 @@ Json prepare_body(const BodySource& source, const PrepareSettings& settings, con
   progress.update(1, "decompose");
   throw_if_stopped();
 
-  const meshing::Decomposition decomposition =
-      meshing::decompose(model.surface, {.max_shells = settings.shells,
-                                         .max_concavity = settings.concavity,
-                                         .inflation = settings.inflate,
-                                         .exact = settings.exact});
+  MadeBody made;
+  made.decomposition = make_shells(model.surface, settings);
   costs.end_stage("decompose");
   progress.update(2, "cage");
   throw_if_stopped();
 
-  std::optional<TetMesh> made_cage = source.made_cage();
-  meshing::Cage cage;
-  if (made_cage) {
-    cage.mesh = std::move(*made_cage);
-    cage.shell_from_tet.assign(std::size_t(cage.mesh.tets.rows()), 0);
-  } else {
-    cage = meshing::build_cage(model.surface, decomposition.shells,
-                               {.mode = mode_of(settings.mode), .tets = settings.tets});
-  }
+  made.cage = make_cage(model.surface, made.decomposition.shells, settings, source.made_cage());
+  const meshing::Cage& cage = made.cage;
   validate(cage.mesh, source.model + ": cage");
   costs.end_stage("cage");
   progress.update(3, "certify");
@@ -217,8 +247,7 @@ Json prepare_body(const BodySource& source, const PrepareSettings& settings, con
   throw_if_stopped();
 
   progress.update(5, "contact");
-  meshing::ContactShapeReport contact_report;
-  const ContactShape contact = meshing::make_contact_shape(model.surface, cage.mesh, {}, &contact_report);
+  made.contact = meshing::make_contact_shape(model.surface, cage.mesh, {}, &made.contact_report);
   costs.end_stage("contact");
   progress.update(6, "write");
 
@@ -232,15 +261,15 @@ Json prepare_body(const BodySource& source, const PrepareSettings& settings, con
   for (const char* name : export_files) fs::remove(folder / name, ignored);
   for (const char* name : preview_files) fs::remove(folder / name, ignored);
   write_ply(folder / "surface.ply", model.surface);
-  write_obj(folder / "shells.obj", decomposition.shells);
+  write_obj(folder / "shells.obj", made.decomposition.shells);
   write_msh(folder / "cage.msh", cage.mesh, cage.shell_from_tet);
   ffd::write_binding(folder / "binding.npz", binding, model.surface, cage.mesh);
-  write_contact_shape(folder / "contact.npz", contact, model.surface, cage.mesh);
+  write_contact_shape(folder / "contact.npz", made.contact, model.surface, cage.mesh);
   costs.end_stage("write");
 
   std::vector<std::string> warnings = model.warnings;
   warnings.insert(warnings.end(), cage.notes.begin(), cage.notes.end());
-  warnings.insert(warnings.end(), contact_report.warnings.begin(), contact_report.warnings.end());
+  warnings.insert(warnings.end(), made.contact_report.warnings.begin(), made.contact_report.warnings.end());
   if (certificate.vertices_outside > 0)
     warnings.push_back(fmt::format("{} vertices lie outside the cage", certificate.vertices_outside));
   if (certificate.triangles_crossing > 0)
@@ -250,21 +279,10 @@ Json prepare_body(const BodySource& source, const PrepareSettings& settings, con
   Json report{{"version", version}, {"model", source.model}, {"input", input}};
   report.update(meshing::to_json(model));
   report["warnings"] = warnings;
-  report.update(facts_of_body(model.surface, decomposition.shells, cage.mesh, binding, contact, certificate));
-  report["shells"].update({{"stopped_by", decomposition.stopped_by},
-                           {"inflation", settings.inflate},
-                           {"sum_of_volumes_m3", decomposition.sum_of_hull_volumes},
-                           {"mean_overshoot", decomposition.mean_overshoot},
-                           {"max_overshoot", decomposition.max_overshoot},
-                           {"vertices_uncovered", decomposition.vertices_uncovered},
-                           {"triangles_uncovered", decomposition.triangles_uncovered},
-                           {"neighbours", decomposition.neighbours}});
-  report["cage"].update({{"mode", made_cage ? "cells" : settings.mode},
-                         {"volume_ratio", cage.volume_ratio},
-                         {"glued_share", cage.glued_share}});
-  report["contact"].update({{"cells", contact_report.cells},
-                            {"characteristic_m", contact_report.characteristic_m},
-                            {"open_share", contact_report.open_share}});
+  report.update(
+      facts_of_body(model.surface, made.decomposition.shells, cage.mesh, binding, made.contact, certificate));
+  const Json making = facts_of_making(made, settings);
+  for (const auto& [table, figures] : making.items()) report[table].update(figures);
   report["cpu_seconds"] = costs.cpu_s;
   report["peak_memory_mb_after"] = costs.peak_mb;
   report["peak_memory_mb"] = std::round(peak_memory_mb());

@@ -11,7 +11,10 @@
 #include "core/json.h"
 #include "core/mesh.h"
 #include "ffd/binding.h"
+#include "meshing/cage.h"
 #include "meshing/certificate.h"
+#include "meshing/contact_shape.h"
+#include "meshing/decompose.h"
 #include "meshing/import.h"
 #include "scenes/scene.h"
 
@@ -40,6 +43,23 @@ struct BodySource {
 
 // What a body's report says it was made from: when that is the same, so is the body.
 Json input_of(const Json& identity, const PrepareSettings&);
+
+// The settings of such an input. Throws Json::exception where it is none.
+PrepareSettings settings_of_input(const Json& input);
+
+// A body's shells, cage and contact, made from its surface and those before; `made_cage` is that of a body in
+// cells.
+struct MadeBody {
+  meshing::Decomposition decomposition;
+  meshing::Cage cage;
+  ContactShape contact;
+  meshing::ContactShapeReport contact_report;
+};
+meshing::Decomposition make_shells(const SurfaceMesh&, const PrepareSettings&);
+meshing::Cage make_cage(const SurfaceMesh&, const std::vector<ConvexShell>&, const PrepareSettings&,
+                        std::optional<TetMesh> made_cage);
+// What a report tells of their making: tables within "shells", "cage" and "contact".
+Json facts_of_making(const MadeBody&, const PrepareSettings&);
 
 // Writes the six files and returns the report; leaves a folder that is up to date as it is.
 Json prepare_body(const BodySource&, const PrepareSettings&, const fs::path& folder);

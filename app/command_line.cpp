@@ -306,7 +306,7 @@ int run_command_line(int argc, const char* const* argv) {
   RenderOptions render_options;
   BenchOptions bench_options;
   fs::path folder;
-  std::optional<fs::path> observables;
+  VerifyOptions verify_options;
   std::function<Outcome()> chosen;
 
   CLI::App& prepare_command =
@@ -464,15 +464,26 @@ int run_command_line(int argc, const char* const* argv) {
 
   CLI::App& verify_command =
       *program.add_subcommand("verify", "replays the plan bit for bit, checks every promise, prints a table");
-  verify_command.add_option("DIR", folder, "work folder, or the output folder of prepare")->required();
+  verify_command.add_option("DIR", verify_options.folder, "work folder, or the output folder of prepare")
+      ->required();
   add_global(verify_command, global), add_threads(verify_command, global);
   verify_command
       .add_option(
-          "--observables", observables,
+          "--observables", verify_options.observables,
           "also write, for each frame of the path: of each body volume, strain, energies and contact force, "
           "the strongest contact and the deepest penetration")
       ->type_name("FILE.csv");
-  verify_command.callback([&] { chosen = [&] { return verify(folder, observables); }; });
+  verify_command
+      .add_option(
+          "--scene", verify_options.scene.scene,
+          "the scene that the plan must be of, to the letter, with these --set; its models are looked "
+          "for beside it and in --data, and must be found")
+      ->type_name("SCENE");
+  add_edits(verify_command, verify_options.scene.sets, verify_options.scene.data);
+  verify_command.add_flag("--remake", verify_options.remake,
+                          "make the convex shells of large bodies (over 20,000 triangles) again, too, and "
+                          "compare; else they are only checked against what shells must be");
+  verify_command.callback([&] { chosen = [&] { return verify(verify_options); }; });
 
   std::optional<fs::path> page;
   CLI::App& report_command = *program.add_subcommand(

@@ -338,11 +338,13 @@ Outcome plan(const PlanOptions& options, const scenes::Scene& scene) {
 
   std::optional<plan::Plan> earlier;
   Json earlier_summary;
+  int nodes_kept = 0;  // in the file
   if (options.resume) {
     PlanFolder folder = read_searched_folder(options.out);
     if (folder.plan.system_hash == system.hash()) require_of_world(folder.plan, world, options.out);
     earlier = std::move(folder.plan);
     earlier_summary = std::move(folder.summary);
+    nodes_kept = earlier->tree.size();
     if (earlier->system_hash != system.hash())
       throw InputError(fmt::format(
           "{}: was made for another world than this scene's; plan anew without --resume", file.string()));
@@ -361,11 +363,12 @@ Outcome plan(const PlanOptions& options, const scenes::Scene& scene) {
   const plan::ShortcutSettings shortcuts = shortcuts_of(scene, options, earlier_summary);
   Json extra;
   std::string extra_text;
+  for (const char* later : {"shortcut", "improve", "refine"})
+    if (earlier_summary.contains(later)) extra[later] = earlier_summary.at(later);
   if (several) {
     extra["portfolio"] = plan::json_of(searches);
     extra_text += text_of_portfolio(searches, plan);
   }
-  if (earlier_summary.contains("shortcut")) extra["shortcut"] = earlier_summary.at("shortcut");
   if (plan.solved() && shortcuts.rounds > shortcuts.rounds_done) {
     extra["shortcut"] = plan::json_of(plan::shorten(system, plan, shortcuts));
     extra_text += text_of_shortcut(extra.at("shortcut"));
@@ -375,6 +378,11 @@ Outcome plan(const PlanOptions& options, const scenes::Scene& scene) {
         plan::improve(system, plan, {.cost = shortcuts.cost, .shortcut_rounds = shortcuts.rounds});
     extra["improve"] = plan::json_of(report);
     extra_text += text_of_improvements(report);
+  }
+  // Whatever comes of a search, of shortcuts or of better paths is in the tree.
+  if (stop_signal() != 0 && plan.tree.size() == nodes_kept) {
+    log::info("{}: is as it was; go on with --resume", file.string());
+    throw_if_stopped();
   }
   const Outcome outcome = keep_plan(options.out, scene, bodies, world, system, plan, extra, extra_text);
   if (stop_signal() != 0) {

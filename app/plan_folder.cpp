@@ -9,21 +9,21 @@
 
 namespace limber::app {
 
-void write_plan_folder(const fs::path& folder, const plan::Plan& plan, const scenes::Scene& scene,
-                       const std::vector<PreparedBody>& bodies, const Json& summary) {
+namespace {
+
+Json given_of(const std::string& by_version, const scenes::Scene& scene,
+              const std::vector<PreparedBody>& bodies, const Json& summary) {
   Json cages;
   for (std::size_t b = 0; b < bodies.size(); ++b) cages[scene.bodies[b].name] = hex(hash_of(bodies[b].cage));
-  Json given{{"version", version},
+  Json given{{"version", by_version},
              {"scene", scene.text},
              {"sets", scene.sets},
              {"cage_hashes", cages},
              {"summary", summary}};
   if (!scene.script.text.empty())
     given["script"] = {{"text", scene.script.text}, {"name", scene.script.name_for_messages}};
-  plan::write_plan(folder / "plan.npz", plan, given);
+  return given;
 }
-
-namespace {
 
 void require_summary(const PlanFolder& planned, const fs::path& file) {
   constexpr const char* remedy = "plan anew with limber plan";
@@ -55,6 +55,23 @@ void require_summary(const PlanFolder& planned, const fs::path& file) {
 
 }  // namespace
 
+void write_plan_folder(const fs::path& folder, const plan::Plan& plan, const scenes::Scene& scene,
+                       const std::vector<PreparedBody>& bodies, const Json& summary) {
+  plan::write_plan(folder / "plan.npz", plan, given_of(version, scene, bodies, summary));
+}
+
+std::string odd_entry(const fs::path& folder, const PlanFolder& planned,
+                      const std::vector<PreparedBody>& bodies) {
+  const Npz now = read_npz(folder / "plan.npz"),
+            again =
+                plan::npz_of(planned.plan, given_of(planned.version, planned.scene, bodies, planned.summary));
+  for (const auto& [name, array] : now.arrays)
+    if (!again.arrays.contains(name) || again.arrays.at(name) != array) return name + ".npy";
+  for (const auto& [name, text] : now.texts)
+    if (!again.texts.contains(name) || again.texts.at(name) != text) return name;
+  return "";  // what lacks was not read
+}
+
 PlanFolder read_plan_folder(const fs::path& folder) {
   const fs::path file = folder / "plan.npz";
   if (!fs::exists(file))
@@ -75,6 +92,7 @@ PlanFolder read_plan_folder(const fs::path& folder) {
     if (!result.plan.simulation) scenes::require_plannable(result.scene);
     result.summary = extra.at("summary");
     result.cage_hashes = extra.at("cage_hashes");
+    result.version = extra.at("version").get<std::string>();
     require_summary(result, file);
   } catch (const Json::exception& error) {
     throw InputError(fmt::format("{}: its meta.json is not limber's ({}); plan anew with limber plan",

@@ -20,6 +20,7 @@ struct PlanFolder {
   Json summary;             // as `limber plan --json` printed it
   std::uint64_t file_hash;  // of plan.npz
   Json cage_hashes;         // by body name
+  std::string version;      // of the limber that wrote it
   bool sealed;              // as plan::PlanFile
 };
 
@@ -61,6 +62,9 @@ bool begins_elsewhere(const PlanFolder&);
 
 // The system that the folder's motion is of: of a simulation without a goal, and from where it began.
 FemSystem system_of(const PlanFolder&, const fem::World&);
+
+// The first entry of plan.npz that limber would write otherwise, or not at all; "" where there is none.
+std::string odd_entry(const fs::path& folder, const PlanFolder&, const std::vector<PreparedBody>&);
 
 // Throws InputError where the plan's states, controls or frame times are none of this world: what follows
 // would reach beyond its nodes, or replay without end.

@@ -231,15 +231,35 @@ bool same_surface(const SurfaceMesh& a, const SurfaceMesh& b) {
                                          1e-9 * bounding_box(a.positions).diagonal());
 }
 
+std::vector<fs::path> with(std::vector<fs::path> folders, const fs::path& last) {
+  folders.push_back(last);
+  return folders;
+}
+
 }  // namespace
 
+GoalCage goal_cage_of(const scenes::Scene& scene, const std::vector<fs::path>& data,
+                      const std::vector<PreparedBody>& bodies) {
+  if (!has_goal_cage(scene)) return GoalCage::none_asked;
+  const std::optional<fs::path> file = find_goal_cage(scene, data);
+  if (!file) return GoalCage::not_here;
+  const Points asked = read_msh(*file).positions, &there = bodies[std::size_t(scene.robot)].goal_shape_m;
+  return asked.rows() == there.rows() && asked == there ? GoalCage::same : GoalCage::another;
+}
+
 Origin origin_of_scenery(const scenes::Scene& scene, const scenes::BodySpec& body,
-                         const fs::path& work_folder) {
+                         const std::vector<fs::path>& data, const fs::path& work_folder) {
   Origin origin;
   const fs::path mesh = scenery_file(work_folder, body, ".ply");
   const Json said = read_json(scenery_file(work_folder, body, ".json"));
   if (!was_found(said)) {
-    origin.placed_so = said.at("input") == Json{{"triangles", body.triangles}} && !fs::exists(mesh);
+    // Only a file is ever not found.
+    const auto* file = std::get_if<scenes::FileModel>(&body.model);
+    origin.placed_so = file && file->made.empty() &&
+                       said == Json{{"version", said.value("version", "")},
+                                    {"input", {{"triangles", body.triangles}}},
+                                    {"hash", Json()}} &&
+                       !fs::exists(mesh);
     return origin;
   }
   try {
@@ -247,9 +267,9 @@ Origin origin_of_scenery(const scenes::Scene& scene, const scenes::BodySpec& bod
     identity["triangles"] = body.triangles;
     origin.placed_so = said.at("input") == identity && said.at("hash") == hash_of_scenery(mesh, said);
     if (const auto* file = std::get_if<scenes::FileModel>(&body.model);
-        file && !scenes::find_model(file->file, {scene.folder}))
+        file && !scenes::find_model(file->file, with(data, scene.folder)))
       return origin;
-    const BodySource found = source_of_scenery(scene, body, {});
+    const BodySource found = source_of_scenery(scene, body, data);
     if (found.identity == said.at("input"))
       origin.same_surface = same_surface(make_scenery(body, found), read_ply(mesh));
   } catch (const Json::exception&) {
@@ -258,21 +278,23 @@ Origin origin_of_scenery(const scenes::Scene& scene, const scenes::BodySpec& bod
   return origin;
 }
 
-Origin origin_of(const scenes::Scene& scene, const scenes::BodySpec& body, const PreparedBody& prepared) {
+Origin origin_of(const scenes::Scene& scene, const scenes::BodySpec& body, const std::vector<fs::path>& data,
+                 const PreparedBody& prepared) {
   const Json& said = prepared.report.at("input");
   Origin origin;
   try {
     const std::string source = said.at("model").at("model").at("source").get<std::string>();
     origin.placed_so = said == input_of(identity_of(body, source), settings_of(body));
     const auto* file = std::get_if<scenes::FileModel>(&body.model);
-    if (file && !scenes::find_model(file->file, {scene.folder})) {
+    if (file && !scenes::find_model(file->file, with(data, scene.folder))) {
       const std::optional<SurfaceMesh> made = scenes::made_surface(body);
       if (!made || source != hex(hash_of(*made))) return origin;
     }
-    const BodySource found = source_of(scene, body, {});
+    const BodySource found = source_of(scene, body, data);
     // A file may have changed, or another of its name lie here.
     if (file && found.identity.at("model").at("source") != source) return origin;
     origin.same_surface = same_surface(found.load().surface, prepared.surface);
+    origin.made_cage = found.made_cage();
   } catch (const Json::exception&) {
     origin.placed_so = false;
   }

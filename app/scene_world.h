@@ -42,10 +42,17 @@ Json identity_of(const scenes::Scene&, const scenes::BodySpec&, const std::vecto
 struct Origin {
   bool placed_so = false;            // its report tells of the scene's pose, cage and settings
   std::optional<bool> same_surface;  // read and placed again; nothing where the model file is not here
+  std::optional<TetMesh> made_cage;  // of a body in cells
 };
-Origin origin_of(const scenes::Scene&, const scenes::BodySpec&, const PreparedBody&);
+Origin origin_of(const scenes::Scene&, const scenes::BodySpec&, const std::vector<fs::path>& data,
+                 const PreparedBody&);
 // The same of scenery. Throws InputError when its files are missing or damaged.
-Origin origin_of_scenery(const scenes::Scene&, const scenes::BodySpec&, const fs::path& work_folder);
+Origin origin_of_scenery(const scenes::Scene&, const scenes::BodySpec&, const std::vector<fs::path>& data,
+                         const fs::path& work_folder);
+// What the shape that the robot is to take is, to the scene's goal.shape.cage.
+enum class GoalCage { none_asked, not_here, same, another };
+GoalCage goal_cage_of(const scenes::Scene&, const std::vector<fs::path>& data,
+                      const std::vector<PreparedBody>&);
 
 // The scene's scenery, in world coordinates, from `scenery/` of the work folder, where prepare_bodies puts
 // it. Throws InputError when a mesh is missing or damaged.

@@ -6,14 +6,25 @@
 #include "app/verify_body.h"
 #include "app/verify_plan.h"
 #include "core/error.h"
+#include "core/hash.h"
 #include "core/progress.h"
+#include "scenes/library.h"
 
 namespace limber::app {
 
 namespace {
 
-Outcome outcome_of(const Promises& table, const Json& motion) {
-  std::string text;
+// What scene it is that all is derived from.
+std::string text_of_scene(const Json& scene) {
+  if (scene.is_null()) return "";
+  std::string edits;
+  for (const Json& set : scene.at("sets")) edits += " --set " + set.get<std::string>();
+  return fmt::format("a plan of scene {} (hash of its text {}){}\n", scene.at("name").get<std::string>(),
+                     scene.at("hash").get<std::string>(), edits.empty() ? "" : ", edited by" + edits);
+}
+
+Outcome outcome_of(const Promises& table, const Json& motion, const Json& scene) {
+  std::string text = text_of_scene(scene);
   for (const Json& r : table.rows())
     text += fmt::format("  {:6}  {:48}  {}\n", r.at("kept").get<bool>() ? "kept" : "BROKEN",
                         r.at("promise").get<std::string>(), r.at("value").get<std::string>());
@@ -30,48 +41,74 @@ Outcome outcome_of(const Promises& table, const Json& motion) {
           {{"all_kept", table.all_kept()},
            {"promises", table.rows()},
            {"measured", table.measured()},
-           {"motion", motion}},
+           {"motion", motion},
+           {"scene", scene}},
           text};
 }
 
 }  // namespace
 
 Outcome verify_plan(const fs::path& folder, const PlanFolder& planned,
-                    const std::vector<PreparedBody>& bodies, const fem::World& world,
-                    MotionFigures& figures) {
+                    const std::vector<PreparedBody>& bodies, const fem::World& world, MotionFigures& figures,
+                    const VerifyDepth& depth) {
+  const std::optional<TrustedScene>& trusted = depth.trusted;
   const NothingToKeep nothing_to_keep;
   Promises table;
-  for (std::size_t b = 0; b < bodies.size(); ++b) {
-    const scenes::BodySpec& body = planned.scene.bodies[b];
-    check_origin(body.name, origin_of(planned.scene, body, bodies[b]), table);
-    check_body(body.name, bodies[b], body_folder(folder, body), table);
+  scenes::Scene scene = planned.scene;
+  if (trusted) {
+    const std::string wrong = scene.text != trusted->scene.text   ? "its text is another"
+                              : scene.sets != trusted->scene.sets ? "its edits by --set are others"
+                                                                  : "";
+    table.row("the plan is of the scene " + trusted->name, wrong.empty(), wrong);
+    scene.folder = trusted->scene.folder;
   }
-  for (const scenes::BodySpec& body : planned.scene.scenery)
-    check_origin(body.name, origin_of_scenery(planned.scene, body, folder), table);
+  const std::vector<fs::path> data = trusted ? trusted->data : std::vector<fs::path>{};
+  for (std::size_t b = 0; b < bodies.size(); ++b) {
+    const scenes::BodySpec& body = scene.bodies[b];
+    const Origin origin = origin_of(scene, body, data, bodies[b]);
+    check_origin(body.name, origin, trusted.has_value(), table);
+    check_body(body.name, bodies[b], body_folder(folder, body), origin.made_cage, depth.remake, table);
+  }
+  for (const scenes::BodySpec& body : scene.scenery)
+    check_origin(body.name, origin_of_scenery(scene, body, data, folder), trusted.has_value(), table);
+  check_goal_cage(goal_cage_of(scene, data, bodies), trusted.has_value(), table);
   check_plan(folder, planned, bodies, world, figures, table);
   check_pictures(folder, planned, world, figures, table);
-  return outcome_of(table, json_of(figures));
+  return outcome_of(
+      table, json_of(figures),
+      {{"name", scene.name}, {"hash", hex(hash_of(std::string_view(scene.text)))}, {"sets", scene.sets}});
 }
 
-Outcome verify(const fs::path& folder, const std::optional<fs::path>& observables) {
+Outcome verify(const VerifyOptions& options) {
+  const fs::path& folder = options.folder;
   if (!fs::is_directory(folder))
     throw InputError(fmt::format("{}: is not a folder; name a work folder of limber", folder.string()));
+  const bool scene_is_named = !options.scene.scene.empty();
+  if (!scene_is_named && !(options.scene.sets.empty() && options.scene.data.empty()))
+    throw InputError("--set and --data are of the scene that --scene names, and none is named");
   if (fs::exists(folder / "plan.npz")) {
+    std::optional<TrustedScene> trusted;
+    if (scene_is_named)
+      trusted = {options.scene.scene,
+                 scenes::read_scene_file(scenes::find_scene(options.scene.scene), options.scene.sets),
+                 options.scene.data};
     const PlanFolder planned = read_plan_folder(folder);
     const std::vector<PreparedBody> bodies = read_bodies_of(planned, folder);
     const fem::World world = build_world(planned.scene, bodies);
     MotionFigures figures;
-    const Outcome outcome = verify_plan(folder, planned, bodies, world, figures);
-    if (observables) write_observables(*observables, world, figures);
+    const Outcome outcome = verify_plan(folder, planned, bodies, world, figures, {trusted, options.remake});
+    if (options.observables) write_observables(*options.observables, world, figures);
     return outcome;
   }
   if (fs::exists(folder / "report.json")) {
-    if (observables)
-      throw InputError(fmt::format(
-          "{}: holds no plan, so there is nothing to observe; leave --observables out", folder.string()));
+    if (options.observables || scene_is_named)
+      throw InputError(
+          fmt::format("{}: holds no plan, so there is nothing to observe, and no scene; leave --observables "
+                      "and --scene out",
+                      folder.string()));
     Promises table;
-    check_body("body", read_body(folder), folder, table);
-    return outcome_of(table, {});
+    check_body("body", read_body(folder), folder, std::nullopt, options.remake, table);
+    return outcome_of(table, {}, {});
   }
   throw InputError(
       fmt::format("{}: holds neither plan.npz nor report.json; make them with limber run or limber prepare",

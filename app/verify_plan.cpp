@@ -1,5 +1,7 @@
 #include "app/verify_plan.h"
 
+#include <set>
+
 #include "app/fem_system.h"
 #include "app/goal_terms.h"
 #include "app/manifest.h"
@@ -10,6 +12,7 @@
 #include "core/error.h"
 #include "core/hash.h"
 #include "core/progress.h"
+#include "core/same_bits.h"
 #include "plan/course.h"
 #include "plan/shortcut.h"
 #include "plan/simulation.h"
@@ -136,7 +139,8 @@ void check_start(const plan::Plan& plan, const fem::World& world, Promises& tabl
   for (const fem::Parting::Pair& pair : parting.pairs) least = std::min(least, pair.gap_m);
   const State start = plan.tree.states[0];
   table.row(
-      "bodies that overlap at the start are parted again: the same start", start == fem::start_state(world),
+      "bodies that overlap at the start are parted again: the same start",
+      same_bits(start, fem::start_state(world)),
       fmt::format("{} pairs, up to {:.2f} mm deep ({} and {}), now {:.2f} mm apart or more; {} steps",
                   parting.pairs.size(), 1e3 * deepest->depth_m, world.bodies[std::size_t(deepest->body)].name,
                   world.bodies[std::size_t(deepest->other)].name, 1e3 * least, parting.steps));
@@ -148,16 +152,19 @@ void check_path(const plan::Plan& plan, const plan::Settings& settings, const Re
   const plan::Trajectory& path = plan.trajectory;
   const plan::Course& course = replay.course();
   table.row("replay gives the same bits",
-            replay.whole() && course.frames == path.frames && course.end == path.end,
+            replay.whole() && same_bits(course.end, path.end) &&
+                std::equal(course.frames.begin(), course.frames.end(), path.frames.begin(), path.frames.end(),
+                           [](const State& a, const State& b) { return same_bits(a, b); }),
             fmt::format("{} frames, end {}", course.frames.size(), hex(hash_of(course.end))));
 
   const std::vector<int> nodes = plan::path_to(plan.tree, plan.best_node);
   const bool settles = path.settle_steps > 0;
   bool same = path.controls.size() + 1 == nodes.size() + std::size_t(settles);
   for (std::size_t i = 1; same && i < nodes.size(); ++i)
-    same = path.controls[i - 1] == plan.tree.controls[std::size_t(nodes[i])] &&
-           replay.after(i) == plan.tree.states[std::size_t(nodes[i])];
-  if (same && settles) same = path.controls.back() == plan::settle_control(settings, path.settle_steps);
+    same = same_bits(path.controls[i - 1], plan.tree.controls[std::size_t(nodes[i])]) &&
+           same_bits(replay.after(i), plan.tree.states[std::size_t(nodes[i])]);
+  if (same && settles)
+    same = same_bits(path.controls.back(), plan::settle_control(settings, path.settle_steps));
   table.row("the path is the way through the tree", same, fmt::format("{} nodes", nodes.size()));
 }
 
@@ -165,7 +172,8 @@ bool same_nodes(const plan::Tree& a, const plan::Tree& b, int count) {
   for (int n = 0; n < count; ++n) {
     const auto i = std::size_t(n);
     if (a.parents[i] != b.parents[i] || a.iterations[i] != b.iterations[i] ||
-        a.controls[i] != b.controls[i] || a.centers[n] != b.centers[n] || a.states[i] != b.states[i])
+        !same_bits(a.controls[i], b.controls[i]) || !same_bits(a.centers[n], b.centers[n]) ||
+        !same_bits(a.states[i], b.states[i]))
       return false;
   }
   return true;
@@ -185,8 +193,8 @@ bool nodes_follow(const FemSystem& system, const plan::Tree& tree, int first) {
     propagator->propagate(rollouts);
     for (int n = from; n < to; ++n) {
       const plan::Rollout& end = rollouts[std::size_t(n - from)];
-      if (!end.ok || end.to != tree.states[std::size_t(n)] ||
-          tree.centers[n] != Vec3f(system.robot_center(end.to).cast<float>()))
+      if (!end.ok || !same_bits(end.to, tree.states[std::size_t(n)]) ||
+          !same_bits(tree.centers[n], system.robot_center(end.to).cast<float>()))
         return false;
     }
     from = to;
@@ -218,8 +226,9 @@ void check_search(const PlanFolder& planned, const FemSystem& system, const plan
   const plan::Tree& tree = plan.tree;
   const bool carried = planned.summary.contains("refine");
   int searched = 1;  // the start is the world's
-  bool same = tree.states[0] == system.start() && tree.iterations[0] == -1 && tree.controls[0] == Control{} &&
-              tree.centers[0] == Vec3f(system.robot_center(system.start()).cast<float>());
+  bool same = same_bits(tree.states[0], system.start()) && tree.iterations[0] == -1 &&
+              same_bits(tree.controls[0], Control{}) &&
+              same_bits(tree.centers[0], system.robot_center(system.start()).cast<float>());
   if (!carried) {
     plan::Plan found;
     try {
@@ -267,6 +276,68 @@ void check_forces(const plan::Plan& plan, const plan::Settings& settings, const 
             largest <= settings.max_force_n * rounding &&
                 settling <= settings.max_force_n * settings.settle.max_force_share * rounding,
             fmt::format("{:.1f} of {:.1f} N", largest, settings.max_force_n));
+}
+
+bool has_just(const Json& table, const std::set<std::string>& keys) {
+  if (!table.is_object() || table.size() != keys.size()) return false;
+  return std::all_of(keys.begin(), keys.end(), [&](const std::string& key) { return table.contains(key); });
+}
+
+double cost_of(const Json& costs, const std::string& kind) {
+  plan::Costs c;
+  costs.at("duration_s").get_to(c.duration_s), costs.at("effort_n_s").get_to(c.effort_n_s);
+  costs.at("strain_energy_j").get_to(c.strain_energy_j), costs.at("volume_change").get_to(c.volume_change);
+  return plan::cost_in(c, plan::cost_kind_from(kind));
+}
+
+// Of a path in `tets`, that came after the search: whether what is told of it could be so, and ends with what
+// the path costs now. "" or the table that does not.
+std::string wrong_of_later(const Json& summary, const plan::Plan& plan, const Json& costs_now,
+                           std::int64_t tets) {
+  bool told = false, now = false;
+  if (summary.contains("shortcut")) {
+    const Json& s = summary.at("shortcut");
+    if (!has_just(s, {"rounds", "cost", "accepted", "before", "after", "cpu_s", "wall_s"}) ||
+        cost_of(s.at("after"), s.at("cost")) > cost_of(s.at("before"), s.at("cost")))
+      return "shortcut";
+    told = true, now = now || s.at("after") == costs_now;
+  }
+  if (summary.contains("improve")) {
+    const Json& s = summary.at("improve");
+    if (!has_just(s,
+                  {"cost", "first", "improvements", "searches", "solved", "iterations", "cpu_s", "wall_s"}))
+      return "improve";
+    Json last = s.at("first");
+    for (const Json& better : s.at("improvements")) {
+      if (!has_just(better, {"wall_s", "iterations", "search", "costs"}) ||
+          cost_of(better.at("costs"), s.at("cost")) >= cost_of(last, s.at("cost")) ||
+          better.at("iterations") > s.at("iterations") || better.at("search") > s.at("searches"))
+        return "improve.improvements";
+      last = better.at("costs");
+    }
+    if (s.at("solved") > s.at("searches") || s.at("solved") < s.at("improvements").size())
+      return "improve.solved";
+    told = true, now = now || last == costs_now;
+  }
+  if (told && plan.solved() && !now) return summary.contains("improve") ? "improve" : "shortcut.after";
+  if (!summary.contains("refine")) return "";
+  const Json& s = summary.at("refine");
+  if (!has_just(s, {"how", "tracked_s", "largest_error_m", "iterations", "replay_cpu_s", "track_cpu_s",
+                    "search_cpu_s", "coarse_tets", "tets"}) ||
+      s.at("tets") != tets)
+    return "refine";
+  const std::string how = s.at("how");
+  if (how == "replanned" || how == "failed") return "";
+  if (how != "replayed" && how != "tracked") return "refine.how";
+  // A chain of nodes, each an iteration of no search, before those that came later.
+  plan::Statistics none;
+  none.iterations = plan.statistics.iterations;
+  none.cpu_s = plan.statistics.cpu_s, none.wall_s = plan.statistics.wall_s;
+  if (plan::json_of(none) != plan::json_of(plan.statistics) || s.at("iterations") != 0) return "refine";
+  const std::vector<std::int64_t>& of = plan.tree.iterations;
+  for (std::size_t n = 1; n < of.size(); ++n)
+    if (of[n] != (std::int64_t(n) <= none.iterations ? std::int64_t(n) - 1 : -1)) return "refine";
+  return "";
 }
 
 // That a portfolio tells of this plan, and of no search that would have won instead. The others are not done
@@ -320,10 +391,18 @@ void check_claims(const PlanFolder& planned, const fem::World& world, const FemS
     wrong = "summary.portfolio";
   std::vector<Control> controls = plan.trajectory.controls;
   if (plan.trajectory.settle_steps > 0) controls.pop_back();
-  if (plan.solved() && planned.summary.contains("shortcut") && !planned.summary.contains("improve") &&
-      planned.summary.at("shortcut").at("after") !=
-          plan::json_of(plan::path_of(system, settings, controls).costs))
-    wrong = "summary.shortcut.after";
+  std::int64_t tets = 0;
+  for (const fem::Body& body : world.bodies) tets += body.cage.tets.rows();
+  const bool came_later = planned.summary.contains("shortcut") || planned.summary.contains("improve");
+  const Json costs = came_later ? plan::json_of(plan::path_of(system, settings, controls).costs) : Json();
+  try {
+    const std::string later = wrong_of_later(planned.summary, plan, costs, tets);
+    if (!later.empty()) wrong = "summary." + later;
+  } catch (const Json::exception& error) {
+    wrong = fmt::format("its summary ({})", error.what());
+  } catch (const InputError& error) {
+    wrong = fmt::format("its summary ({})", error.what());
+  }
   table.row("what the plan tells of itself is so", wrong.empty(), wrong.empty() ? "" : wrong + " is not");
 }
 
@@ -484,6 +563,9 @@ void check_plan(const fs::path& folder, const PlanFolder& planned, const std::ve
   const plan::Plan& plan = planned.plan;
   table.row("one hash stands over all of plan.npz", planned.sealed,
             planned.sealed ? "" : "it is of an older limber, and has none; plan anew");
+  const std::string odd = planned.sealed ? odd_entry(folder, planned, bodies) : "";
+  table.row("plan.npz holds what limber writes, and no more", odd.empty(),
+            odd.empty() ? "" : odd + " is not as limber writes it");
   if (plan.simulation) return check_simulation(folder, planned, bodies, world, figures, table);
   const FemSystem system = system_of(planned, world);
   const plan::Settings settings = settings_for(planned.scene, plan.settings);

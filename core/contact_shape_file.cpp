@@ -117,6 +117,9 @@ void write_contact_shape(const fs::path& path, const ContactShape& shape, const 
 
 ContactShape read_contact_shape(const fs::path& path, const SurfaceMesh& surface, const TetMesh& cage) {
   const Npz file = read_npz(path);
+  file.require_only(
+      {"field", "sample_positions_m", "sample_tets", "sample_weights", "sample_areas_m2", "least_weight"},
+      {"meta.json"});
   const Json meta = parse_json(file.text("meta.json"), path.string() + ": meta.json");
   ContactShape shape;
   try {
@@ -125,6 +128,7 @@ ContactShape read_contact_shape(const fs::path& path, const SurfaceMesh& surface
     require_hash(meta, "cage", hash_of(cage), path);
     meta.at("usable").get_to(shape.usable);
     shape.field = field_of(file, meta);
+    require(meta.size() == 7, path, "meta.json has more in it than limber writes");
   } catch (const Json::exception& trouble) {
     require(false, path, std::string("meta.json: ") + trouble.what());
   }

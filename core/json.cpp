@@ -1,5 +1,8 @@
 #include "core/json.h"
 
+#include <functional>
+#include <set>
+
 #include "core/error.h"
 #include "core/json_text.h"
 
@@ -30,12 +33,30 @@ void require_shallow(const std::string& text, const std::string& what) {
   }
 }
 
+// Whoever has a key twice says two things, and readers differ in which they hear.
+class KeysOnce {
+ public:
+  explicit KeysOnce(const std::string& what) : what_(what) {}
+  bool operator()(int, Json::parse_event_t event, const Json& parsed) {
+    if (event == Json::parse_event_t::object_start) keys_.emplace_back();
+    if (event == Json::parse_event_t::object_end) keys_.pop_back();
+    if (event == Json::parse_event_t::key && !keys_.back().insert(parsed.get<std::string>()).second)
+      throw InputError(fmt::format("{}: has the key {} twice in one table", what_, text_of(parsed)));
+    return true;
+  }
+
+ private:
+  const std::string& what_;
+  std::vector<std::set<std::string>> keys_;  // of each table that is open
+};
+
 }  // namespace
 
 Json parse_json(const std::string& text, const std::string& what) {
   require_shallow(text, what);
   try {
-    return Json::parse(text);
+    KeysOnce once(what);
+    return Json::parse(text, std::ref(once));
   } catch (const Json::parse_error& error) {
     const auto at = std::min(std::size_t(error.byte), text.size());
     const auto line = 1 + std::count(text.begin(), text.begin() + std::ptrdiff_t(at), '\n');

@@ -137,6 +137,18 @@ const std::string& Npz::text(const std::string& name) const {
   return found->second;
 }
 
+void Npz::require_only(const std::set<std::string>& known_arrays,
+                       const std::set<std::string>& known_texts) const {
+  const auto refuse = [&](const std::string& entry) {
+    throw InputError(
+        fmt::format("{}: has an entry \"{}\", which limber does not write", source.string(), entry));
+  };
+  for (const auto& [name, array] : arrays)
+    if (!known_arrays.contains(name)) refuse(name + ".npy");
+  for (const auto& [name, text] : texts)
+    if (!known_texts.contains(name)) refuse(name);
+}
+
 // The .npy format, version 1.0: magic, header length, a Python dict padded to 64 bytes, then the elements.
 std::string npy_file(const NpyArray& array) {
   std::string shape;

@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <map>
+#include <set>
 #include <span>
 #include <string>
 #include <vector>
@@ -17,6 +18,7 @@ struct NpyArray {
   std::vector<std::int64_t> shape;  // C order
   std::vector<std::byte> bytes;
 
+  bool operator==(const NpyArray&) const = default;
   std::int64_t size() const;  // product of the shape
   // The elements; throws InputError naming `name` when T is not the array's type.
   template <class T>
@@ -68,6 +70,8 @@ struct Npz {
   // Throws InputError that names the file's missing entry.
   const NpyArray& array(const std::string& name) const;
   const std::string& text(const std::string& name) const;
+  // Throws InputError that names an entry that is none of these.
+  void require_only(const std::set<std::string>& arrays, const std::set<std::string>& texts) const;
   fs::path source;  // for messages
 };
 

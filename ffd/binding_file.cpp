@@ -42,6 +42,7 @@ void write_binding(const fs::path& path, const Binding& binding, const SurfaceMe
 
 Binding read_binding(const fs::path& path, const SurfaceMesh& surface, const TetMesh& cage) {
   const Npz file = read_npz(path);
+  file.require_only({"tet_from_vertex", "weights"}, {"meta.json"});
   const Json meta = parse_json(file.text("meta.json"), path.string() + ": meta.json");
   const Eigen::Index vertices = surface.positions.rows();
   Binding binding;
@@ -54,6 +55,7 @@ Binding read_binding(const fs::path& path, const SurfaceMesh& surface, const Tet
                   {"farthest_outside_vertex", -1},
                   {"max_outside_distance_m", 0.5}},
                  Keys::all, path.string() + ": meta.json", "renew it with `limber prepare`");
+    require(meta.size() == 6, path, "meta.json has more in it than limber writes");
     require_hash(meta, "surface", hash_of(surface), path);
     require_hash(meta, "cage", hash_of(cage), path);
     meta.at("outside").get_to(binding.outside);

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "core/random.h"
 #include "meshing/contact_shape.h"
@@ -49,6 +50,7 @@ class Checker {
  public:
   Checker(const ContactShape& shape, const SurfaceMesh& surface, const TetMesh& cage)
       : shape_(shape),
+        surface_(surface),
         cage_(cage),
         size_(bounding_box(surface.positions).size().maxCoeff()),
         winding_(surface.positions, surface.triangles),
@@ -110,7 +112,8 @@ class Checker {
                                            0, field.nodes[std::size_t(axis)] - 1);
       check_node(at);
     }
-    c_.steepest = steepest_of(field);
+    // Where it is a guess what is inside, the field may change its sign without coming near to 0.
+    if (closed_) c_.steepest = steepest_of(field);
   }
 
   bool in_a_tet(const Vec3& p) const {
@@ -123,9 +126,18 @@ class Checker {
 
   void check_samples() {
     const SurfaceSamples& samples = shape_.samples;
+    std::optional<detail::SurfaceDistance> whole_surface;
+    // Pieces of an open surface are judged by their neighbours, and samples of corners by themselves: some
+    // lie on a piece that is not seen.
+    const auto off_surface = [&](const Vec3& p) {
+      const double off = distance_.at(p);
+      if (off <= rounding * size_) return off;
+      if (!whole_surface) whole_surface.emplace(surface_.positions, surface_.triangles);
+      return whole_surface->at(p);
+    };
     for (Eigen::Index s = 0; s < samples.area_m2.size(); ++s) {
       const Vec3 p = samples.positions_m.row(s);
-      c_.off_surface_m = std::max(c_.off_surface_m, distance_.at(p));
+      c_.off_surface_m = std::max(c_.off_surface_m, off_surface(p));
       Vec3 there = Vec3::Zero();
       for (int k = 0; k < 4; ++k)
         there += samples.weights(s, k) * Vec3(cage_.positions.row(cage_.tets(samples.tet_from_sample[s], k)));
@@ -165,6 +177,7 @@ class Checker {
   }
 
   const ContactShape& shape_;
+  const SurfaceMesh& surface_;
   const TetMesh& cage_;
   const double size_;
   const WindingNumber winding_;

@@ -13,8 +13,8 @@ struct ContactCheck {
   int nodes = 0;           // of the field that were measured, all over it and next to the surface
   double field_cells = 0;  // the most that one of them is off, in cells
   int wrong_sides = 0;     // of them: inside by the field and outside by the winding number, or the other way
-  double steepest =
-      0;  // change of the field between neighbouring nodes, over their distance; 1 or a little more
+  double steepest = 0;  // change of the field between neighbouring nodes, over their distance; 1 or a little
+                        // more; not measured of open surfaces, 0
   double off_surface_m = 0, misplaced_m = 0;  // the farthest of a sample from the surface, and from where its
                                               // weights put it
   double area_share = 0;                      // that the samples stand for, of the surface that is seen

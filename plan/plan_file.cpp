@@ -393,7 +393,7 @@ void read_search(const Reader& reader, const Json& meta, const std::string& file
 
 }  // namespace
 
-void write_plan(const fs::path& path, const Plan& plan, const Json& given) {
+Npz npz_of(const Plan& plan, const Json& given) {
   Npz file;
   put_shared_states(file, plan.tree.states);
   put_controls(file, "tree", plan.tree.controls);
@@ -424,7 +424,11 @@ void write_plan(const fs::path& path, const Plan& plan, const Json& given) {
   meta["given"] = given;
   file.texts["meta.json"] = meta.dump(2) + "\n";
   file.texts[seal_name] = hex(hash_of(file, seal_name)) + "\n";
-  write_npz(path, file);
+  return file;
+}
+
+void write_plan(const fs::path& path, const Plan& plan, const Json& given) {
+  write_npz(path, npz_of(plan, given));
 }
 
 PlanFile read_plan(const fs::path& path) {

@@ -2,6 +2,7 @@
 // Entries: docs/planning.md.
 #pragma once
 
+#include "core/npz.h"
 #include "plan/search.h"
 
 namespace limber::plan {
@@ -13,6 +14,8 @@ struct PlanFile {
 };
 
 void write_plan(const fs::path&, const Plan&, const Json& given);
+// Its entries, as write_plan has them.
+Npz npz_of(const Plan&, const Json& given);
 
 // Throws InputError when the file is cut short, lacks an entry, contradicts itself, or was changed since it
 // was written (its hashes are checked).

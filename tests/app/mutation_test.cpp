@@ -3,6 +3,7 @@
 // name each. A new promise wants its mutations here: one line in the list of its file.
 #include <Eigen/LU>
 #include <map>
+#include <numbers>
 
 #include "app/fem_system.h"
 #include "app/manifest.h"
@@ -13,8 +14,11 @@
 #include "core/mesh_files.h"
 #include "core/npz.h"
 #include "ffd/binding_file.h"
+#include "meshing/cage.h"
 #include "meshing/certificate.h"
 #include "meshing/contact_shape.h"
+#include "meshing/convex_hull.h"
+#include "meshing/shell_check.h"
 #include "plan/plan_file.h"
 #include "tests/app/program.h"
 
@@ -564,7 +568,7 @@ List of_bodies() {
     s.positions_m.conservativeResize(half, 3), s.weights.conservativeResize(half, 4);
     s.tet_from_sample.conservativeResize(half), s.area_m2.conservativeResize(half);
   });
-  add(ball, "contact by the cage", "ball: contact is by the cage", [](PreparedBody& body, auto&) {
+  add(ball, "contact by the cage", "ball: contact made again", [](PreparedBody& body, auto&) {
     SurfaceSamples& s = body.contact.samples;
     body.contact.usable = false;
     s.positions_m.resize(0, 3), s.weights.resize(0, 4), s.tet_from_sample.resize(0), s.area_m2.resize(0);
@@ -603,7 +607,11 @@ List of_reports(const Json& report) {
   for (const char* key :
        {"tets", "nodes", "volume_m3", "min_dihedral_deg", "max_dihedral_deg", "median_min_dihedral_deg"})
     add(std::string("/cage/") + key, "ball: report.json");
-  add("/shells/count", "ball: report.json");
+  for (const char* key :
+       {"/shells/count", "/shells/stopped_by", "/shells/inflation", "/shells/sum_of_volumes_m3", "/cage/mode",
+        "/cage/volume_ratio", "/cage/glued_share", "/contact/cells", "/contact/characteristic_m",
+        "/contact/open_share"})
+    add(key, "ball: report.json");
   add("/shells/mean_overshoot", "ball: shells stand off");
   add("/shells/max_overshoot", "ball: shells stand off");
   return list;
@@ -678,6 +686,271 @@ List of_files() {
   return list;
 }
 
+// More in a file than limber writes there, under hashes that fit.
+List of_what_nobody_reads() {
+  List list;
+  const std::string more = "plan.npz holds what limber writes, and no more";
+  const auto add_to_plan = [&](std::string what, std::string named, std::function<void(Npz&)> change) {
+    list.push_back({std::move(what), std::move(named), [change = std::move(change)](Mutant& m) {
+                      Npz npz = read_npz(m.folder / "plan.npz");
+                      change(npz);
+                      npz.texts["hash.txt"] = hex(hash_of(npz, "hash.txt")) + "\n";
+                      write_npz(m.folder / "plan.npz", npz);
+                    }});
+  };
+  const std::vector<float> nothing{std::numeric_limits<float>::quiet_NaN()};
+  const NpyArray odd = NpyArray::of<float>(nothing, {1});
+  add_to_plan("an array of NaN that nobody reads", more, [=](Npz& npz) { npz.arrays["proof"] = odd; });
+  add_to_plan("a text that nobody reads", more, [](Npz& npz) { npz.texts["README.txt"] = "proved"; });
+  add_to_plan("a name that differs in case", more, [](Npz& npz) { npz.texts["Meta.json"] = "{}"; });
+  for (const char* key : {"/proof", "/settings/proof", "/settings/goal/proof", "/statistics/proof",
+                          "/given/proof", "/given/cage_hashes/ghost"})
+    add_to_plan(std::string("meta.json with ") + key, more, [key = Json::json_pointer(key)](Npz& npz) {
+      Json meta = Json::parse(npz.texts.at("meta.json"));
+      meta[key] = "0123456789abcdef";
+      npz.texts["meta.json"] = meta.dump(2) + "\n";
+    });
+  add_to_plan("a key twice", "has the key \"solved\" twice",
+              [](Npz& npz) { npz.texts.at("meta.json").insert(1, "\n  \"solved\": false,"); });
+  for (const bool before : {true, false})
+    list.push_back({std::string("bytes ") + (before ? "before" : "after") + " the archive", "plan.npz",
+                    [before](Mutant& m) {
+                      const std::string bytes = read_file(m.folder / "plan.npz");
+                      write_file(m.folder / "plan.npz", before ? "more" + bytes : bytes + "more");
+                    }});
+  for (const std::string file : {"contact.npz", "binding.npz"}) {
+    const auto add = [&](std::string what, std::string named, std::function<void(Npz&)> change) {
+      list.push_back({file + ": " + what, std::move(named), [file, change = std::move(change)](Mutant& m) {
+                        const fs::path path = m.folder / "bodies" / "ball" / file;
+                        Npz npz = read_npz(path);
+                        change(npz);
+                        write_npz(path, npz);
+                        m.write_report(ball);
+                      }});
+    };
+    add("an array that nobody reads", "which limber does not write",
+        [=](Npz& npz) { npz.arrays["proof"] = odd; });
+    add("a key that nobody reads", "more in it than limber writes", [](Npz& npz) {
+      Json meta = Json::parse(npz.texts.at("meta.json"));
+      meta["proof"] = 1;
+      npz.texts["meta.json"] = meta.dump(2) + "\n";
+    });
+  }
+  for (const char* key : {"/proof", "/shells/proof", "/contact/proof"})
+    list.push_back({std::string("report.json with ") + key, "ball: report.json tells of these files",
+                    [key = Json::json_pointer(key)](Mutant& m) {
+                      m.bodies[ball].report[key] = "0123456789abcdef";
+                      m.write_report(ball);
+                    }});
+  list.push_back({"a file more in report.json", "ball: report.json tells of these files", [](Mutant& m) {
+                    write_file(m.folder / "bodies" / "ball" / "proof", "proved");
+                    m.bodies[ball].report["files"]["proof"] = "";
+                    m.write_report(ball);
+                  }});
+  return list;
+}
+
+// −0 is not 0, though == says so.
+List of_zeros() {
+  const std::string tree = "searched again from the scene: the same tree";
+  List list;
+  list.push_back({"a speed of −0 at the start", tree, [](Mutant& m) {
+                    change_state(m.planned.plan, 0, [](State& s) { s.velocities[0] = -0.f; });
+                    m.write_plan();
+                  }});
+  list.push_back({"a speed of −0 in the first frame", "replay gives the same bits", [](Mutant& m) {
+                    m.planned.plan.trajectory.frames[0].velocities[0] = -0.f;
+                    m.write_plan();
+                  }});
+  list.push_back({"numbers of −0 that no push uses", tree, [](Mutant& m) {
+                    for (Control& control : m.planned.plan.tree.controls)
+                      for (float& x : control.target_m)
+                        if (x == 0) x = -0.f;
+                    m.write_plan();
+                  }});
+  return list;
+}
+
+// Bodies that fit together and are not those that the scene's text leads to. `anew`: planned in.
+List of_other_bodies() {
+  List list;
+  const std::string shells_again = "block: shells made again", cage_again = "ball: cage made again",
+                    contact_again = "ball: contact made again";
+  const auto plan_anew = [](Mutant& m) {
+    TemporaryFolder text;
+    std::ofstream(text / "scene.toml") << m.planned.scene.text;
+    const Result planned =
+        limber_program({"plan", (text / "scene.toml").string(), "-o", m.folder.string(), "-q"});
+    if (planned.code != exit_done) throw std::runtime_error("is not planned: " + planned.err);
+  };
+  using Change = std::function<void(Mutant&)>;
+  const auto add = [&](std::size_t b, std::string what, std::string named, bool anew, Change change) {
+    list.push_back({std::move(what), std::move(named), [=](Mutant& m) {
+                      change(m);
+                      m.write_body(b);
+                      anew ? plan_anew(m) : m.write_plan();
+                    }});
+  };
+  add(ball, "no samples at the front", contact_again, true, [](Mutant& m) {
+    SurfaceSamples& s = m.bodies[ball].contact.samples;
+    Eigen::Index tip = 0, left = 0;
+    s.positions_m.col(0).maxCoeff(&tip);
+    const Vec3 front = s.positions_m.row(tip);
+    const double radius = 3 * std::sqrt(s.area_m2[tip]), all = s.area_m2.sum();
+    for (Eigen::Index i = 0; i < s.area_m2.size(); ++i) {
+      if ((Vec3(s.positions_m.row(i)) - front).norm() <= radius) continue;
+      s.positions_m.row(left) = s.positions_m.row(i), s.weights.row(left) = s.weights.row(i);
+      s.tet_from_sample[left] = s.tet_from_sample[i], s.area_m2[left++] = s.area_m2[i];
+    }
+    s.positions_m.conservativeResize(left, 3), s.weights.conservativeResize(left, 4);
+    s.tet_from_sample.conservativeResize(left), s.area_m2.conservativeResize(left);
+    s.area_m2 *= all / s.area_m2.sum();
+  });
+  add(ball, "samples that stand for more at the back", contact_again, true, [](Mutant& m) {
+    SurfaceSamples& s = m.bodies[ball].contact.samples;
+    const double all = s.area_m2.sum(), middle = s.positions_m.col(0).mean();
+    for (Eigen::Index i = 0; i < s.area_m2.size(); ++i)
+      s.area_m2[i] *= s.positions_m(i, 0) > middle ? 0.7 : 1.3;
+    s.area_m2 *= all / s.area_m2.sum();
+  });
+  add(ball, "all distances larger by less than a cell", contact_again, true, [](Mutant& m) {
+    DistanceField& field = m.bodies[ball].contact.field;
+    const int by = int(0.9 * field.cell_m / field.unit_m);
+    for (std::int16_t& v : field.values) v = std::int16_t(std::min(32000, v + by));
+    m.bodies[ball].contact.least_weight = meshing::least_weights(field, m.bodies[ball].cage);
+  });
+  add(ball, "a cage that is a little larger", cage_again, true, [](Mutant& m) {
+    PreparedBody& body = m.bodies[ball];
+    const Eigen::RowVector3d middle = body.cage.positions.colwise().mean();
+    body.cage.positions = ((body.cage.positions.rowwise() - middle) * 1.02).rowwise() + middle;
+    body.binding = ffd::bind(body.surface, body.cage);
+    body.contact = meshing::make_contact_shape(body.surface, body.cage);
+  });
+
+  const auto label = [](Mutant& m) {
+    m.bodies[block].shell_from_tet = meshing::label_tets(m.bodies[block].cage, m.shells[block]);
+  };
+  const auto tell_honestly = [](Mutant& m) {
+    const meshing::ShellCheck c = meshing::check_shells(m.shells[block], m.bodies[block].surface);
+    m.bodies[block].report["shells"].update({{"mean_overshoot", c.mean_overshoot},
+                                             {"max_overshoot", c.max_overshoot},
+                                             {"vertices_uncovered", c.vertices_uncovered},
+                                             {"triangles_uncovered", c.triangles_uncovered}});
+  };
+  const auto scale = [](Mutant& m, double by) {
+    for (ConvexShell& shell : m.shells[block]) {
+      const Eigen::RowVector3d middle = shell.vertices.colwise().mean();
+      shell.vertices = ((shell.vertices.rowwise() - middle) * by).rowwise() + middle;
+    }
+  };
+  add(block, "shells too large, said to be inflated", "block: shells stand off", false, [=](Mutant& m) {
+    scale(m, 1.3), label(m);
+    m.bodies[block].report["shells"]["inflation"] = 1e-9;
+  });
+  add(block, "small shells, and what they do not cover is told", shells_again, false,
+      [=](Mutant& m) { scale(m, 0.1), label(m), tell_honestly(m); });
+  add(block, "one shell, the hull, and how it stands off is told", shells_again, false, [=](Mutant& m) {
+    m.shells[block] = {meshing::convex_hull(m.bodies[block].surface.positions)};
+    label(m), tell_honestly(m);
+  });
+  add(block, "tets of the first shell, said to be in cells", "block: each tet of the cage", false,
+      [](Mutant& m) {
+        std::vector<int>& shells = m.bodies[block].shell_from_tet;
+        std::fill(shells.begin(), shells.end(), 0);
+        m.bodies[block].report["cage"]["mode"] = "cells";
+      });
+  add(block, "tets of the other shell, said to be of mode paper", "block: each tet of the cage", false,
+      [](Mutant& m) {
+        for (int& shell : m.bodies[block].shell_from_tet) shell = 1 - shell;
+        m.bodies[block].report["cage"]["mode"] = "paper";
+      });
+  return list;
+}
+
+// What is told of shortcuts, better paths and carried ones that were not.
+List of_later_ones() {
+  const Json costs{
+      {"duration_s", 1.0}, {"effort_n_s", 1.0}, {"strain_energy_j", 1.0}, {"volume_change", 0.01}};
+  List list;
+  const auto add = [&](std::string what, std::function<void(Mutant&)> change) {
+    list.push_back(
+        {std::move(what), "what the plan tells of itself", [change = std::move(change)](Mutant& m) {
+           change(m);
+           m.write_plan();
+         }});
+  };
+  add("a better path that was not", [=](Mutant& m) {
+    m.planned.summary["improve"] = {{"cost", "duration"}, {"first", costs}, {"improvements", Json::array()},
+                                    {"searches", 9},      {"solved", 9},    {"iterations", 99},
+                                    {"cpu_s", 1.0},       {"wall_s", 1.0}};
+  });
+  add("a better path of which nothing is told",
+      [](Mutant& m) { m.planned.summary["improve"] = Json::object(); });
+  add("a carried plan of which little is told", [](Mutant& m) {
+    m.planned.summary["refine"] = {{"how", "replayed"}};
+    m.planned.plan.statistics.iterations = 3, m.planned.plan.statistics.rollout_steps = 1;
+  });
+  for (const char* how : {"replayed", "carried by an angel"})
+    add(std::string("a plan that was not ") + how, [how](Mutant& m) {
+      std::int64_t tets = 0;
+      for (const PreparedBody& body : m.bodies) tets += body.cage.tets.rows();
+      m.planned.summary["refine"] = {{"how", how},          {"tracked_s", 1.0},    {"largest_error_m", 0.0},
+                                     {"iterations", 0},     {"replay_cpu_s", 1.0}, {"track_cpu_s", 1.0},
+                                     {"search_cpu_s", 0.0}, {"coarse_tets", tets}, {"tets", tets}};
+    });
+  return list;
+}
+
+// Of a plan with shortcuts and better paths.
+List of_a_better_plan() {
+  const std::string claims = "what the plan tells of itself";
+  List list;
+  const auto add = [&](std::string what, std::string named, std::function<void(Json&)> change) {
+    list.push_back({std::move(what), std::move(named), [change = std::move(change)](Mutant& m) {
+                      change(m.planned.summary);
+                      m.write_summary();
+                    }});
+  };
+  add("what shortcuts began with", claims, [](Json& s) { s["shortcut"]["before"]["duration_s"] = 0.01; });
+  add("shortcuts with more in them", claims, [](Json& s) { s["shortcut"]["proof"] = "exact"; });
+  add("what the best path costs", claims, [](Json& s) {
+    Json& i = s["improve"];
+    (i["improvements"].empty() ? i["first"] : i["improvements"].back()["costs"])["duration_s"] = 0.01;
+    s["shortcut"]["after"]["duration_s"] = 0.01;
+  });
+  add("a better path that is not better", claims, [](Json& s) {
+    Json& i = s["improve"];
+    const Json costs = i["improvements"].empty() ? i["first"] : i["improvements"].back()["costs"];
+    i["improvements"].push_back({{"wall_s", 1.0}, {"iterations", 1}, {"search", 1}, {"costs", costs}});
+    i["solved"] = 9, i["searches"] = 9;
+  });
+  add("more searches that ended well than there were", claims,
+      [](Json& s) { s["improve"]["solved"] = 1 + s["improve"]["searches"].get<int>(); });
+  add("nothing of what came after the search", "searched again from the scene: the same tree",
+      [](Json& s) { s.erase("improve"), s.erase("shortcut"); });
+  return list;
+}
+
+// Of a plan that was carried over.
+List of_a_carried_plan() {
+  List list;
+  const auto add = [&](std::string what, std::function<void(Mutant&)> change) {
+    list.push_back(
+        {std::move(what), "what the plan tells of itself", [change = std::move(change)](Mutant& m) {
+           change(m);
+           m.write_plan();
+         }});
+  };
+  add("its tets", [](Mutant& m) { m.planned.summary["refine"]["tets"] = 1'000'000; });
+  add("how it was carried", [](Mutant& m) { m.planned.summary["refine"]["how"] = "by an angel"; });
+  add("counts of a search", [](Mutant& m) { m.planned.plan.statistics.diverged = 3; });
+  add("iterations of its nodes", [](Mutant& m) {
+    std::vector<std::int64_t>& of = m.planned.plan.tree.iterations;
+    for (std::size_t n = 1; n < of.size(); ++n) of[n] += 7;
+  });
+  return list;
+}
+
 // Of a start at which bodies were parted.
 List of_a_parted_start() {
   List list;
@@ -724,18 +997,21 @@ List of_a_parted_start() {
 class Mutations_slow : public testing::Test {
  protected:
   static void SetUpTestSuite() { plan(scene_text); }
-  static void plan(const std::string& text) {
-    shared_ = new TemporaryFolder;
-    std::ofstream(shared_->path() / "scene.toml") << text;
-    planned_ = limber_program({"plan", (shared_->path() / "scene.toml").string(), "-o", good().string()});
+  static void plan(const std::string& text, const std::vector<std::string>& more = {}) {
+    if (!shared_) shared_ = new TemporaryFolder;
+    std::ofstream(scene_file()) << text;
+    std::vector<std::string> words{"plan", scene_file(), "-o", good().string()};
+    words.insert(words.end(), more.begin(), more.end());
+    planned_ = limber_program(words);
   }
-  static void TearDownTestSuite() { delete shared_; }
+  static std::string scene_file() { return (shared_->path() / "scene.toml").string(); }
+  static void TearDownTestSuite() { delete shared_, shared_ = nullptr; }
   static fs::path good() { return shared_->path() / "good"; }
 
   void SetUp() override { ASSERT_EQ(planned_.code, exit_done) << planned_.err; }
 
   // Each mutant is refused, by the promise or complaint that is said.
-  static void expect_named(const List& list) {
+  static void expect_named(const List& list, const std::vector<std::string>& more = {}) {
     const fs::path bad = shared_->path() / "bad";
     for (const Mutation& mutation : list) {
       SCOPED_TRACE(mutation.what);
@@ -748,7 +1024,9 @@ class Mutations_slow : public testing::Test {
         ADD_FAILURE() << "is not made: " << error.what();
         continue;
       }
-      const Result result = limber_program({"verify", (bad / mutation.part).string(), "--json"});
+      std::vector<std::string> words{"verify", (bad / mutation.part).string(), "--json"};
+      words.insert(words.end(), more.begin(), more.end());
+      const Result result = limber_program(words);
       EXPECT_TRUE(result.code == exit_defect || result.code == exit_bad_input) << result.code;
       std::string found;
       const Json answer = result.json();
@@ -784,6 +1062,202 @@ TEST_F(Mutations_slow, OfReports) {
   expect_named(of_reports(read_json(good() / "bodies" / "ball" / "report.json")));
 }
 TEST_F(Mutations_slow, OfFiles) { expect_named(of_files()); }
+TEST_F(Mutations_slow, OfWhatNobodyReads) { expect_named(of_what_nobody_reads()); }
+TEST_F(Mutations_slow, OfZeros) { expect_named(of_zeros()); }
+TEST_F(Mutations_slow, OfOtherBodies) { expect_named(of_other_bodies()); }
+TEST_F(Mutations_slow, OfLaterOnes) { expect_named(of_later_ones()); }
+
+// A ball of 2 · rings · sectors triangles.
+std::string ball_obj(int rings, int sectors) {
+  std::string obj;
+  for (int r = 0; r < rings; ++r)
+    for (int s = 0; s < sectors; ++s) {
+      const double down = std::numbers::pi * (r + 0.5) / rings, round = 2 * std::numbers::pi * s / sectors;
+      obj += fmt::format("v {} {} {}\n", std::sin(down) * std::cos(round), std::sin(down) * std::sin(round),
+                         std::cos(down));
+    }
+  obj += "v 0 0 1\nv 0 0 -1\n";
+  const int last = (rings - 1) * sectors;
+  for (int s = 0; s < sectors; ++s) {
+    const int next = (s + 1) % sectors;
+    obj += fmt::format("f {} {} {}\n", rings * sectors + 1, s + 1, next + 1);
+    obj += fmt::format("f {} {} {}\n", rings * sectors + 2, last + next + 1, last + s + 1);
+    for (int at = 0; at < last; at += sectors) {
+      obj += fmt::format("f {} {} {}\n", at + s + 1, at + sectors + s + 1, at + next + 1);
+      obj += fmt::format("f {} {} {}\n", at + next + 1, at + sectors + s + 1, at + sectors + next + 1);
+    }
+  }
+  return obj;
+}
+
+// What a cage does not promise is told, and the cage is still the one that is made so.
+TEST(BodyMutations_slow, OfACageThatNeedNotEnclose) {
+  for (const char* mode : {"conform", "paper"}) {
+    SCOPED_TRACE(mode);
+    const TemporaryFolder folder;
+    const std::string model = (folder / "ball.obj").string(), body = (folder / "ball").string();
+    write_file(model, ball_obj(15, 20));
+    ASSERT_EQ(limber_program({"prepare", model, "-o", body, "--tets", "100", "--mode", mode}).code,
+              exit_done);
+    const Result good = limber_program({"verify", body});
+    EXPECT_EQ(good.code, exit_done) << good.out << good.err;
+    EXPECT_NE(good.out.find("found   body: no vertex outside the cage"), std::string::npos) << good.out;
+
+    PreparedBody other = read_body(folder / "ball");
+    const fs::path at = folder / "ball";
+    other.cage.positions(3, 0) += 1e-3;
+    const std::vector<ConvexShell> shells = read_obj_shells(at / "shells.obj");
+    other.binding = ffd::bind(other.surface, other.cage);
+    other.contact = meshing::make_contact_shape(other.surface, other.cage);
+    write_msh(at / "cage.msh", other.cage, other.shell_from_tet);
+    ffd::write_binding(at / "binding.npz", other.binding, other.surface, other.cage);
+    write_contact_shape(at / "contact.npz", other.contact, other.surface, other.cage);
+    const Json facts = facts_of_body(other.surface, shells, other.cage, other.binding, other.contact,
+                                     meshing::certify(other.surface, other.cage));
+    for (const auto& [table, figures] : facts.items()) other.report[table].update(figures);
+    for (const auto& [name, hash] : other.report.at("files").items())
+      other.report["files"][name] = hex(hash_of(std::string_view(read_file(at / name))));
+    write_json(at / "report.json", other.report);
+    const Result named = limber_program({"verify", body});
+    EXPECT_EQ(named.code, exit_defect);
+    EXPECT_NE(named.out.find("BROKEN  body: cage made again"), std::string::npos) << named.out;
+  }
+}
+
+// Shells of large bodies are made again for those who ask for it.
+TEST(BodyMutations_slow, OfShellsThatStandOffTooFar) {
+  const TemporaryFolder folder;
+  const std::string model = (folder / "ball.obj").string(), body = (folder / "ball").string();
+  write_file(model, ball_obj(101, 101));  // 20,402 triangles
+  ASSERT_EQ(limber_program({"prepare", model, "-o", body, "--tets", "60"}).code, exit_done);
+  const auto verified = [&](bool remake) {
+    std::vector<std::string> words{"verify", body};
+    if (remake) words.push_back("--remake");
+    return limber_program(words);
+  };
+  for (const bool remake : {false, true}) {
+    const Result good = verified(remake);
+    EXPECT_EQ(good.code, exit_done) << good.out << good.err;
+    EXPECT_EQ(good.out.find("made again; --remake") == std::string::npos, remake) << good.out;
+  }
+
+  const SurfaceMesh surface = read_ply(folder / "ball" / "surface.ply");
+  std::vector<ConvexShell> shells = read_obj_shells(folder / "ball" / "shells.obj");
+  shells.at(0).vertices *= 1.5;
+  write_obj(folder / "ball" / "shells.obj", shells);
+  Json report = read_json(folder / "ball" / "report.json");
+  const meshing::ShellCheck c = meshing::check_shells(shells, surface);
+  report["shells"].update(
+      {{"mean_overshoot", c.mean_overshoot},
+       {"max_overshoot", c.max_overshoot},
+       {"sum_of_volumes_m3", volume(SurfaceMesh{shells[0].vertices, shells[0].triangles})}});
+  report["files"]["shells.obj"] = hex(hash_of(std::string_view(read_file(folder / "ball" / "shells.obj"))));
+  write_json(folder / "ball" / "report.json", report);
+  EXPECT_EQ(verified(false).code, exit_done) << verified(false).out;
+  const Result named = verified(true);
+  EXPECT_EQ(named.code, exit_defect);
+  EXPECT_NE(named.out.find("BROKEN  body: shells made again"), std::string::npos) << named.out;
+
+  report["shells"]["stopped_by"] = "count";
+  write_json(folder / "ball" / "report.json", report);
+  EXPECT_NE(verified(false).out.find("BROKEN  body: report.json tells"), std::string::npos);
+}
+
+// A plan of another scene is a plan: whoever knows which scene it should be of says so.
+TEST_F(Mutations_slow, OfAnotherScene) {
+  const std::vector<std::string> trusted{"--scene", scene_file()};
+  const std::string named = "the plan is of the scene " + scene_file();
+  EXPECT_EQ(limber_program({"verify", good().string(), "--scene", scene_file()}).code, exit_done);
+  expect_named({{"a goal that is next to the start", named,
+                 [](Mutant& m) {
+                   std::string text = m.planned.scene.text;
+                   const std::string goal = "[3.2, 1, 1]";
+                   text.replace(text.find(goal), goal.size(), "[0.9, 1, 1.3]");
+                   TemporaryFolder other;
+                   std::ofstream(other / "scene.toml") << text;
+                   limber_program({"plan", (other / "scene.toml").string(), "-o", m.folder.string(), "-q"});
+                 }},
+                {"an edit by --set", named,
+                 [](Mutant& m) {
+                   m.planned.scene.sets.push_back("goal.radius_m=0.3");
+                   m.write_plan();
+                 }}},
+               trusted);
+  EXPECT_EQ(limber_program({"verify", good().string(), "--set", "name=a"}).code, exit_bad_input);
+}
+
+class BetterMutations_slow : public Mutations_slow {
+ protected:
+  static void SetUpTestSuite() { plan(scene_text, {"--shortcut", "2", "--improve", "--iterations", "120"}); }
+};
+TEST_F(BetterMutations_slow, OfABetterPlan) {
+  const Result good_one = limber_program({"verify", good().string()});
+  EXPECT_EQ(good_one.code, exit_done) << good_one.out << good_one.err;
+  expect_named(of_a_better_plan());
+  // Whoever goes on with it still tells what came after the search.
+  ASSERT_EQ(limber_program({"plan", scene_file(), "-o", good().string(), "--resume"}).code, exit_done);
+  const Result resumed = limber_program({"verify", good().string()});
+  EXPECT_EQ(resumed.code, exit_done) << resumed.out << resumed.err;
+}
+TEST_F(BetterMutations_slow, OfACarriedPlan) {
+  const fs::path fine = good().parent_path() / "fine";
+  ASSERT_EQ(limber_program({"refine", good().string(), "-o", fine.string(), "--tets-factor", "1", "--set",
+                            "film.clock=true"})
+                .code,
+            exit_done);
+  fs::remove_all(good());
+  fs::rename(fine, good());
+  ASSERT_NE(read_plan_folder(good()).summary.at("refine").at("how"), "replanned");
+  const Result good_one = limber_program({"verify", good().string()});
+  EXPECT_EQ(good_one.code, exit_done) << good_one.out << good_one.err;
+  expect_named(of_a_carried_plan());
+}
+
+// A body from a file, and a goal whose shape is one.
+class FileMutations_slow : public Mutations_slow {
+ protected:
+  static void SetUpTestSuite() {
+    plan(scene_text);
+    const fs::path folder = good().parent_path();
+    const PreparedBody made = read_body(good() / "bodies" / "ball");
+    std::string obj;
+    for (const auto& p : made.surface.positions.rowwise())
+      obj += fmt::format("v {} {} {}\n", p.x() - 0.6, p.y() - 1, p.z() - 1.3);
+    for (const auto& t : made.surface.triangles.rowwise())
+      obj += fmt::format("f {} {} {}\n", t[0] + 1, t[1] + 1, t[2] + 1);
+    write_file(folder / "ball.obj", obj);
+    std::string text = scene_text;
+    const auto replace = [&](const std::string& from, const std::string& to) {
+      text.replace(text.find(from), from.size(), to);
+    };
+    replace("model = { sphere = { diameter_m = 0.6, triangle_m = 0.06 } }",
+            "model = { file = \"ball.obj\" }");
+    plan(text);  // prepares the ball; its cage is the shape that is asked for
+    fs::copy_file(good() / "bodies" / "ball" / "cage.msh", folder / "goal.msh");
+    replace("radius_m = 0.3\n[planner]",
+            "radius_m = 0.3\nshape = { cage = \"goal.msh\", tolerance_m = 1 }\n[planner]");
+    plan(text);
+  }
+};
+TEST_F(FileMutations_slow, OfWhatAScenesFilesSay) {
+  const Result good_one = limber_program({"verify", good().string(), "--scene", scene_file()});
+  EXPECT_EQ(good_one.code, exit_done) << good_one.out << good_one.err;
+  expect_named({{"a source that nobody has", "ball: surface is the scene's model",
+                 [](Mutant& m) {
+                   m.bodies[ball].report["input"]["model"]["model"]["source"] = "0123456789abcdef";
+                   m.write_report(ball);
+                   m.write_plan();
+                 }},
+                {"the shape of the goal", "the goal's shape is goal.shape.cage",
+                 [](Mutant& m) {
+                   Points& goal = m.bodies[ball].goal_shape_m;
+                   goal.col(0) *= 1.001;
+                   write_msh(m.folder / "bodies" / "ball" / "goal.msh", {goal, m.bodies[ball].cage.tets},
+                             m.bodies[ball].shell_from_tet);
+                   m.write_plan();
+                 }}},
+               {"--scene", scene_file()});
+}
 
 class PartedMutations_slow : public Mutations_slow {
  protected:

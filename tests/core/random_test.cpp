@@ -3,11 +3,12 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <functional>
 #include <set>
 
 #include "core/error.h"
 #include "core/hash.h"
-#include "core/state.h"
+#include "core/same_bits.h"
 #include "core/threads.h"
 
 namespace limber {
@@ -57,6 +58,29 @@ TEST(Random, BelowIsUniform) {
   std::array<int, 6> count{};
   for (int i = 0; i < 60000; ++i) ++count[std::size_t(rng.below(6))];
   for (const int c : count) EXPECT_NEAR(c, 10000, 5 * std::sqrt(60000 * 5.0 / 36));
+}
+
+TEST(SameBits, MinusZeroIsNotZero) {
+  const State state{3, {0, 2, 3}, {4, 5, 0}};
+  EXPECT_TRUE(same_bits(state, State(state)));
+  State other = state;
+  other.positions[0] = -0.f;
+  EXPECT_TRUE(other == state && !same_bits(other, state));
+  other = state, other.velocities[2] = -0.f;
+  EXPECT_TRUE(other == state && !same_bits(other, state));
+  EXPECT_FALSE(same_bits(state, State{4, state.positions, state.velocities}));
+  EXPECT_FALSE(same_bits(state, State{3, {0, 2}, {4, 5}}));
+  for (const auto& change : std::vector<std::function<void(Control&)>>{
+           [](Control& c) { c.force_n.y() = -0.f; }, [](Control& c) { c.target_m.z() = -0.f; },
+           [](Control& c) { c.radius_m = -0.f; }, [](Control& c) { c.max_force_n = -0.f; }}) {
+    Control control;
+    EXPECT_TRUE(same_bits(control, Control{}));
+    change(control);
+    EXPECT_TRUE(control == Control{} && !same_bits(control, Control{}));
+  }
+  Control pushed;
+  pushed.steps = 1;
+  EXPECT_FALSE(same_bits(pushed, Control{}));
 }
 
 TEST(Hash, SeesEveryPartOfAState) {

@@ -41,6 +41,13 @@ TEST(Strangers, ASizeBeyondTheLimitIsRefusedBeforeItIsRead) {
   EXPECT_NE(complaint([&] { read_json(folder / "large.npz"); }).find("at most 67108864"), std::string::npos);
 }
 
+TEST(Strangers, AKeyTwiceIsTwoAnswers) {
+  EXPECT_EQ(parse_json(R"({"a": {"b": 1}, "b": {"b": 2}, "c": [{"b": 3}, {"b": 4}]})", "x").size(), 3u);
+  for (const char* text : {R"({"a": 1, "a": 1})", R"([{"b": {"a": 1, "c": {"a": 2}, "a": 3}}])"})
+    EXPECT_NE(complaint([&] { parse_json(text, "x"); }).find("x: has the key \"a\" twice"), std::string::npos)
+        << text;
+}
+
 TEST(Strangers, AJsonOfAnyDepthIsAnAnswer) {
   const auto nested = [](int depth) {
     std::string text = "\n";
