@@ -15,6 +15,7 @@
 #include "core/version.h"
 #include "ffd/binding_file.h"
 #include "meshing/quality.h"
+#include "meshing/split_edges.h"
 
 namespace limber::app {
 
@@ -140,12 +141,14 @@ Json input_of(const Json& identity, const PrepareSettings& settings) {
   // What nobody chooses counts, too: a limber that has other values makes another body.
   const meshing::ContactShapeSettings c;
   const meshing::CageOptions cage;
+  const meshing::SplitSettings split;
   return {{"model", identity},
           {"settings", json_of(settings)},
           {"cage",
            {{"min_dihedral_deg", cage.min_dihedral_deg},
             {"max_dihedral_deg", cage.max_dihedral_deg},
             {"gap", cage.gap}}},
+          {"split", {{"share", split.share}, {"most_new_vertices", split.most_new_vertices}}},
           {"contact",
            {{"cells", c.cells},
             {"most_cells", c.most_cells},
@@ -164,6 +167,11 @@ PrepareSettings settings_of_input(const Json& input) {
   const Json& s = input.at("settings");
   return {s.at("shells").get<int>(), s.at("concavity").get<double>(), s.at("inflate").get<double>(),
           s.at("exact").get<bool>(), s.at("tets").get<int>(),         s.at("mode").get<std::string>()};
+}
+
+SurfaceMesh surface_that_bends(const SurfaceMesh& surface, const PrepareSettings& settings) {
+  if (settings.tets == 0) return surface;
+  return meshing::split_long_edges(surface, meshing::longest_edge(surface, settings.tets));
 }
 
 meshing::Decomposition make_shells(const SurfaceMesh& surface, const PrepareSettings& settings) {
@@ -218,8 +226,14 @@ Json prepare_body(const BodySource& source, const PrepareSettings& settings, con
   Costs costs;
   Progress progress("prepare", 7);
   progress.update(0, "import");
-  const meshing::ImportedModel model = source.load();
+  meshing::ImportedModel model = source.load();
   validate(model.surface, source.model);
+  const Eigen::Index own_vertices = model.surface.positions.rows();
+  model.surface = surface_that_bends(model.surface, settings);
+  if (const Eigen::Index more = model.surface.positions.rows() - own_vertices; more > 0)
+    model.mended.push_back(
+        fmt::format("cut long edges at {} places, so that its {} triangles bend as the cage does", more,
+                    model.surface.triangles.rows()));
   costs.end_stage("import");
   progress.update(1, "decompose");
   throw_if_stopped();

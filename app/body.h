@@ -47,6 +47,9 @@ Json input_of(const Json& identity, const PrepareSettings&);
 // The settings of such an input. Throws Json::exception where it is none.
 PrepareSettings settings_of_input(const Json& input);
 
+// A model's surface, its long edges cut so that it bends as the cage does; that of a body in cells as it is.
+SurfaceMesh surface_that_bends(const SurfaceMesh& model, const PrepareSettings&);
+
 // A body's shells, cage and contact, made from its surface and those before; `made_cage` is that of a body in
 // cells.
 struct MadeBody {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 
 #include "app/workspace.h"
 #include "core/hash.h"
@@ -39,6 +40,7 @@ std::uint64_t hash_of(const fem::World& world) {
   hasher.matrix(world.gravity_m_s2).value(world.dt_s).value(world.contact_dt_s).value(world.rest_speed_m_s);
   for (const double offset : world.surfaces64.offset) hasher.value(offset);
   if (!world.part_overlaps) hasher.text("overlaps are refused");
+  if (std::isfinite(world.max_overlap_m)) hasher.value(world.max_overlap_m);
   if (!world.parting.pairs.empty())
     for (const float x : world.start_positions) hasher.value(x);
   for (const fem::Body& body : world.bodies) {
@@ -82,6 +84,7 @@ class FemSystem::Propagator final : public plan::Propagator {
     fem::propagate(batch_for(int(rollouts.size())), work_);
     for (std::size_t i = 0; i < rollouts.size(); ++i) {
       rollouts[i].ok = work_[i].outcome.status == fem::RunStatus::ok;
+      rollouts[i].clear = work_[i].clear;
       rollouts[i].to = std::move(work_[i].end);
     }
   }
@@ -137,6 +140,7 @@ class FemSystem::Propagator final : public plan::Propagator {
         }
         batch.store(int(lane), rollout.to);
         rollout.ok = batch.outcome(int(lane)).status == fem::RunStatus::ok;
+        rollout.clear = !rollout.ok || batch.is_clear(int(lane));
         in_lane[lane] = nullptr;
         supply.done(rollout);
       }
@@ -157,8 +161,8 @@ class FemSystem::Propagator final : public plan::Propagator {
     }
   }
 
-  bool goes_on(const fem::Batch& batch, int lane, const plan::Rollout& rollout, plan::Supply& supply,
-               bool look_due, bool state_due) {
+  bool goes_on(fem::Batch& batch, int lane, plan::Rollout& rollout, plan::Supply& supply, bool look_due,
+               bool state_due) {
     if (look_due) {
       const plan::Look seen = look(batch, lane, rollout.control.steps - batch.steps_left(lane));
       // Numbers that are none stay so: it has diverged, and nobody need look.
@@ -167,6 +171,7 @@ class FemSystem::Propagator final : public plan::Propagator {
     }
     if (!state_due) return true;
     batch.peek(lane, peeked_);
+    rollout.clear = batch.is_clear(lane);
     return supply.goes_on(rollout, peeked_);
   }
 

@@ -2,6 +2,7 @@
 
 #include <numbers>
 
+#include "app/seen.h"
 #include "core/error.h"
 #include "core/hash.h"
 #include "core/log.h"
@@ -293,7 +294,8 @@ Origin origin_of(const scenes::Scene& scene, const scenes::BodySpec& body, const
     const BodySource found = source_of(scene, body, data);
     // A file may have changed, or another of its name lie here.
     if (file && found.identity.at("model").at("source") != source) return origin;
-    origin.same_surface = same_surface(found.load().surface, prepared.surface);
+    origin.same_surface =
+        same_surface(surface_that_bends(found.load().surface, settings_of(body)), prepared.surface);
     origin.made_cage = found.made_cage();
   } catch (const Json::exception&) {
     origin.placed_so = false;
@@ -462,8 +464,12 @@ void set_contact(const scenes::Scene& scene, const std::vector<PreparedBody>& pr
     spec.bodies[b].self_contact =
         body.self_contact ? *body.self_contact : on_surface && can_reach_itself(prepared[b]);
   }
-  spec.contact_offset_m =
-      contact_offset_m(scene, bounding_box(prepared[std::size_t(scene.robot)].surface.positions));
+  const Box robot = bounding_box(prepared[std::size_t(scene.robot)].surface.positions);
+  spec.contact_offset_m = contact_offset_m(scene, robot);
+  // What is promised of what is seen, less what fields may be off by.
+  if (!all_cages)
+    spec.max_overlap_m =
+        (SeenLimits{}.overlap - meshing::ContactShapeSettings{}.field_error) * robot.size().maxCoeff();
 }
 
 }  // namespace

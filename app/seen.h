@@ -11,6 +11,14 @@
 
 namespace limber::app {
 
+// What is promised of what is seen, as shares of the robot's size (longest edge of its fine surface's box at
+// rest), where contact is on the surfaces; and what the report marks of stretch, which a scene may promise.
+struct SeenLimits {
+  double overlap = 0.005, self_overlap = 0.005;
+  double median_gap = 0.01, worst_gap = 0.02;
+  double least_stretch = 0.5, largest_stretch = 2;
+};
+
 struct SeenFrame {
   double overlap_m = 0;  // deepest of two surfaces, at least one of which moves
   int overlap_body = -1, overlap_other = -1;

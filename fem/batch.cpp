@@ -158,6 +158,8 @@ void Batch::store(int lane, State& state) const {
   state = impl_->lanes[lane].state;
 }
 
+bool Batch::is_clear(int lane) { return impl_->stepper.is_clear(lane); }
+
 Cost Batch::cost() const {
   Cost all = impl_->stepper.cost();
   all += impl_->cost;
@@ -175,6 +177,8 @@ void propagate(Batch& batch, std::span<Rollout> rollouts) {
         if (mine != none && batch.steps_left(lane) == 0) {
           batch.store(lane, rollouts[mine].end);
           rollouts[mine].outcome = batch.outcome(lane);
+          rollouts[mine].clear = rollouts[mine].outcome.status != RunStatus::ok ||
+                                 rollouts[mine].control.steps == 0 || batch.is_clear(lane);
           mine = none, --running;
         }
         if (mine != none || next == rollouts.size()) break;

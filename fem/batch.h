@@ -53,6 +53,10 @@ class Batch {
   // with.
   const Outcome& outcome(int lane) const;
   void store(int lane, State&) const;
+  // Of the state that store() or peek() gives: no surface is deeper in another body's than
+  // World::max_overlap_m, as contact measures it; between cages always. Not of a lane that diverged, or was
+  // told to take no step.
+  bool is_clear(int lane);
   Cost cost() const;  // so far
 
  private:
@@ -63,8 +67,9 @@ class Batch {
 struct Rollout {
   const State* start;  // not owned
   Control control;
-  State end;        // out; equals *start when diverged
-  Outcome outcome;  // out
+  State end;          // out; equals *start when diverged
+  Outcome outcome;    // out
+  bool clear = true;  // out: Batch::is_clear of its end
 };
 
 // Runs all of them, refilling a lane as soon as its rollout ends.

@@ -606,6 +606,7 @@ World build_world(const WorldSpec& spec) {
   world.gravity_m_s2 = spec.gravity_m_s2;
   world.rest_speed_m_s = spec.rest_speed_m_s;
   world.part_overlaps = spec.part_overlaps;
+  world.max_overlap_m = spec.max_overlap_m;
   for (const BodySpec& body : spec.bodies) world.bodies.push_back(make_body(body));
   if (!world.bodies[spec.robot].pushed())
     throw InputError(

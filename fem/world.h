@@ -75,6 +75,9 @@ struct WorldSpec {
   double rest_speed_m_s = 0;
   double contact_offset_m = 0;  // ≥ 0: fine surfaces that near push each other
   bool part_overlaps = true;    // fine surfaces that overlap where bodies start are parted, else refused
+  // > 0; in a clear state no fine surface is deeper in another body's than this, beyond what it is at the
+  // start.
+  double max_overlap_m = std::numeric_limits<double>::infinity();
   std::vector<ForceSpec> forces = {};
   // World::start_positions of a world of this spec, which spares it the parting; empty: not known.
   std::vector<float> start_positions = {};
@@ -147,6 +150,7 @@ struct World {
   std::vector<float> start_positions;  // (3 × moving_nodes) rest shapes and places, unless they were parted
   Parting parting;
   bool part_overlaps;                            // as asked for
+  double max_overlap_m;                          // as asked for
   std::vector<Force> forces;                     // in the order of WorldSpec
   std::vector<detail::RigidTable> rigid_tables;  // a body; empty unless it is rigid
 };

@@ -95,8 +95,24 @@ class Checker {
     ++c_.nodes;
     // Where holes are closed, the field knows a surface that is not there.
     c_.field_cells = std::max(c_.field_cells, (closed_ ? std::abs(off) : off) / field.cell_m);
-    const double inside = winding_.at(place) - 0.5;
-    if (distance > field.cell_m && std::abs(inside) > 0.25 && (inside > 0) != (value < 0)) ++c_.wrong_sides;
+    if (distance > field.cell_m && clearly_not(value < 0, place) &&
+        (closed_ || all_round_is_not(value < 0, place)))
+      ++c_.wrong_sides;
+  }
+
+  bool clearly_not(bool inside, const Vec3& place) const {
+    const double winding = winding_.at(place) - 0.5;
+    return std::abs(winding) > 0.25 && (winding > 0) != inside;
+  }
+
+  // Through holes the field takes a side two cells far.
+  bool all_round_is_not(bool inside, const Vec3& place) const {
+    for (int axis = 0; axis < 3; ++axis)
+      for (const double cells : {-2., -1., 1., 2.}) {
+        const Vec3 there = place + cells * shape_.field.cell_m * Vec3::Unit(axis);
+        if ((winding_.at(there) > 0.5) == inside) return false;
+      }
+    return true;
   }
 
   void check_field() {

@@ -67,7 +67,8 @@ class Runner {
     const bool frame = state_.step == step_of_next_frame();
     take_due_frames();
     if (cost() > options_.most || state_.step > course_.last_step) return end(Course::too_costly);
-    if (options_.ask_acceptable && (frame || steps_left_ == 0) && !system_.acceptable(state_))
+    if (options_.ask_acceptable && (frame || steps_left_ == 0) &&
+        !(rollout.clear && system_.acceptable(state_)))
       return end(Course::not_acceptable);
     if (phase_ == Phase::reach && !in_goal()) return;
     if (steps_left_ == 0 || phase_ == Phase::reach) end_of_piece();

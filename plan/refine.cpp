@@ -106,7 +106,7 @@ class Follower {
       Rollout piece{&now, rollout.control, {}, false};
       piece.control.steps = int(std::min(end, frames_.next_step(now.step)) - now.step);
       propagator_->propagate({&piece, 1});
-      if (!piece.ok || !system_.acceptable(piece.to)) return false;
+      if (!piece.ok || !piece.clear || !system_.acceptable(piece.to)) return false;
       now = std::move(piece.to);
     }
     rollout.to = std::move(now);

@@ -44,7 +44,7 @@ Outcome outcome_of(const System& system, Rollout& rollout) {
   o.center = system.robot_center(rollout.to);
   LIMBER_CHECK(o.center.allFinite(), o.center.x(), o.center.y(), o.center.z());
   o.goal_shift = system.goal_shift(rollout.to);
-  o.kind = system.acceptable(rollout.to) ? Outcome::node : Outcome::rejected;
+  o.kind = rollout.clear && system.acceptable(rollout.to) ? Outcome::node : Outcome::rejected;
   o.state = std::move(rollout.to);
   return o;
 }
@@ -134,7 +134,9 @@ class Search {
       return search_.goes_on(const_cast<Expansion&>(static_cast<const Expansion&>(rollout)), look);
     }
     std::int64_t next_shown(std::int64_t step) const override { return search_.frames_.next_step(step); }
-    bool goes_on(const Rollout&, const State& state) override { return search_.system_.acceptable(state); }
+    bool goes_on(const Rollout& rollout, const State& state) override {
+      return rollout.clear && search_.system_.acceptable(state);
+    }
     void done(Rollout& rollout) override {
       Outcome outcome = outcome_of(search_.system_, rollout);
       const std::lock_guard lock(search_.mutex_);

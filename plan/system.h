@@ -18,6 +18,9 @@ struct Rollout {
   Control control;
   State to;         // out; its step is from->step + control.steps
   bool ok = false;  // out; false: the dynamics diverged, and `to` means nothing
+  // Out, of the state that was shown last, or of `to`: no two surfaces are deeper in one another than a state
+  // may have them. A part of System::acceptable that only who steps knows at little cost.
+  bool clear = true;
 };
 
 // What a rollout shows on its way.
@@ -89,7 +92,8 @@ class System {
   virtual Box sample_bounds() const = 0;              // where random points are drawn, metres
   virtual double dt_s() const = 0;                    // length of a step
   virtual std::uint64_t hash() const = 0;             // of all that a rollout's result depends on
-  // False: no rollout passes through this state at a frame time, and no node is made of it.
+  // False: no rollout passes through this state at a frame time, and no node is made of it; as where
+  // Rollout::clear is false.
   virtual bool acceptable(const State&) const { return true; }
   // What else than the place of the robot's centre of mass makes it reach the goal: its turn, its shape, …
   virtual bool goal_holds(const State&) const { return true; }

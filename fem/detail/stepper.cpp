@@ -285,6 +285,15 @@ void Stepper<Real>::add_contact_forces() {
   if (contacts_) contacts_->add_forces_of_walls(view(0));
 }
 
+// What sleeps is looked at, too: whether it sleeps is no part of the state.
+template <class Real>
+bool Stepper<Real>::is_clear(int lane) {
+  if (!surface_contacts_ || !std::isfinite(world_.max_overlap_m)) return true;
+  LaneView<Real> all = view(lane);
+  all.asleep = nullptr;
+  return surface_contacts_->deepest_overlap(lane, all) <= Real(world_.max_overlap_m);
+}
+
 template <class Real>
 void Stepper<Real>::add_stretch_limits() {
   stretch_limits_.find(state_.data(), inner_travel_.data(), all_asleep_);

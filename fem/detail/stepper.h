@@ -43,7 +43,8 @@ class Stepper {
   };
   Node node(int lane, int node) const;
   std::vector<Vec3> pushes_m_s2(
-      int lane);  // of each node of the robot, by its control, in the step that begins
+      int lane);            // of each node of the robot, by its control, in the step that begins
+  bool is_clear(int lane);  // Batch::is_clear
   const Cost& cost() const { return cost_; }
 
  private:

@@ -280,6 +280,16 @@ void SurfaceContacts<Real>::add_forces(int lane, const LaneView<Real>& view) {
 }
 
 template <class Real>
+Real SurfaceContacts<Real>::deepest_overlap(int lane, const LaneView<Real>& view) {
+  Real deepest = 0;
+  for (const SurfaceTouch<Real>& touch : find(lane, view))
+    if (touch.against >= 0 && touch.against != touch.body)
+      deepest = std::max(
+          deepest, touch.depth - std::max(surface_.offset[touch.body * bodies_ + touch.against], Real(0)));
+  return deepest;
+}
+
+template <class Real>
 const std::vector<SurfaceTouch<Real>>& SurfaceContacts<Real>::find(int lane, const LaneView<Real>& view) {
   if (++stamp_ == 0) std::fill(stamps_.begin(), stamps_.end(), 0u), stamp_ = 1;
   touches_.clear(), shares_.clear();

@@ -42,6 +42,9 @@ class SurfaceContacts {
   }
   // Of all bodies, as add_forces finds them; valid until the next call.
   const std::vector<SurfaceTouch<Real>>& find(int lane, const LaneView<Real>& view);
+  // How deep the samples of bodies are below the surfaces of others at most, beyond what they are where
+  // bodies start; 0 where none is.
+  Real deepest_overlap(int lane, const LaneView<Real>& view);
   using Share = typename SurfaceTables<Real>::Share;
   const std::vector<Share>& shares() const { return shares_; }
 

@@ -438,6 +438,33 @@ TEST_P(SurfaceContact, TheAgeOfListsChangesNothing) {
   EXPECT_GT(touched, 5);
 }
 
+// Two balls that are thrown at one another: a state is clear as long as the deepest of its touches is, as
+// another program finds them, whatever the lane saw before.
+TEST_P(SurfaceContact, AStateIsClearUntilSurfacesAreTooDeep) {
+  constexpr double most = 0.004;
+  WorldSpec spec = two_balls(0.03, 0.2, GetParam());
+  spec.max_overlap_m = most;
+  const World world = build_world(spec);
+  State start = start_state(world);
+  for (int n = 0; n < world.moving_nodes; ++n)
+    start.velocities[std::size_t(3 * n)] = n < world.bodies[1].first_node ? 6.f : -6.f;
+  Batch batch(world, 4);
+  Control coast;
+  coast.steps = 400;
+  batch.load(1, start, coast);
+  int clear = 0, deep = 0;
+  for (State now; batch.steps_left(1) > 2;) {
+    batch.advance(2);
+    batch.peek(1, now);
+    double overlap = 0;
+    for (const ContactForce& f : contact_forces(world, now)) overlap = std::max(overlap, f.depth_m - 0.005);
+    ASSERT_EQ(batch.is_clear(1), overlap <= most) << overlap;
+    (overlap <= most ? clear : deep) += 1;
+  }
+  EXPECT_GT(clear, 5);
+  EXPECT_GT(deep, 3);
+}
+
 TEST_P(SurfaceContact, SameBitsForAnyLanesNeighboursAndInstructionSet) {
   const World world = build_world(barriers_with_bevels(GetParam()));
   Control press;

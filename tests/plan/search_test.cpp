@@ -176,6 +176,21 @@ TEST(Search, NoFrameOfAPathIsUnacceptable) {
   }
 }
 
+// What a propagator tells of the states it shows counts as what the system says of them: the same plans.
+TEST(Search, WhatIsNotClearIsNotAcceptable) {
+  const Toy says_so(5, true, false, 1.15f);
+  Toy shows_it(5, true, false, 99);
+  shows_it.not_clear_above_z = 1.15f;
+  Settings s = toy_settings();
+  for (s.seed = 1; s.seed <= 5; ++s.seed) {
+    const Plan one = plan(says_so, s), other = plan(shows_it, s);
+    EXPECT_GT(other.statistics.rejected, 0);
+    EXPECT_EQ(one.statistics.rejected, other.statistics.rejected);
+    EXPECT_EQ(hash_of(one.tree), hash_of(other.tree));
+    EXPECT_EQ(hash_of(one.trajectory), hash_of(other.trajectory));
+  }
+}
+
 TEST(Search, FirstNodeOfAFreePointHasItsClosedForm) {
   Toy toy;
   toy.damping_per_s = 0;

@@ -52,6 +52,19 @@ void expect_solves(const Toy& toy, const Settings& s, const Trajectory& t) {
   EXPECT_LT(toy.mean_speed(state), s.settle.mean_speed_m_s);
 }
 
+TEST(Shortcut, WhatIsNotClearIsNotAcceptable) {
+  const Toy says_so(5, true, true, 1.05f);
+  Toy shows_it(5, true, true, 99);
+  shows_it.not_clear_above_z = 1.05f;
+  const Settings s = settings_of_seed(7);
+  const auto shortened = [&](const Toy& toy) {
+    Plan p = plan(toy, s);
+    EXPECT_GT(shorten(toy, p, {.rounds = 8}).accepted, 0);
+    return hash_of(p.trajectory);
+  };
+  EXPECT_EQ(shortened(says_so), shortened(shows_it));
+}
+
 TEST(Shortcut, NeverCostsMoreNorLastsLongerAndSolvesTheQuery) {
   for (const CostKind cost : all_costs) {
     int accepted = 0;

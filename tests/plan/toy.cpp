@@ -25,6 +25,7 @@ class ToyPropagator final : public Propagator {
       begin();
       r.to = *r.from;
       r.ok = steps(r.control, r.control.steps, r.to);
+      r.clear = toy_.is_clear(r.to);
     }
   }
 
@@ -52,6 +53,7 @@ class ToyPropagator final : public Propagator {
                                         rollout.control.steps - mine.steps, shown - mine.now.step}));
         rollout.ok = steps(rollout.control, piece, mine.now);
         mine.steps += piece;
+        rollout.clear = toy_.is_clear(mine.now);
         const Look look{mine.steps, toy_.robot_center(mine.now), toy_.robot_velocity(mine.now),
                         toy_.goal_shift(mine.now)};
         const bool whole = !rollout.ok || mine.steps == rollout.control.steps;
@@ -202,7 +204,7 @@ bool passes(const System& system, const Settings& settings, Propagator& propagat
     if (step <= from.step) continue;
     piece.control.steps = int(step - from.step);  // from its beginning: pieces are nobody's business here
     propagator.propagate({&piece, 1});
-    if (!piece.ok || !system.acceptable(piece.to)) return false;
+    if (!piece.ok || !piece.clear || !system.acceptable(piece.to)) return false;
     if (step == end) break;
   }
   rollout.to = piece.to, rollout.ok = true;

@@ -19,6 +19,7 @@ struct Toy final : System {
   bool wall = false;                // across x = 5, 0.4 thick, open for 2 < y < 4
   bool lava = false;                // a rollout through y < 0.5 diverges
   float unacceptable_above_z = 99;  // no node may be there
+  float not_clear_above_z = 99;     // nor there, as propagators tell of what they step
   Vec3 goal_velocity_m_s = Vec3::Zero();
   std::optional<State> begins_at;  // else at rest at (1, 1.5, 1)
   int lanes_wanted = 1;
@@ -40,6 +41,7 @@ struct Toy final : System {
   double dt_s() const override { return 0.01; }
   std::uint64_t hash() const override;
   bool acceptable(const State&) const override;
+  bool is_clear(const State& s) const { return robot_center(s).z() <= double(not_clear_above_z); }
   Vec3 goal_shift(const State& s) const override { return goal_velocity_m_s * (double(s.step) * dt_s()); }
   Measures measures(
       const State&) const override;  // energy of the springs; largest relative change of one's length

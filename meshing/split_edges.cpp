@@ -1,0 +1,98 @@
+#include "meshing/split_edges.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <map>
+#include <utility>
+#include <vector>
+
+#include "meshing/detail/edges.h"
+
+namespace limber::meshing {
+
+namespace {
+
+using Edge = std::pair<int, int>;  // lower vertex first
+
+double length(const std::vector<Vec3>& points, int a, int b) {
+  return (points[std::size_t(std::max(a, b))] - points[std::size_t(std::min(a, b))]).norm();
+}
+
+// Within a factor of two, how many vertices it takes to cut all edges down to that length, and triangles that
+// are longer both ways.
+double vertices_needed(const SurfaceMesh& surface, double longest_m) {
+  double needed = area(surface) / (longest_m * longest_m);
+  detail::for_each_edge(detail::edge_uses(surface.triangles), [&](auto uses) {
+    const double edge = (surface.positions.row(uses[0].upper) - surface.positions.row(uses[0].lower)).norm();
+    needed += edge > longest_m ? edge / longest_m : 0;
+  });
+  return needed;
+}
+
+// Of one triangle whose corners are `v`, and the middles of its sides `m` (side k goes from corner k), −1
+// where a side is not cut.
+void cut(const std::vector<Vec3>& points, const std::array<int, 3>& v, const std::array<int, 3>& m,
+         std::vector<std::array<int, 3>>& out) {
+  const int cuts = (m[0] >= 0) + (m[1] >= 0) + (m[2] >= 0);
+  if (cuts == 0) {
+    out.push_back(v);
+  } else if (cuts == 3) {
+    out.insert(out.end(), {{v[0], m[0], m[2]}, {v[1], m[1], m[0]}, {v[2], m[2], m[1]}, m});
+  } else if (cuts == 1) {
+    const int k = m[0] >= 0 ? 0 : m[1] >= 0 ? 1 : 2;
+    const int a = v[std::size_t(k)], b = v[std::size_t((k + 1) % 3)], c = v[std::size_t((k + 2) % 3)];
+    const int middle = m[std::size_t(k)];
+    out.insert(out.end(), {{a, middle, c}, {middle, b, c}});
+  } else {
+    // Side k is whole, from a to b; what is left beside c's corner is a quadrangle, cut by its shorter way.
+    const int k = m[0] < 0 ? 0 : m[1] < 0 ? 1 : 2;
+    const int a = v[std::size_t(k)], b = v[std::size_t((k + 1) % 3)], c = v[std::size_t((k + 2) % 3)];
+    const int of_bc = m[std::size_t((k + 1) % 3)], of_ca = m[std::size_t((k + 2) % 3)];
+    out.push_back({of_bc, c, of_ca});
+    const double from_a = length(points, a, of_bc), from_b = length(points, b, of_ca);
+    if (from_a < from_b || (from_a == from_b && a < b))
+      out.insert(out.end(), {{a, b, of_bc}, {a, of_bc, of_ca}});
+    else
+      out.insert(out.end(), {{a, b, of_ca}, {b, of_bc, of_ca}});
+  }
+}
+
+}  // namespace
+
+double longest_edge(const SurfaceMesh& surface, int tets, const SplitSettings& settings) {
+  return settings.share * std::sqrt(area(surface)) / std::cbrt(double(tets));
+}
+
+SurfaceMesh split_long_edges(const SurfaceMesh& surface, double longest_m, const SplitSettings& settings) {
+  while (vertices_needed(surface, longest_m) > settings.most_new_vertices) longest_m *= 2;
+  std::vector<Vec3> points;
+  for (Eigen::Index i = 0; i < surface.positions.rows(); ++i) points.emplace_back(surface.positions.row(i));
+  std::vector<std::array<int, 3>> triangles, cut_ones;
+  for (Eigen::Index i = 0; i < surface.triangles.rows(); ++i)
+    triangles.push_back({surface.triangles(i, 0), surface.triangles(i, 1), surface.triangles(i, 2)});
+
+  for (bool cut_some = true; cut_some; triangles.swap(cut_ones)) {
+    std::map<Edge, int> middles;
+    cut_ones.clear();
+    cut_some = false;
+    for (const std::array<int, 3>& v : triangles) {
+      std::array<int, 3> m{-1, -1, -1};
+      for (std::size_t k = 0; k < 3; ++k) {
+        const int a = v[k], b = v[(k + 1) % 3];
+        if (length(points, a, b) <= longest_m) continue;
+        const auto [at, fresh] = middles.try_emplace(std::minmax(a, b), int(points.size()));
+        if (fresh) points.push_back(0.5 * (points[std::size_t(a)] + points[std::size_t(b)]));
+        m[k] = at->second, cut_some = true;
+      }
+      cut(points, v, m, cut_ones);
+    }
+  }
+  SurfaceMesh out{Points(points.size(), 3), Triangles(triangles.size(), 3)};
+  for (std::size_t i = 0; i < points.size(); ++i) out.positions.row(Eigen::Index(i)) = points[i];
+  for (std::size_t i = 0; i < triangles.size(); ++i)
+    out.triangles.row(Eigen::Index(i)) << triangles[i][0], triangles[i][1], triangles[i][2];
+  return out;
+}
+
+}  // namespace limber::meshing
