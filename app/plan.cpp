@@ -254,7 +254,7 @@ Json facts_of(const plan::Plan& plan, const fem::World& world, const FemSystem& 
                {"distance_m", plan.best_distance_m},
                {"statistics", plan::json_of(plan.statistics)}});
   if (!plan.settings.via.empty()) json["legs"] = legs_of(plan);
-  if (plan.solved()) return json;
+  if (plan.solved() || is_unmeasured(plan)) return json;
   const Diagnosis diagnosis = diagnose(world, system, plan);
   json["explanation"] = json["explanation"].get<std::string>() + " " + diagnosis.text;
   json["diagnosis"] = diagnosis.json;
@@ -409,10 +409,18 @@ void remove_what_shows_another_plan(const fs::path& folder, const Json& summary)
 }  // namespace
 
 Outcome keep_plan(const fs::path& folder, const scenes::Scene& scene, const std::vector<PreparedBody>& bodies,
-                  const fem::World& world, const FemSystem& system, const plan::Plan& plan, const Json& extra,
+                  const fem::World& world, const FemSystem& system, plan::Plan& plan, const Json& extra,
                   const std::string& extra_text) {
-  return keep_measured_plan(folder, scene, bodies, world, system, plan,
-                            measure_motion(world, bodies, plan.trajectory), extra, extra_text);
+  MotionFigures figures;
+  try {
+    const NothingToKeep nothing_to_keep;
+    throw_if_stopped();
+    figures = measure_motion(world, bodies, plan.trajectory);
+    plan.measured = true;
+  } catch (const Interrupted&) {
+    plan.measured = false;
+  }
+  return keep_measured_plan(folder, scene, bodies, world, system, plan, figures, extra, extra_text);
 }
 
 Outcome keep_measured_plan(const fs::path& folder, const scenes::Scene& scene,
@@ -436,7 +444,7 @@ Outcome keep_measured_plan(const fs::path& folder, const scenes::Scene& scene,
     return {plan.simulation->ending == plan::Simulation::diverged ? exit_no_plan : exit_done, summary,
             is_unmeasured(plan) ? "" : text_of_simulation(summary, extra_text, folder / "plan.npz")};
   return {plan.solved() ? exit_done : exit_no_plan, summary,
-          text_of(summary, extra_text, folder / "plan.npz")};
+          is_unmeasured(plan) ? "" : text_of(summary, extra_text, folder / "plan.npz")};
 }
 
 bool plan_is_up_to_date(const PlanOptions& options, const scenes::Scene& scene) {
@@ -455,7 +463,7 @@ bool plan_is_up_to_date(const PlanOptions& options, const scenes::Scene& scene) 
     return folder.plan.system_hash == FemSystem(world, goal_rules_of(scene)).hash() &&
            plan::first_difference(folder.plan.settings, settings).empty() && finished(folder.plan) &&
            (folder.plan.solved() || folder.plan.settings.max_iterations >= settings.max_iterations) &&
-           folder.plan.settings.frames_per_second == settings.frames_per_second &&
+           folder.plan.measured && folder.plan.settings.frames_per_second == settings.frames_per_second &&
            (!options.improve || folder.summary.contains("improve")) &&
            (!folder.plan.solved() || shortened(folder.summary, shortcuts_of(scene, options, {})));
   } catch (const InputError& error) {

@@ -28,9 +28,9 @@ void write_plan_folder(const fs::path& folder, const plan::Plan&, const scenes::
                        const std::vector<PreparedBody>&, const Json& summary);
 
 // Measures the plan's motion, writes plan.npz, volume.svg and the manifest, and says all that there is to
-// say. `extra` goes into the summary, `extra_text` among its lines.
+// say; after a stop signal writes it unmeasured. `extra` goes into the summary, `extra_text` among its lines.
 Outcome keep_plan(const fs::path& folder, const scenes::Scene&, const std::vector<PreparedBody>&,
-                  const fem::World&, const FemSystem&, const plan::Plan&, const Json& extra,
+                  const fem::World&, const FemSystem&, plan::Plan&, const Json& extra,
                   const std::string& extra_text);
 
 // The same of a motion that is measured already.
@@ -38,9 +38,9 @@ Outcome keep_measured_plan(const fs::path& folder, const scenes::Scene&, const s
                            const fem::World&, const FemSystem&, const plan::Plan&, const MotionFigures&,
                            const Json& extra, const std::string& extra_text);
 
-// Of a simulation that a signal ended nothing is measured, so that it ends at once: no figures, no pictures.
+// Of what a signal ended nothing is measured, so that it ends at once: no figures, no pictures.
 inline bool is_unmeasured(const plan::Plan& plan) {
-  return plan.simulation && plan.simulation->ending == plan::Simulation::stopped;
+  return !plan.measured || (plan.simulation && plan.simulation->ending == plan::Simulation::stopped);
 }
 
 // All of a summary that follows from the plan: not what the dynamics cost, nor what came after the search.

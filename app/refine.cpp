@@ -83,7 +83,7 @@ Outcome refine(const RefineOptions& options) {
   settings.max_iterations = options.iterations.value_or(planned.plan.settings.max_iterations);
   settings.time_limit_s = options.time_limit_s, settings.in_flight = options.in_flight;
   plan::RefineReport report;
-  const plan::Plan plan = plan::refine(system, settings, reference, report);
+  plan::Plan plan = plan::refine(system, settings, reference, report);
   Json json = plan::json_of(report);
   json["coarse_tets"] = tets_of(coarse_bodies);
   json["tets"] = tets_of(bodies);

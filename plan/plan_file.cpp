@@ -90,9 +90,10 @@ constexpr std::pair<Simulation::Ending, const char*> simulation_endings[] = {
 class Reader {
  public:
   explicit Reader(const fs::path& path) : path_(path), file_(read_npz(path)) {}
+  void say_to_run(const char* command) { command_ = command; }
 
   [[noreturn]] void refuse(const std::string& why) const {
-    throw InputError(fmt::format("{}: {}; run `limber plan` again", path_.string(), why));
+    throw InputError(fmt::format("{}: {}; run `limber {}` again", path_.string(), why, command_));
   }
   void require(bool good, const std::string& why) const {
     if (!good) refuse(why);
@@ -295,6 +296,7 @@ class Reader {
  private:
   fs::path path_;
   Npz file_;
+  const char* command_ = "plan";  // that makes such files
 };
 
 Statistics statistics_from_json(const Reader& reader, const Json& json) {
@@ -348,6 +350,7 @@ Json json_of_search(const Plan& plan) {
   for (std::size_t leg = 0; leg < plan.legs.size() && !plan.settings.via.empty(); ++leg)
     meta["legs"].push_back(
         {{"root", plan.legs[leg].root}, {"first_iteration", plan.legs[leg].first_iteration}});
+  if (!plan.measured) meta["measured"] = false;
   meta["settings"] = json_of(plan.settings);
   meta["statistics"] = json_of(plan.statistics);
   return meta;
@@ -383,6 +386,7 @@ void read_search(const Reader& reader, const Json& meta, const std::string& file
     reader.refuse(error.what());
   }
   plan.ending = reader.ending(meta.at("ending"));
+  plan.measured = meta.value("measured", true);
   reader.require(plan.best_node >= 0 && plan.best_node < plan.tree.size(),
                  "best_node is not a node of the tree");
   reader.require(plan.goal_node == -1 || plan.goal_node == plan.best_node, "goal_node is not best_node");
@@ -432,8 +436,9 @@ void write_plan(const fs::path& path, const Plan& plan, const Json& given) {
 }
 
 PlanFile read_plan(const fs::path& path) {
-  const Reader reader(path);
+  Reader reader(path);
   const Json meta = reader.meta();
+  reader.say_to_run(meta.contains("simulation") ? "simulate" : "plan");
   try {
     PlanFile file;
     file.sealed = meta.at("format") == format_name;

@@ -2,8 +2,8 @@
 
 #include <fcntl.h>
 #include <signal.h>
-#include <spawn.h>
 #include <sys/mman.h>
+#include <sys/prctl.h>
 #include <sys/socket.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -14,8 +14,6 @@
 #include <sstream>
 
 #include "core/error.h"
-
-extern char** environ;
 
 namespace limber::render::detail {
 
@@ -28,32 +26,41 @@ bool is_in_path(const std::string& program) {
 }
 
 Process::Process(const std::vector<std::string>& argv) {
+  std::vector<char*> arguments;
+  for (const std::string& a : argv) arguments.push_back(const_cast<char*>(a.c_str()));
+  arguments.push_back(nullptr);
   // A socket, because send() can be told not to raise SIGPIPE when the other side is gone; a memory file,
   // because a pipe for the errors could fill up and block both.
-  int ends[2];
+  int ends[2], start[2];
   LIMBER_CHECK(::socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends) == 0, std::strerror(errno));
   input_ = ends[0];
   errors_ = ::memfd_create("stderr", MFD_CLOEXEC);
   LIMBER_CHECK(errors_ >= 0, std::strerror(errno));
+  LIMBER_CHECK(::pipe2(start, O_CLOEXEC) == 0, std::strerror(errno));
 
-  posix_spawn_file_actions_t files;
-  posix_spawn_file_actions_init(&files);
-  posix_spawn_file_actions_adddup2(&files, ends[1], 0);
-  posix_spawn_file_actions_addopen(&files, 1, "/dev/null", O_WRONLY, 0);
-  posix_spawn_file_actions_adddup2(&files, errors_, 2);
-  std::vector<char*> arguments;
-  for (const std::string& a : argv) arguments.push_back(const_cast<char*>(a.c_str()));
-  arguments.push_back(nullptr);
-  pid_t pid = -1;
-  const int error = ::posix_spawnp(&pid, arguments[0], &files, nullptr, arguments.data(), environ);
-  posix_spawn_file_actions_destroy(&files);
-  ::close(ends[1]);
-  if (error != 0) {
-    ::close(input_), ::close(errors_);
-    throw InputError(
-        fmt::format("{} cannot be started: {}; is it installed and in PATH?", argv[0], std::strerror(error)));
+  const pid_t parent = ::getpid();
+  pid_ = ::fork();
+  if (pid_ == 0) {
+    // Whoever kills limber kills it too: it would write the file that the next run has cleared away.
+    ::prctl(PR_SET_PDEATHSIG, SIGKILL);
+    if (::getppid() != parent) ::_exit(127);
+    ::dup2(ends[1], 0), ::dup2(::open("/dev/null", O_WRONLY | O_CLOEXEC), 1), ::dup2(errors_, 2);
+    ::execvp(arguments[0], arguments.data());
+    const int error = errno;
+    ::_exit(::write(start[1], &error, sizeof error) == sizeof error ? 127 : 126);
   }
-  pid_ = pid;
+  ::close(ends[1]), ::close(start[1]);
+  int error = pid_ < 0 ? errno : 0;
+  if (pid_ > 0)
+    while (::read(start[0], &error, sizeof error) < 0 && errno == EINTR) {
+    }
+  ::close(start[0]);
+  if (error == 0) return;
+  if (pid_ > 0) finish();
+  if (input_ >= 0) ::close(input_);
+  ::close(errors_);
+  throw InputError(
+      fmt::format("{} cannot be started: {}; is it installed and in PATH?", argv[0], std::strerror(error)));
 }
 
 Process::~Process() {

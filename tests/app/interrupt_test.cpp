@@ -6,6 +6,7 @@
 
 #include <functional>
 
+#include "core/npz.h"
 #include "core/random.h"
 #include "render/png_file.h"
 #include "tests/app/program.h"
@@ -78,6 +79,12 @@ int exit_code_after_signal(const std::vector<std::string>& arguments, int signal
   return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
 }
 
+// What is told of a plan's motion was worked out, and is in its folder.
+bool is_measured(const fs::path& folder) {
+  const Json meta = Json::parse(read_npz(folder / "plan.npz").texts.at("meta.json"));
+  return meta.value("measured", true) && fs::exists(folder / "volume.svg");
+}
+
 class Interrupt : public Program {};
 
 class InterruptedScene : public Program, public ::testing::WithParamInterface<const char*> {};
@@ -116,10 +123,12 @@ TEST_F(Interrupt, SignalsToAProcessKeepAPlanThatGoesOnToTheSameBytes) {
       return std::count(text.begin(), text.end(), '\n') >= c.lines;
     });
     ASSERT_EQ(code, 128 + c.signal_number);
+    EXPECT_FALSE(is_measured(cut));  // which would take longer than who stops it waits
     std::vector<std::string> rest = settings;
     rest.push_back("--resume");
     const Json resumed = plan_json("barriers1", cut, rest);
     expect_same_plan(resumed, whole);
+    EXPECT_TRUE(is_measured(cut));
     fs::remove_all(cut);
   }
 }

@@ -8,6 +8,8 @@
 #include <chrono>
 #include <cmath>
 #include <cstdlib>
+#include <fstream>
+#include <functional>
 #include <map>
 #include <numbers>
 #include <set>
@@ -109,8 +111,8 @@ std::string join(const std::vector<std::string>& words) {
 
 class Killed : public Program {
  protected:
-  // In a process of its own, killed after so long; its exit code, −1 when it was killed.
-  static int run(const std::vector<std::string>& words, double seconds) {
+  // In a process of its own, killed when it is time; its exit code, −1 when it was killed.
+  static int exit_code_after(const std::vector<std::string>& words, const std::function<bool()>& is_time) {
     const std::string program = std::string(limber_binary_dir) + "/app/limber";
     std::vector<char*> argv{const_cast<char*>(program.c_str())};
     for (const std::string& word : words) argv.push_back(const_cast<char*>(word.c_str()));
@@ -122,13 +124,16 @@ class Killed : public Program {
       ::execv(program.c_str(), argv.data());
       ::_exit(127);
     }
-    const auto end = std::chrono::steady_clock::now() + std::chrono::duration<double>(seconds);
     int status = 0;
     while (::waitpid(child, &status, WNOHANG) == 0) {
-      if (std::chrono::steady_clock::now() >= end) ::kill(child, SIGKILL);
+      if (is_time()) ::kill(child, SIGKILL);
       ::usleep(200);
     }
     return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+  }
+  static int run(const std::vector<std::string>& words, double seconds) {
+    const auto end = std::chrono::steady_clock::now() + std::chrono::duration<double>(seconds);
+    return exit_code_after(words, [&] { return std::chrono::steady_clock::now() >= end; });
   }
 
   // `before` is copied to `work` for every run; the words name files in `work`.
@@ -261,6 +266,30 @@ TEST_F(Killed, Stills) {
 }
 TEST_F(Killed, Observables) {
   expect_survives({"verify", work(), "--observables", work("o.csv")}, planned(), 14);
+}
+
+// Else it would go on writing, and make its file anew after the next run had cleared it away.
+TEST_F(Killed, TakesItsEncoderAlong) {
+  const fs::path before = planned(), tools = folder / "tools", told = folder / "encoder";
+  fs::create_directories(tools);
+  std::ofstream(tools / "ffmpeg") << fmt::format(
+      "#!/bin/sh\necho $$ > {0}.new && mv {0}.new {0}\nexec sleep 600\n", told.string());
+  fs::permissions(tools / "ffmpeg", fs::perms::owner_all);
+  const std::string path = std::getenv("PATH");
+  ::setenv("PATH", (tools.string() + ":" + path).c_str(), 1);
+  EXPECT_EQ(exit_code_after({"render", before.string()}, [&] { return fs::exists(told); }), -1);
+  ::setenv("PATH", path.c_str(), 1);
+  ASSERT_TRUE(fs::exists(told));
+  const pid_t encoder = pid_t(std::stol(read_file(told)));
+  // Dead, or the shadow of one that nobody waits for.
+  const auto lives = [&] {
+    std::ifstream stat(fmt::format("/proc/{}/stat", encoder));
+    std::string number, name, state;
+    return bool(stat >> number >> name >> state) && state != "Z";
+  };
+  for (int wait = 0; wait < 1000 && lives(); ++wait) ::usleep(10000);
+  EXPECT_FALSE(lives());
+  ::kill(encoder, SIGKILL);
 }
 
 }  // namespace
