@@ -465,6 +465,8 @@ bool plan_is_up_to_date(const PlanOptions& options, const scenes::Scene& scene) 
            (folder.plan.solved() || folder.plan.settings.max_iterations >= settings.max_iterations) &&
            folder.plan.measured && folder.plan.settings.frames_per_second == settings.frames_per_second &&
            (!options.improve || folder.summary.contains("improve")) &&
+           // Written after the pictures, so that they are there.
+           read_manifest(options.out).value("plan", Json()) == folder.summary &&
            (!folder.plan.solved() || shortened(folder.summary, shortcuts_of(scene, options, {})));
   } catch (const InputError& error) {
     log::info("planning anew: {}", error.what());

@@ -225,10 +225,11 @@ namespace {
 void film_otherwise(const fs::path& folder, const PlanFolder& planned, const scenes::Scene& scene) {
   const std::vector<PreparedBody> bodies = read_bodies_of(planned, folder);
   const fem::World world = build_world(scene, bodies, State(planned.plan.tree.states[0]).positions);
-  write_plan_folder(folder, planned.plan, scene, bodies, planned.summary);
   const MotionFigures figures = measure_motion(world, planned.plan.trajectory);
   for (const auto& [name, bytes] : pictures_of(scene, world, planned.plan, figures))
     write_file(folder / name, bytes);
+  // Last, so that a run after one that was killed films otherwise again.
+  write_plan_folder(folder, planned.plan, scene, bodies, planned.summary);
 }
 
 }  // namespace

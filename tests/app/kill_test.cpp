@@ -268,6 +268,21 @@ TEST_F(Killed, Observables) {
   expect_survives({"verify", work(), "--observables", work("o.csv")}, planned(), 14);
 }
 
+// The pictures and the manifest of a plan come after it.
+TEST_F(Killed, BetweenThePlanAndItsPicturesRunMakesThem) {
+  const fs::path before = planned();
+  const Files whole = files_in(before);
+  fs::create_directories(work());
+  fs::copy(before / "bodies", work("bodies"), fs::copy_options::recursive);
+  fs::copy(before / "plan.npz", work("plan.npz"));
+  ASSERT_EQ(limber_program({"run", quick_scene(), "-o", work()}).code, exit_done);
+  const Files now = files_in(work());
+  for (const char* name : {"volume.svg", "volume.png", "tree.svg", "plan.npz"})
+    EXPECT_TRUE(now.contains(name) && now.at(name) == whole.at(name)) << name;
+  EXPECT_EQ(Json::parse(now.at("manifest.json")).at("plan"),
+            Json::parse(whole.at("manifest.json")).at("plan"));
+}
+
 // Else it would go on writing, and make its file anew after the next run had cleared it away.
 TEST_F(Killed, TakesItsEncoderAlong) {
   const fs::path before = planned(), tools = folder / "tools", told = folder / "encoder";
