@@ -272,7 +272,7 @@ Json prepare_body(const BodySource& source, const PrepareSettings& settings, con
   fs::remove(folder / "report.json",
              ignored);  // what is in the folder counts again when a new report says so
   // These would be of the body before.
-  for (const char* name : export_files) fs::remove(folder / name, ignored);
+  remove_exports(folder);
   for (const char* name : preview_files) fs::remove(folder / name, ignored);
   write_ply(folder / "surface.ply", model.surface);
   write_obj(folder / "shells.obj", made.decomposition.shells);

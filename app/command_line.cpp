@@ -361,11 +361,16 @@ int run_command_line(int argc, const char* const* argv) {
           "--export", prepare_options.exports,
           "files for other programs, also of a body that is up to date; any of vtu (ParaView: cage.vtu, "
           "surface.vtu), node (TetGen: cage.node, cage.ele), interp (Vega FEM: cage.veg, surface.interp, "
-          "surface.obj)")
+          "surface.obj), vtk (Drake, Bullet: cage.vtk), inp (Abaqus: cage.inp), urdf, sdf, mjcf (one OBJ a "
+          "shell in hulls, mass.json, and body.urdf, body.sdf, or MuJoCo's body.xml and flex.xml)")
       ->type_name("FORMAT[,FORMAT…]")
       ->delimiter(',')
       ->check(CLI::IsMember(export_formats))
       ->allow_extra_args(false);
+  prepare_command
+      .add_option("--density", prepare_options.density_kg_m3, "kg/m³, of the masses of --export; 1e-6 … 1e6")
+      ->check(within(1e-6, 1e6))
+      ->capture_default_str();
   add_global(prepare_command, global), add_threads(prepare_command, global);
   prepare_command.callback([&] { chosen = [&] { return prepare(prepare_options); }; });
 

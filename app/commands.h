@@ -41,6 +41,7 @@ struct PrepareOptions {
   bool y_up = false;
   bool preview = false;              // pictures beside the files
   std::vector<std::string> exports;  // of export_formats (app/export.h)
+  double density_kg_m3 = 1000;       // of their masses
 };
 Outcome prepare(const PrepareOptions&);
 

@@ -1,5 +1,9 @@
 #include "app/export.h"
 
+#include <algorithm>
+#include <regex>
+
+#include "app/write_robot.h"
 #include "core/error.h"
 #include "core/export_files.h"
 #include "core/mesh_files.h"
@@ -33,11 +37,17 @@ std::vector<VtuData> binding_data(const ffd::Binding& b) {
 }  // namespace
 
 std::vector<std::string> export_body(const PreparedBody& body, const std::vector<std::string>& formats,
-                                     const fs::path& folder) {
+                                     double density_kg_m3, const fs::path& folder) {
   std::vector<std::string> written;
-  const auto name = [&](const char* file) {
-    written.push_back(file);
+  const auto name = [&](const std::string& file) {
+    if (std::find(written.begin(), written.end(), file) == written.end()) written.push_back(file);
     return folder / file;
+  };
+  const std::vector<ConvexShell> shells = read_obj_shells(folder / "shells.obj");
+  const auto write_rigid = [&](const char* file, auto write) {
+    for (const std::string& hull : write_hulls(body, shells, density_kg_m3, folder)) name(hull);
+    write_obj(name("surface.obj"), body.surface);
+    write(name(file), body, int(shells.size()), density_kg_m3);
   };
   for (const std::string& format : formats) {
     if (format == "vtu") {
@@ -47,14 +57,39 @@ std::vector<std::string> export_body(const PreparedBody& body, const std::vector
     } else if (format == "node") {
       write_node_ele(name("cage.node"), body.cage, body.shell_from_tet);
       name("cage.ele");
-    } else {
-      LIMBER_CHECK(format == "interp", format);
+    } else if (format == "interp") {
       write_veg(name("cage.veg"), body.cage, body.shell_from_tet);
       ffd::write_interp(name("surface.interp"), body.binding, body.cage.tets);
       write_obj(name("surface.obj"), body.surface);
+    } else if (format == "vtk") {
+      write_legacy_vtk(name("cage.vtk"), body.cage);
+    } else if (format == "inp") {
+      write_inp(name("cage.inp"), body.cage, body.shell_from_tet);
+    } else if (format == "urdf") {
+      write_rigid("body.urdf", write_urdf);
+    } else if (format == "sdf") {
+      write_rigid("body.sdf", write_sdf);
+    } else {
+      LIMBER_CHECK(format == "mjcf", format);
+      write_rigid("body.xml", write_mjcf);
+      write_mjcf_flex(name("flex.xml"), body, density_kg_m3);
     }
   }
   return written;
+}
+
+void remove_exports(const fs::path& folder) {
+  std::error_code ignored;
+  for (const char* file :
+       {"cage.vtu", "surface.vtu", "cage.node", "cage.ele", "cage.veg", "surface.interp", "surface.obj",
+        "cage.vtk", "cage.inp", "mass.json", "body.urdf", "body.sdf", "body.xml", "flex.xml"})
+    fs::remove(folder / file, ignored);
+  static const std::regex hull(R"(hull_[0-9]{3,}\.obj)");
+  std::vector<fs::path> hulls;
+  for (const auto& entry : fs::directory_iterator(folder / "hulls", ignored))
+    if (std::regex_match(entry.path().filename().string(), hull)) hulls.push_back(entry.path());
+  for (const fs::path& file : hulls) fs::remove(file, ignored);
+  fs::remove(folder / "hulls", ignored);  // where nothing of the user's is in it
 }
 
 }  // namespace limber::app

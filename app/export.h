@@ -8,12 +8,14 @@
 
 namespace limber::app {
 
-inline const std::vector<std::string> export_formats{"vtu", "node", "interp"};
-inline constexpr const char* export_files[] = {"cage.vtu", "surface.vtu",    "cage.node",  "cage.ele",
-                                               "cage.veg", "surface.interp", "surface.obj"};
+inline const std::vector<std::string> export_formats{"vtu", "node", "interp", "vtk",
+                                                     "inp", "urdf", "sdf",    "mjcf"};
 
-// Writes those files of each format into the folder, and returns their names.
+// Writes those files of each format into the folder, and returns their names, each once. Masses are of
+// density_kg_m3.
 std::vector<std::string> export_body(const PreparedBody&, const std::vector<std::string>& formats,
-                                     const fs::path& folder);
+                                     double density_kg_m3, const fs::path& folder);
+// Removes all that export_body can have written there.
+void remove_exports(const fs::path& folder);
 
 }  // namespace limber::app

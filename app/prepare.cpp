@@ -30,7 +30,7 @@ Outcome prepare(const PrepareOptions& options) {
   if (options.exports.empty() && !options.preview) return {exit_done, report, text};
 
   const PreparedBody body = read_body(options.out);
-  std::vector<std::string> written = export_body(body, options.exports, options.out);
+  std::vector<std::string> written = export_body(body, options.exports, options.density_kg_m3, options.out);
   if (options.preview) {
     write_previews(body, read_obj_shells(options.out / "shells.obj"), options.out);
     written.insert(written.end(), std::begin(preview_files), std::end(preview_files));

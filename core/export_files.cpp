@@ -116,6 +116,22 @@ void check_label(const TetMesh& mesh, const std::vector<int>& label) {
                mesh.tets.rows());
 }
 
+// Tets of each label, numbered from 1.
+std::map<int, std::vector<Eigen::Index>> sets_of(const std::vector<int>& label) {
+  std::map<int, std::vector<Eigen::Index>> sets;
+  for (std::size_t t = 0; t < label.size(); ++t) sets[label[t]].push_back(Eigen::Index(t) + 1);
+  return sets;
+}
+
+// Ten a line: Vega reads lines of up to 1023 letters, Abaqus 16 numbers.
+void append_set(std::string& text, const std::vector<Eigen::Index>& tets, const char* last_of_a_line) {
+  for (std::size_t i = 0; i < tets.size(); ++i)
+    if (i + 1 == tets.size() || (i + 1) % 10 == 0)
+      fmt::format_to(std::back_inserter(text), "{}{}\n", tets[i], last_of_a_line);
+    else
+      fmt::format_to(std::back_inserter(text), "{}, ", tets[i]);
+}
+
 }  // namespace
 
 void write_vtu(const fs::path& path, const Points& points, const Eigen::Ref<const Cells>& cells,
@@ -164,14 +180,40 @@ void write_veg(const fs::path& path, const TetMesh& mesh, const std::vector<int>
   for (Eigen::Index t = 0; t < mesh.tets.rows(); ++t)
     append_line(text, t + 1, mesh.tets(t, 0) + 1, mesh.tets(t, 1) + 1, mesh.tets(t, 2) + 1,
                 mesh.tets(t, 3) + 1);
-  std::map<int, std::vector<Eigen::Index>> sets;
-  for (std::size_t t = 0; t < label.size(); ++t) sets[label[t]].push_back(Eigen::Index(t) + 1);
-  constexpr std::size_t numbers_a_line = 10;  // Vega reads lines of up to 1023 letters
-  for (const auto& [name, tets] : sets) {
+  for (const auto& [name, tets] : sets_of(label)) {
     fmt::format_to(std::back_inserter(text), "\n*SET label_{}\n", name);
-    for (std::size_t i = 0; i < tets.size(); ++i)
-      fmt::format_to(std::back_inserter(text), "{}{}", tets[i],
-                     i + 1 == tets.size() || (i + 1) % numbers_a_line == 0 ? ",\n" : ", ");
+    append_set(text, tets, ",");
+  }
+  write_file(path, text);
+}
+
+void write_legacy_vtk(const fs::path& path, const TetMesh& mesh) {
+  const Eigen::Index nodes = mesh.positions.rows(), tets = mesh.tets.rows();
+  std::string text = fmt::format(
+      "# vtk DataFile Version 3.0\nlimber cage\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS {} double\n", nodes);
+  for (Eigen::Index v = 0; v < nodes; ++v)
+    append_line(text, mesh.positions(v, 0), mesh.positions(v, 1), mesh.positions(v, 2));
+  fmt::format_to(std::back_inserter(text), "CELLS {} {}\n", tets, 5 * tets);
+  for (Eigen::Index t = 0; t < tets; ++t)
+    append_line(text, 4, mesh.tets(t, 0), mesh.tets(t, 1), mesh.tets(t, 2), mesh.tets(t, 3));
+  fmt::format_to(std::back_inserter(text), "CELL_TYPES {}\n", tets);
+  for (Eigen::Index t = 0; t < tets; ++t) text += "10\n";
+  write_file(path, text);
+}
+
+void write_inp(const fs::path& path, const TetMesh& mesh, const std::vector<int>& label) {
+  check_label(mesh, label);
+  std::string text = "*HEADING\nlimber cage\n*NODE\n";
+  for (Eigen::Index v = 0; v < mesh.positions.rows(); ++v)
+    fmt::format_to(std::back_inserter(text), "{}, {}, {}, {}\n", v + 1, mesh.positions(v, 0),
+                   mesh.positions(v, 1), mesh.positions(v, 2));
+  text += "*ELEMENT, TYPE=C3D4, ELSET=ALL\n";
+  for (Eigen::Index t = 0; t < mesh.tets.rows(); ++t)
+    fmt::format_to(std::back_inserter(text), "{}, {}, {}, {}, {}\n", t + 1, mesh.tets(t, 0) + 1,
+                   mesh.tets(t, 1) + 1, mesh.tets(t, 2) + 1, mesh.tets(t, 3) + 1);
+  for (const auto& [name, tets] : sets_of(label)) {
+    fmt::format_to(std::back_inserter(text), "*ELSET, ELSET=LABEL_{}\n", name);
+    append_set(text, tets, "");
   }
   write_file(path, text);
 }

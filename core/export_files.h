@@ -46,4 +46,11 @@ void write_node_ele(const fs::path& node_file, const TetMesh&, const std::vector
 // and no *REGION: Vega then takes its own defaults, and says so.
 void write_veg(const fs::path&, const TetMesh&, const std::vector<int>& label = {});
 
+// VTK's legacy format, version 3.0, ASCII: the cage as an unstructured grid.
+void write_legacy_vtk(const fs::path&, const TetMesh&);
+
+// Abaqus' .inp, numbered from 1: nodes, elements C3D4, a set ALL and one set LABEL_i for each label. No
+// material, section or step.
+void write_inp(const fs::path&, const TetMesh&, const std::vector<int>& label = {});
+
 }  // namespace limber
