@@ -34,7 +34,7 @@ CLI::Validator within(double low, double high) {
         const bool is_number = CLI::detail::lexical_cast(text, value);
         return is_number && value >= low && value <= high
                    ? std::string()
-                   : fmt::format("{} is no number from {:.17g} to {:.17g}", text, low, high);
+                   : fmt::format("{} is no number from {} to {}", text, low, high);
       },
       fmt::format("FLOAT in [{:g} - {:g}]", low, high));
 }
