@@ -43,11 +43,16 @@ std::vector<std::string> export_body(const PreparedBody& body, const std::vector
     if (std::find(written.begin(), written.end(), file) == written.end()) written.push_back(file);
     return folder / file;
   };
-  const std::vector<ConvexShell> shells = read_obj_shells(folder / "shells.obj");
+  BodyMass whole;
+  std::vector<ConvexShell> shells;
   const auto write_rigid = [&](const char* file, auto write) {
-    for (const std::string& hull : write_hulls(body, shells, density_kg_m3, folder)) name(hull);
-    write_obj(name("surface.obj"), body.surface);
-    write(name(file), body, int(shells.size()), density_kg_m3);
+    if (shells.empty()) {
+      whole = mass_of(body);
+      shells = read_obj_shells(folder / "shells.obj");
+      for (const std::string& hull : write_hulls(body, whole, shells, density_kg_m3, folder)) name(hull);
+      write_obj(name("surface.obj"), body.surface);
+    }
+    write(name(file), body, whole, int(shells.size()), density_kg_m3);
   };
   for (const std::string& format : formats) {
     if (format == "vtu") {
@@ -72,7 +77,7 @@ std::vector<std::string> export_body(const PreparedBody& body, const std::vector
     } else {
       LIMBER_CHECK(format == "mjcf", format);
       write_rigid("body.xml", write_mjcf);
-      write_mjcf_flex(name("flex.xml"), body, density_kg_m3);
+      write_mjcf_flex(name("flex.xml"), body, whole, density_kg_m3);
     }
   }
   return written;

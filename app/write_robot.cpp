@@ -37,21 +37,21 @@ Json json_of(const MassProperties& m, double density) {
 }  // namespace
 
 BodyMass mass_of(const PreparedBody& body) {
-  if (is_closed(body.surface))
+  if (is_closed(body.surface.triangles))
     if (const MassProperties m = mass_properties(body.surface.positions, body.surface.triangles);
         m.volume_m3 > 0)
       return {m, true};
   return {mass_properties(body.cage), false};
 }
 
-std::vector<std::string> write_hulls(const PreparedBody& body, const std::vector<ConvexShell>& shells,
-                                     double density, const fs::path& folder) {
-  const BodyMass whole = mass_of(body);
+std::vector<std::string> write_hulls(const PreparedBody& body, const BodyMass& whole,
+                                     const std::vector<ConvexShell>& shells, double density,
+                                     const fs::path& folder) {
   Json json{{"density_kg_m3", density}, {"of", whole.of_model ? "model" : "cage"}};
   json["whole"] = json_of(whole.of, density);
   json["cage"] = json_of(mass_properties(body.cage), density);
   std::vector<std::string> written{"mass.json"};
-  fs::create_directories(folder / "hulls");
+  make_folder(folder / "hulls");
   for (const ConvexShell& shell : shells) {
     const std::string file = hull_file(int(written.size()) - 1);
     write_obj(folder / file, SurfaceMesh{shell.vertices, shell.triangles});
@@ -64,8 +64,9 @@ std::vector<std::string> write_hulls(const PreparedBody& body, const std::vector
   return written;
 }
 
-void write_urdf(const fs::path& path, const PreparedBody& body, int hulls, double density) {
-  const MassProperties m = mass_of(body).of;
+void write_urdf(const fs::path& path, const PreparedBody& body, const BodyMass& whole, int hulls,
+                double density) {
+  const MassProperties& m = whole.of;
   const Eigen::Matrix3d i = density * m.inertia_m5;
   std::string xml = fmt::format(
       "<?xml version=\"1.0\"?>\n<robot name=\"{0}\">\n<link name=\"{0}\">\n<inertial>\n<origin "
@@ -81,8 +82,9 @@ void write_urdf(const fs::path& path, const PreparedBody& body, int hulls, doubl
   write_file(path, xml + "</link>\n</robot>\n");
 }
 
-void write_sdf(const fs::path& path, const PreparedBody& body, int hulls, double density) {
-  const MassProperties m = mass_of(body).of;
+void write_sdf(const fs::path& path, const PreparedBody& body, const BodyMass& whole, int hulls,
+               double density) {
+  const MassProperties& m = whole.of;
   const Eigen::Matrix3d i = density * m.inertia_m5;
   std::string xml = fmt::format(
       "<?xml version=\"1.0\"?>\n<sdf version=\"1.7\">\n<model name=\"{0}\">\n<link "
@@ -99,8 +101,9 @@ void write_sdf(const fs::path& path, const PreparedBody& body, int hulls, double
   write_file(path, xml + "</link>\n</model>\n</sdf>\n");
 }
 
-void write_mjcf(const fs::path& path, const PreparedBody& body, int hulls, double density) {
-  const MassProperties m = mass_of(body).of;
+void write_mjcf(const fs::path& path, const PreparedBody& body, const BodyMass& whole, int hulls,
+                double density) {
+  const MassProperties& m = whole.of;
   const Eigen::Matrix3d i = density * m.inertia_m5;
   // What is seen need not be closed, nor weigh anything.
   std::string
@@ -119,7 +122,7 @@ void write_mjcf(const fs::path& path, const PreparedBody& body, int hulls, doubl
                          i(2, 2), i(0, 1), i(0, 2), i(1, 2), geoms));
 }
 
-void write_mjcf_flex(const fs::path& path, const PreparedBody& body, double density) {
+void write_mjcf_flex(const fs::path& path, const PreparedBody& body, const BodyMass& whole, double density) {
   std::string points, tets;
   for (const auto& p : body.cage.positions.rowwise()) points += text_of(p) + "\n";
   for (const auto& t : body.cage.tets.rowwise()) tets += fmt::format("{} {} {} {}\n", t[0], t[1], t[2], t[3]);
@@ -130,7 +133,7 @@ void write_mjcf_flex(const fs::path& path, const PreparedBody& body, double dens
                          "radius=\"{}\" point=\"{}\" element=\"{}\">\n<contact selfcollide=\"none\" "
                          "internal=\"false\"/>\n<elasticity young=\"5e4\" poisson=\"0.3\" "
                          "damping=\"1e-4\"/>\n</flexcomp>\n</worldbody>\n</mujoco>\n",
-                         name_of(body), density * mass_of(body).of.volume_m3, 0.005 * size, points, tets));
+                         name_of(body), density * whole.of.volume_m3, 0.005 * size, points, tets));
 }
 
 }  // namespace limber::app

@@ -38,12 +38,12 @@ class Moments {
 
 }  // namespace
 
-bool is_closed(const SurfaceMesh& mesh) {
+bool is_closed(const Triangles& triangles) {
   std::vector<std::array<int, 3>> edges;  // lower vertex, higher, way
-  edges.reserve(std::size_t(3 * mesh.triangles.rows()));
-  for (Eigen::Index f = 0; f < mesh.triangles.rows(); ++f)
+  edges.reserve(std::size_t(triangles.size()));
+  for (Eigen::Index f = 0; f < triangles.rows(); ++f)
     for (int i = 0; i < 3; ++i) {
-      const int from = mesh.triangles(f, i), to = mesh.triangles(f, (i + 1) % 3);
+      const int from = triangles(f, i), to = triangles(f, (i + 1) % 3);
       edges.push_back({std::min(from, to), std::max(from, to), from < to ? 1 : -1});
     }
   std::sort(edges.begin(), edges.end());

@@ -6,7 +6,7 @@
 namespace limber {
 
 // Every edge is run along as often one way as the other: the surface has an inside.
-bool is_closed(const SurfaceMesh&);
+bool is_closed(const Triangles&);
 
 struct MassProperties {
   double volume_m3 = 0;

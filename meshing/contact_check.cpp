@@ -6,6 +6,7 @@
 #include <cmath>
 #include <optional>
 
+#include "core/mass_properties.h"
 #include "core/random.h"
 #include "meshing/contact_shape.h"
 #include "meshing/detail/overshoot.h"
@@ -54,7 +55,7 @@ class Checker {
         cage_(cage),
         size_(bounding_box(surface.positions).size().maxCoeff()),
         winding_(surface.positions, surface.triangles),
-        closed_(detail::is_closed(surface.triangles)),
+        closed_(is_closed(surface.triangles)),
         seen_(detail::seen_surface(surface, winding_, closed_, size_ / 32, offset_share * size_)),
         distance_(soup_points(), soup_triangles()) {}
 

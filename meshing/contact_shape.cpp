@@ -6,6 +6,7 @@
 #include <numeric>
 
 #include "core/error.h"
+#include "core/mass_properties.h"
 #include "core/progress.h"
 #include "core/threads.h"
 #include "meshing/detail/box_tree.h"
@@ -278,7 +279,7 @@ ContactShape make_contact_shape(const SurfaceMesh& surface, const TetMesh& cage,
   };
   const WindingNumber winding(surface.positions, surface.triangles);
   const double offset = offset_share * size;
-  const bool closed = detail::is_closed(surface.triangles);
+  const bool closed = is_closed(surface.triangles);
   const detail::SeenSurface seen = detail::seen_surface(surface, winding, closed, size / 32, offset);
   r.open_share = seen.open_share;
   const std::string no_inside =

@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "core/error.h"
-#include "meshing/detail/edges.h"
+#include "core/mass_properties.h"
 
 namespace limber::meshing::detail {
 namespace {
@@ -18,16 +18,6 @@ struct Grid {
   Lattice lattice;
   std::vector<std::uint8_t> state;  // of each tet
 };
-
-bool is_closed(const Triangles& triangles) {
-  bool closed = true;
-  for_each_edge(edge_uses(triangles), [&](std::span<const EdgeUse> uses) {
-    int balance = 0;
-    for (const EdgeUse& use : uses) balance += use.forward ? 1 : -1;
-    closed = closed && balance == 0;
-  });
-  return closed;
-}
 
 Box box_of_triangles(const SurfaceMesh& surface) {
   Box all;

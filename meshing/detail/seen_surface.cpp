@@ -51,25 +51,6 @@ bool parts_inside_from_outside(const WindingNumber& winding, const Vec3& point, 
   return !winding.inside(point + offset * normal) && winding.inside(point - offset * normal);
 }
 
-bool is_closed(const Triangles& triangles) {
-  std::vector<std::array<int, 3>> edges;  // lesser end, greater end, 1 or −1
-  edges.reserve(std::size_t(triangles.size()));
-  for (const auto t : triangles.rowwise())
-    for (int k = 0; k < 3; ++k) {
-      const int a = t[k], b = t[(k + 1) % 3];
-      edges.push_back({std::min(a, b), std::max(a, b), a < b ? 1 : -1});
-    }
-  std::sort(edges.begin(), edges.end());
-  int turns = 0;
-  for (std::size_t i = 0; i < edges.size(); ++i) {
-    turns += edges[i][2];
-    const bool last =
-        i + 1 == edges.size() || edges[i + 1][0] != edges[i][0] || edges[i + 1][1] != edges[i][1];
-    if (last && turns != 0) return false;
-  }
-  return true;
-}
-
 SeenSurface seen_surface(const SurfaceMesh& surface, const WindingNumber& winding, bool closed,
                          double longest, double offset) {
   SeenSurface result;

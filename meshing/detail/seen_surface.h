@@ -31,9 +31,6 @@ struct SeenSurface {
 SeenSurface seen_surface(const SurfaceMesh&, const WindingNumber&, bool closed, double longest,
                          double offset);
 
-// Whether each edge is run through as often one way as the other.
-bool is_closed(const Triangles&);
-
 // Whether a step of `offset` along the unit normal leads out, and against it in.
 bool parts_inside_from_outside(const WindingNumber&, const Vec3& point, const Vec3& normal, double offset);
 

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 #include <zlib.h>
 
+#include <algorithm>
 #include <cstring>
 #include <map>
 #include <sstream>
@@ -151,6 +152,53 @@ TEST(ExportFiles, NodeAndEleCountFromZero) {
             (std::vector{2, 4, 1, 0, 0, 1, 2, 3, 4, 1, 0, 2, 1, 4, 2}));
   write_node_ele(folder / "a.node", mesh);
   EXPECT_EQ(numbers<int>(read_file(folder / "a.ele")), (std::vector{2, 4, 0, 0, 0, 1, 2, 3, 1, 0, 2, 1, 4}));
+}
+
+TEST(ExportFiles, LegacyVtkHoldsNodesAndTets) {
+  const TemporaryFolder folder;
+  const TetMesh mesh = two_tets();
+  write_legacy_vtk(folder / "a.vtk", mesh);
+  const std::string text = read_file(folder / "a.vtk");
+  const auto between = [&](const std::string& begin, const std::string& end) {
+    const std::size_t from = text.find(begin) + begin.size();
+    return text.substr(from, end.empty() ? text.npos : text.find(end) - from);
+  };
+  EXPECT_EQ(points_of(numbers<double>(between("POINTS 5 double\n", "CELLS"))), mesh.positions);
+  EXPECT_EQ(numbers<int>(between("CELLS 2 10\n", "CELL_TYPES")), (std::vector{4, 0, 1, 2, 3, 4, 0, 2, 1, 4}));
+  EXPECT_EQ(numbers<int>(between("CELL_TYPES 2\n", "")), (std::vector{10, 10}));
+}
+
+TEST(ExportFiles, InpCountsFromOneAndHasASetForEachLabel) {
+  const TemporaryFolder folder;
+  TetMesh mesh = two_tets();
+  mesh.tets = mesh.tets.replicate(6, 1).eval();
+  std::vector<int> label(12, 3);
+  label[1] = 0;
+  write_inp(folder / "a.inp", mesh, label);
+  std::map<std::string, std::string> sections;
+  std::istringstream in(read_file(folder / "a.inp"));
+  std::string section;
+  for (std::string line; std::getline(in, line);)
+    if (line.starts_with('*'))
+      section = line;
+    else if (section != "*HEADING")
+      sections[section] += line + "\n";
+  for (auto& [name, text] : sections) std::replace(text.begin(), text.end(), ',', ' ');
+  const std::vector<double> nodes = numbers<double>(sections["*NODE"]);
+  ASSERT_EQ(nodes.size(), 5 * 4);
+  for (int v = 0; v < 5; ++v) {
+    EXPECT_EQ(nodes[std::size_t(4 * v)], v + 1);
+    for (int k = 0; k < 3; ++k) EXPECT_EQ(nodes[std::size_t(4 * v + 1 + k)], mesh.positions(v, k));
+  }
+  const std::vector<int> tets = numbers<int>(sections["*ELEMENT, TYPE=C3D4, ELSET=ALL"]);
+  ASSERT_EQ(tets.size(), 12 * 5);
+  for (int t = 0; t < 12; ++t) {
+    EXPECT_EQ(tets[std::size_t(5 * t)], t + 1);
+    for (int k = 0; k < 4; ++k) EXPECT_EQ(tets[std::size_t(5 * t + 1 + k)], mesh.tets(t, k) + 1);
+  }
+  EXPECT_EQ(numbers<int>(sections["*ELSET, ELSET=LABEL_0"]), (std::vector{2}));
+  EXPECT_EQ(numbers<int>(sections["*ELSET, ELSET=LABEL_3"]),
+            (std::vector{1, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12}));
 }
 
 TEST(ExportFiles, VegCountsFromOneAndHasASetForEachLabel) {
