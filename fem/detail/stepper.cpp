@@ -3,6 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
+#include <utility>
+#include <vector>
 
 #include "core/error.h"
 #include "fem/world.h"
@@ -14,13 +17,30 @@ namespace {
 // 2 s.
 constexpr double goal_frequency = 6;  // rad/s
 
-bool is_pushed(const World& world, const Control& control, int robot_node) {
-  if (control.manipulation == Manipulation::body) return true;
-  if (control.manipulation != Manipulation::control_point) return false;
+// A control point pushes at least so much of its robot, or a strong push would tear out a single node.
+constexpr double least_share = 0.1;
+
+// Mass that a control pushes, by node of the robot; 0: not pushed. Round a control point that is all within
+// its radius and, where that is less than least_share, what is nearest to it.
+std::vector<double> pushed_masses_kg(const World& world, const Control& control) {
   const Body& robot = world.bodies[world.robot];
-  LIMBER_CHECK(control.node >= 0 && control.node < robot.node_count(), control.node);
-  return (robot.cage.positions.row(robot_node) - robot.cage.positions.row(control.node)).norm() <=
-         control.radius_m;
+  std::vector<double> masses(std::size_t(robot.node_count()), 0);
+  if (control.manipulation != Manipulation::body && control.manipulation != Manipulation::control_point)
+    return masses;
+  std::vector<std::pair<double, int>> free;  // distance from the control point, node
+  const bool all = control.manipulation == Manipulation::body;
+  LIMBER_CHECK(all || (control.node >= 0 && control.node < robot.node_count()), control.node);
+  for (int n = 0; n < robot.node_count(); ++n)
+    if (!robot.fixed[n])
+      free.emplace_back(
+          all ? 0 : (robot.cage.positions.row(n) - robot.cage.positions.row(control.node)).norm(), n);
+  std::sort(free.begin(), free.end());
+  double pushed = 0;
+  for (const auto& [distance, n] : free) {
+    if (!all && distance > control.radius_m && pushed >= least_share * robot.mass_kg) break;
+    pushed += masses[std::size_t(n)] = robot.node_mass_kg[n];
+  }
+  return masses;
 }
 
 }  // namespace
@@ -114,12 +134,14 @@ void Stepper<Real>::load(int lane, std::int64_t step, const Real* positions, con
     for (std::size_t k = 0; k < forced.size(); k += std::size_t(lanes_)) forced[k + lane] = 0;
 
   const Body& robot = world_.bodies[world_.robot];
-  Real acceleration[3];
-  for (int c = 0; c < 3; ++c) acceleration[c] = Real(control.force_n[c]) / Real(robot.mass_kg);
-  for (int n = 0; n < robot.node_count(); ++n) {
-    const bool pushed = !robot.fixed[n] && is_pushed(world_, control, n);
-    for (int c = 0; c < 3; ++c) push_[(3 * n + c) * lanes_ + lane] = pushed ? acceleration[c] : Real(0);
-  }
+  const std::vector<double> pushed = pushed_masses_kg(world_, control);
+  const double mass = control.manipulation == Manipulation::body
+                          ? robot.mass_kg
+                          : std::accumulate(pushed.begin(), pushed.end(), 0.);
+  for (int n = 0; n < robot.node_count(); ++n)
+    for (int c = 0; c < 3; ++c)
+      push_[(3 * n + c) * lanes_ + lane] =
+          pushed[std::size_t(n)] > 0 ? Real(control.force_n[c]) / Real(mass) : Real(0);
 }
 
 template <class Real>

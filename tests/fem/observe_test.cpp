@@ -2,6 +2,7 @@
 #include "fem/observe.h"
 #include "fem/control_forces.h"
 
+#include <fmt/core.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -222,10 +223,12 @@ TEST(Observe, ControlForcesAreWhatMovesTheRobot) {
     Vec3 sum = Vec3::Zero(), gained = Vec3::Zero();
     const std::vector<Vec3> forces = control_forces_n(world, state, control);
     ASSERT_EQ(int(forces.size()), robot.node_count());
+    // A control point's force falls on a part of the robot, but on a tenth of its mass at least.
+    const double least = manipulation == Manipulation::control_point ? 0.1 : 1;
     for (int n = 0; n < robot.node_count(); ++n) {
       sum += forces[std::size_t(n)];
       EXPECT_LE(forces[std::size_t(n)].norm(),
-                1.00001 * largest_force(control) * robot.node_mass_kg[n] / robot.mass_kg);
+                1.00001 * largest_force(control) * robot.node_mass_kg[n] / (least * robot.mass_kg));
       for (int c = 0; c < 3; ++c) {
         const std::size_t k = std::size_t(3 * (robot.first_node + n) + c);
         gained[c] += robot.node_mass_kg[n] * (double(next.velocities[k]) - double(state.velocities[k]));
@@ -239,6 +242,34 @@ TEST(Observe, ControlForcesAreWhatMovesTheRobot) {
     const Vec3 expected = world.dt_s * (sum + robot.mass_kg * world.gravity_m_s2);
     EXPECT_LT((gained - expected).norm(), 1e-5 * robot.mass_kg);
   }
+}
+
+// Wherever a free robot is pushed, and however few nodes are within the radius, it gains the force times its
+// duration.
+TEST(Observe, AControlPointGivesTheRobotAllOfItsForce) {
+  const World world = build_world(alone({"robot", cube(Vec3::Zero(), 1, 4), {}, {}}));
+  const Body& robot = world.bodies[0];
+  Control push;
+  push.manipulation = Manipulation::control_point;
+  push.force_n = {30, -8, 12}, push.steps = 100;
+  const double duration_s = push.steps * world.dt_s;
+  for (const float radius : {0.01f, 0.3f, 0.6f, 3.f})
+    for (const int node : {0, 31, robot.node_count() - 1}) {
+      SCOPED_TRACE(fmt::format("radius {}, node {}", radius, node));
+      push.radius_m = radius, push.node = node;
+      const State end = propagate(world, rest_state(world), push).end;
+      Vec3 gained = Vec3::Zero();
+      for (int n = 0; n < robot.node_count(); ++n)
+        for (int c = 0; c < 3; ++c)
+          gained[c] += robot.node_mass_kg[n] * double(end.velocities[std::size_t(3 * n + c)]);
+      EXPECT_LT((gained - duration_s * push.force_n.cast<double>()).norm(), 1e-4 * gained.norm());
+      double pushed = 0;
+      const std::vector<Vec3> forces = control_forces_n(world, rest_state(world), push);
+      for (int n = 0; n < robot.node_count(); ++n)
+        if (forces[std::size_t(n)].norm() > 0) pushed += robot.node_mass_kg[n];
+      EXPECT_GE(pushed, 0.1 * robot.mass_kg);
+      EXPECT_EQ(pushed > 0.5 * robot.mass_kg, radius > 1);
+    }
 }
 
 // The bodies' energies are those of the world, each that of the body alone.
