@@ -3,6 +3,7 @@
 #include <numbers>
 
 #include "app/seen.h"
+#include "app/write_robot.h"
 #include "core/error.h"
 #include "core/hash.h"
 #include "core/log.h"
@@ -363,13 +364,18 @@ void set_script(const scenes::Scene& scene, const std::vector<PreparedBody>& pre
   }
 }
 
+// The cage weighs what the model does, as far as that has an inside.
+double share_of_the_cage(const PreparedBody& prepared) {
+  return std::min(1., mass_of(prepared).of.volume_m3 / volume(prepared.cage));
+}
+
 // What the parts of a body say, tet by tet.
-void set_parts(const scenes::BodySpec& body, const PreparedBody& prepared, fem::BodySpec& out) {
+void set_parts(const scenes::BodySpec& body, const PreparedBody& prepared, double share, fem::BodySpec& out) {
   if (body.parts.empty()) return;
   const Tets& tets = prepared.cage.tets;
   const int shells = prepared.report.at("shells").at("count").get<int>();
   out.youngs_modulus_from_tet_pa.assign(std::size_t(tets.rows()), body.material.youngs_modulus_pa);
-  out.density_from_tet_kg_m3.assign(std::size_t(tets.rows()), body.material.density_kg_m3);
+  out.density_from_tet_kg_m3.assign(std::size_t(tets.rows()), out.material.density_kg_m3);
   for (const scenes::PartSpec& part : body.parts) {
     if (part.shell && *part.shell >= shells)
       throw InputError(
@@ -386,7 +392,7 @@ void set_parts(const scenes::BodySpec& body, const PreparedBody& prepared, fem::
       if (part.shell ? prepared.shell_from_tet[std::size_t(t)] != *part.shell : !in_box) continue;
       ++chosen;
       if (part.youngs_modulus_pa) out.youngs_modulus_from_tet_pa[std::size_t(t)] = *part.youngs_modulus_pa;
-      if (part.density_kg_m3) out.density_from_tet_kg_m3[std::size_t(t)] = *part.density_kg_m3;
+      if (part.density_kg_m3) out.density_from_tet_kg_m3[std::size_t(t)] = share * *part.density_kg_m3;
     }
     if (chosen == 0)
       throw InputError(
@@ -491,11 +497,12 @@ fem::World build_world(const scenes::Scene& scene, const std::vector<PreparedBod
     fem::BodySpec fem_body;
     fem_body.name = body.name;
     fem_body.cage = prepared[b].cage;
+    const double share = share_of_the_cage(prepared[b]);
     fem_body.material = {.model = body.material.model == "springs" ? fem::MaterialModel::springs
                                                                    : fem::MaterialModel::neo_hookean,
                          .youngs_modulus_pa = body.material.youngs_modulus_pa,
                          .poisson_ratio = body.material.poisson_ratio,
-                         .density_kg_m3 = body.material.density_kg_m3,
+                         .density_kg_m3 = share * body.material.density_kg_m3,
                          .damping_ratio = body.material.damping_ratio,
                          .friction = body.material.friction,
                          .mesh_independent = body.material.mesh_independent};
@@ -504,7 +511,7 @@ fem::World build_world(const scenes::Scene& scene, const std::vector<PreparedBod
     fem_body.velocity_m_s = body.velocity_m_s, fem_body.angular_velocity_rad_s = body.angular_velocity_rad_s;
     fem_body.max_volume_change = body.max_volume_change;
     if (body.max_stretch && *body.max_stretch < scenes::any_stretch) fem_body.max_stretch = *body.max_stretch;
-    set_parts(body, prepared[b], fem_body);
+    set_parts(body, prepared[b], share, fem_body);
     spec.bodies.push_back(std::move(fem_body));
   }
   set_script(scene, prepared, spec);

@@ -50,7 +50,7 @@ void check(const BodySpec& spec) {
     require_range(spec, name, value, 1e-3, 1e13, "from 0.001 to 1e13");
   };
   const auto require_density = [&](const std::string& name, double value) {
-    require_range(spec, name, value, 1e-6, 1e6, "from 1e-6 to 1e6");
+    require_range(spec, name, value, 1e-9, 1e6, "from 1e-9 to 1e6");
   };
   const std::size_t tets = std::size_t(spec.cage.tets.rows());
   const auto &moduli = spec.youngs_modulus_from_tet_pa, &densities = spec.density_from_tet_kg_m3;

@@ -40,6 +40,12 @@ TEST(SceneWorld, EveryScenePreparesBuildsAndSteps) {
     EXPECT_NEAR(tets, tets_of_scene.at(known.name), by_budget ? 0.1 * tets : 0);
 
     const fem::World world = build_world(scene, bodies);
+    for (std::size_t b = 0; b < bodies.size(); ++b) {
+      SCOPED_TRACE(scene.bodies[b].name);
+      // What its model weighs, whatever its cage is.
+      const double mass_kg = scene.bodies[b].material.density_kg_m3 * volume(bodies[b].surface);
+      if (scene.bodies[b].parts.empty()) EXPECT_NEAR(world.bodies[b].mass_kg, mass_kg, 1e-5 * mass_kg);
+    }
     const FemSystem system(world, goal_rules_of(scene));
     const State start = system.start();
     const scenes::Goal& first = scene.via.empty() ? scene.goal : scene.via.front().goal;
