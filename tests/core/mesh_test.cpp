@@ -35,25 +35,6 @@ TEST(Mesh, VolumeOfASurfaceDoesNotDependOnWhereItStands) {
   EXPECT_NEAR(volume(surface), 1.0, 1e-9);
 }
 
-TEST(Mesh, ASurfaceIsClosedWhereEveryEdgeIsRunAlongBothWays) {
-  const TetMesh cube = five_tet_cube();
-  const SurfaceMesh closed{cube.positions, boundary_triangles(cube.tets)};
-  EXPECT_TRUE(is_closed(closed));
-  EXPECT_TRUE(is_closed({}));
-  SurfaceMesh twice = closed;  // no manifold, and closed all the same
-  twice.triangles.conservativeResize(24, 3);
-  twice.triangles.bottomRows(12) = closed.triangles;
-  EXPECT_TRUE(is_closed(twice));
-  for (int f = 0; f < 12; ++f) {
-    SurfaceMesh turned = closed, open = closed;
-    std::swap(turned.triangles(f, 0), turned.triangles(f, 1));
-    EXPECT_FALSE(is_closed(turned));
-    open.triangles.row(f) = closed.triangles.row(11);
-    open.triangles.conservativeResize(11, 3);
-    EXPECT_FALSE(is_closed(open));
-  }
-}
-
 TEST(Mesh, VertexNormalsOfACubeCornerPointAlongItsDiagonals) {
   const TetMesh cube = five_tet_cube();
   const Points normals = vertex_normals(cube.positions, boundary_triangles(cube.tets));
