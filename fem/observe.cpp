@@ -6,9 +6,8 @@
 #include <algorithm>
 #include <map>
 
-#include "fem/detail/contact.h"
 #include "fem/detail/overlap.h"
-#include "fem/detail/surface_contact.h"
+#include "fem/detail/stepper.h"
 #include "fem/reference.h"
 
 namespace limber::fem {
@@ -257,31 +256,11 @@ int piercing_edges(const World& world, const State& state) {
   return count;
 }
 
-std::vector<ContactForce> contact_forces(const World& world, const State& state) {
-  std::vector<float> x = world.tables.rest_positions, v(x.size(), 0.f), f(x.size(), 0.f);
-  std::copy(state.positions.begin(), state.positions.end(), x.begin());
-  std::copy(state.velocities.begin(), state.velocities.end(), v.begin());
-  const std::size_t bodies = world.bodies.size();
-  std::vector<float> lower, upper, travel(bodies, 0.f);
-  for (int b = 0; b < int(bodies); ++b) {
-    const Box box = bounding_box(body_positions(world, state, b));
-    for (int c = 0; c < 3; ++c) lower.push_back(float(box.lower[c])), upper.push_back(float(box.upper[c]));
-  }
-  constexpr detail::Layout rows{3, 1};
-  const detail::LaneView<float> view{x.data(), v.data(),     f.data(),     rows,          rows,
-                                     1,        lower.data(), upper.data(), travel.data(), travel.data()};
-  std::vector<detail::Exerted<float>> exerted;
-  const auto ask = [&](auto contacts) {
-    contacts.tell(&exerted);
-    contacts.add_forces(0, view);
-  };
-  const auto& kernels = detail::kernels<float>(detail::best_isa(), 1);
-  if (world.touches_on_surfaces())
-    ask(detail::SurfaceContacts<float>(world, kernels, 1));
-  else
-    ask(detail::Contacts<float>(world, kernels, 1));
+std::vector<ContactForce> contact_forces(const World& world, const State& state, const Control& control) {
+  detail::Stepper<float> stepper(world, 1, detail::best_isa());
+  stepper.load(0, state.step, state.positions.data(), state.velocities.data(), control, true);
   std::vector<ContactForce> forces;
-  for (const auto& e : exerted) {
+  for (const auto& e : stepper.exerted(0)) {
     ContactForce force{e.body, e.against, Vec3::Zero(), Vec3::Zero(), double(e.depth)};
     for (int c = 0; c < 3; ++c) force.force_n[c] = double(e.force[c]), force.place_m[c] = double(e.place[c]);
     forces.push_back(force);

@@ -60,15 +60,16 @@ Penetration deepest_penetration(const World&, const State&);
 // moves.
 int piercing_edges(const World&, const State&);
 
-// The forces of contact and walls in the step that starts here, by the code that steps and in its float32:
-// they sum to what moves the bodies. Ordered by pair, then as contact finds them.
+// The forces of contact, walls and friction in the step that starts here under that control, by the code that
+// steps and in its float32: they sum to what moves the bodies. Friction depends on all other forces, and so
+// on the control. Ordered by pair, then as contact finds them.
 struct ContactForce {
   int body, other;  // whose point is inside whom; other −1: a wall
   Vec3 place_m;     // of the point
   Vec3 force_n;     // on `body`; −force_n on `other`
   double depth_m;
 };
-std::vector<ContactForce> contact_forces(const World&, const State&);
+std::vector<ContactForce> contact_forces(const World&, const State&, const Control& = {});
 
 struct PairForce {
   int body, other;  // body < other, or equal: it touches itself; other −1: the walls

@@ -20,6 +20,10 @@ class Bearing {
   // none jumps.
   template <class Real>
   double inverse_mass(const Real at[3], const Real along[3], Real depth) const;
+  // As measured: of the whole body, and about its centre of mass (xx xy xz yy yz zz).
+  double inverse_mass() const { return inverse_mass_; }
+  const double* center() const { return center_; }
+  const double* inverse_inertia() const { return inverse_inertia_; }
 
  private:
   double inverse_mass_ = 0, center_[3], inverse_inertia_[6];  // xx xy xz yy yz zz

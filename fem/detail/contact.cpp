@@ -135,18 +135,18 @@ void Contacts<Real>::forget(int lane) {
 }
 
 template <class Real>
-void Contacts<Real>::add_forces(int lane, const LaneView<Real>& view) {
-  if (!bearings_.empty()) return add_forces_with_rigid(lane, view);
+void Contacts<Real>::add_forces(int lane, const LaneView<Real>& view, Friction<Real>* friction) {
+  if (!bearings_.empty()) return add_forces_with_rigid(lane, view, friction);
   for (const auto& [a, b] : pairs_) {
     if (view.sleeps(a) && view.sleeps(b)) continue;
-    for (const Touch<Real>& touch : find(lane, view, a, b)) respond(view, a, b, touch);
+    for (const Touch<Real>& touch : find(lane, view, a, b)) respond(view, a, b, touch, friction);
   }
-  add_wall_forces(view);
+  add_wall_forces(view, friction);
 }
 
 // The mass that a rigid body sets against a contact depends on all it has, so these are found first.
 template <class Real>
-void Contacts<Real>::add_forces_with_rigid(int lane, const LaneView<Real>& view) {
+void Contacts<Real>::add_forces_with_rigid(int lane, const LaneView<Real>& view, Friction<Real>* friction) {
   held_.clear();
   for (Bearing& bearing : bearings_) bearing.depths = 0;
   for (const auto& [a, b] : pairs_) {
@@ -163,8 +163,8 @@ void Contacts<Real>::add_forces_with_rigid(int lane, const LaneView<Real>& view)
     for_each_beyond_wall(view, body, [&](int, int, Real, Real depth) { bearing.depths += double(depth); });
     if (bearing.depths > 0) bearing.measure(view, topology_.bodies[body], tables_.node_mass);
   }
-  for (const Held& held : held_) respond(view, held.a, held.b, held.touch);
-  add_wall_forces(view);
+  for (const Held& held : held_) respond(view, held.a, held.b, held.touch, friction);
+  add_wall_forces(view, friction);
 }
 
 template <class Real>
@@ -810,7 +810,8 @@ bool Contacts<Real>::walk_out(const LaneView<Real>& view, int tet, int before, c
 }
 
 template <class Real>
-void Contacts<Real>::respond(const LaneView<Real>& view, int a, int b, const Touch<Real>& touch) const {
+void Contacts<Real>::respond(const LaneView<Real>& view, int a, int b, const Touch<Real>& touch,
+                             Friction<Real>* friction) const {
   if (!(touch.depth > 0)) return;
   const Topology::Point& point = topology_.points[touch.point];
   const int* corner = topology_.tets[touch.tet].node;
@@ -831,24 +832,25 @@ void Contacts<Real>::respond(const LaneView<Real>& view, int a, int b, const Tou
       inverse_mass += share[i] * share[i] * tables_.inverse_mass[node[i]];
   const bool any_rigid = world_.bodies[a].kind == BodyKind::rigid || world_.bodies[b].kind == BodyKind::rigid;
   if (!any_rigid && !(inverse_mass > 0)) return;
-  const auto mass_along = [&](const Real along[3]) {
-    Real inverse = inverse_mass;
-    for (const int body : side)
-      if (world_.bodies[body].kind == BodyKind::rigid)
-        inverse += Real(bearings_[body].inverse_mass(place, along, touch.depth));
-    return 1 / inverse;
-  };
+  for (const int body : side)
+    if (world_.bodies[body].kind == BodyKind::rigid)
+      inverse_mass += Real(bearings_[body].inverse_mass(place, touch.direction, touch.depth));
   const Real beta = Real(point.share[1] > 0 ? contact_edge_beta : contact_beta);
+  const Real push = penalty_push(beta, touch.depth, dot(relative, touch.direction), 1 / inverse_mass, step_);
+  if (!(push > 0)) return;
   Real force[3];
-  if (!penalty_force(beta, touch.depth, touch.direction, relative, mass_along, step_,
-                     tables_.pair_friction[a * bodies_ + b], force))
-    return;
+  for (int c = 0; c < 3; ++c) force[c] = push * touch.direction[c];
   for (int i = 0; i < 6; ++i)
     if (tables_.inverse_mass[node[i]] > 0)
       for (int c = 0; c < 3; ++c) view.f[view.force.at(node[i], c)] += share[i] * force[c];
   if (told_)
     told_->push_back(
         {side[0], side[1], {place[0], place[1], place[2]}, touch.depth, {force[0], force[1], force[2]}});
+  if (!friction) return;
+  Share<Real> shares[6];
+  for (int i = 0; i < 6; ++i) shares[i] = {node[i], share[i]};
+  friction->add(side[0], side[1], place, touch.direction, tables_.pair_friction[a * bodies_ + b] * push,
+                shares, shares + 2, shares + 6, told_ ? int(told_->size()) - 1 : -1);
 }
 
 // Calls each(node, axis, the wall's normal along it, depth).
@@ -870,50 +872,31 @@ void Contacts<Real>::for_each_beyond_wall(const LaneView<Real>& view, int body, 
 }
 
 template <class Real>
-void Contacts<Real>::add_wall_forces(const LaneView<Real>& view) const {
+void Contacts<Real>::add_wall_forces(const LaneView<Real>& view, Friction<Real>* friction) const {
   for (int body = 0; body < bodies_; ++body) {
+    if (view.sleeps(body)) continue;
     const bool rigid = world_.bodies[body].kind == BodyKind::rigid;
-    if (view.sleeps(body) || (!rigid && !told_)) continue;
     for_each_beyond_wall(view, body, [&](int n, int axis, Real out, Real depth) {
-      Real normal[3] = {0, 0, 0}, place[3], velocity[3], force[3];
+      Real normal[3] = {0, 0, 0}, place[3];
       normal[axis] = out;
-      for (int c = 0; c < 3; ++c)
-        place[c] = view.x[view.state.at(n, c)], velocity[c] = view.v[view.state.at(n, c)];
-      const auto mass_along = [&](const Real along[3]) {
-        return rigid ? Real(1 / bearings_[body].inverse_mass(place, along, depth)) : tables_.node_mass[n];
-      };
-      if (!penalty_force(Real(contact_beta), depth, normal, velocity, mass_along, step_,
-                         tables_.pair_friction[body * bodies_ + body], force))
-        return;
-      for (int c = 0; c < 3; ++c) view.f[view.force.at(n, c)] += force[c];
+      fetch(view, n, place);
+      const Real mass =
+          rigid ? Real(1 / bearings_[body].inverse_mass(place, normal, depth)) : tables_.node_mass[n];
+      const Real push =
+          penalty_push(Real(contact_beta), depth, out * view.v[view.state.at(n, axis)], mass, step_);
+      if (!(push > 0)) return;
+      view.f[view.force.at(n, axis)] += out * push;
       if (told_)
-        told_->push_back({body, -1, {place[0], place[1], place[2]}, depth, {force[0], force[1], force[2]}});
+        told_->push_back({body,
+                          -1,
+                          {place[0], place[1], place[2]},
+                          depth,
+                          {push * normal[0], push * normal[1], push * normal[2]}});
+      if (!friction) return;
+      const Share<Real> share{n, 1};
+      friction->add(body, -1, place, normal, tables_.pair_friction[body * bodies_ + body] * push, &share,
+                    &share + 1, &share + 1, told_ ? int(told_->size()) - 1 : -1);
     });
-  }
-}
-
-template <class Real>
-void Contacts<Real>::add_forces_of_walls(const LaneView<Real>& view) const {
-  for (int body = 0; body < bodies_ && world_.walls; ++body) {
-    const Topology::Body& nodes = topology_.bodies[body];
-    if (!nodes.pushed || world_.bodies[body].kind == BodyKind::rigid) continue;
-    Wall<Real> wall{};
-    wall.nodes = nodes.surface_nodes.data(), wall.count = int(nodes.surface_nodes.size());
-    wall.mass = tables_.node_mass.data(), wall.inverse_mass = tables_.inverse_mass.data();
-    wall.beta = Real(contact_beta), wall.damping = damping_of(wall.beta);
-    wall.slip_stop = Real(contact_slip_stop), wall.friction = tables_.pair_friction[body * bodies_ + body];
-    wall.step = step_;
-    wall.asleep = view.asleep + body * view.stride;
-    for (int side = 0; side < 6; ++side) {
-      const bool upper = side % 2 == 1;
-      wall.axis = side / 2, wall.inward = Real(upper ? -1 : 1);
-      wall.place = Real((upper ? world_.bounds_m.upper : world_.bounds_m.lower)[wall.axis]);
-      const Real* reach = (upper ? view.upper : view.lower) + (3 * body + wall.axis) * view.stride;
-      bool beyond = false;
-      for (int lane = 0; lane < view.stride; ++lane)
-        beyond |= !(wall.asleep[lane] > 0) && wall.inward * (wall.place - reach[lane]) > 0;
-      if (beyond) kernels_.push_off(wall, view.x, view.v, view.f);
-    }
   }
 }
 

@@ -6,6 +6,7 @@
 
 #include "core/types.h"
 #include "fem/detail/bearing.h"
+#include "fem/detail/friction.h"
 #include "fem/detail/lane_view.h"
 #include "fem/detail/penalty.h"
 #include "fem/detail/tables.h"
@@ -46,11 +47,10 @@ class Contacts {
  public:
   Contacts(const World&, const Kernels<Real>&, int lanes);
   void forget(int lane);  // the lane holds another state now
-  // Adds to view.f the forces of all contacts, and of the walls on rigid bodies.
-  void add_forces(int lane, const LaneView<Real>& view);
-  // After that in every lane: adds those of the walls on soft bodies that are awake. The view of lane 0.
-  void add_forces_of_walls(const LaneView<Real>& view) const;
-  // From now on add_forces also appends to this list, unless null, and adds the forces of all walls.
+  // Adds to view.f the normal forces of all contacts and walls, and to `friction`, unless null, what they
+  // are.
+  void add_forces(int lane, const LaneView<Real>& view, Friction<Real>* friction = nullptr);
+  // From now on add_forces also appends to this list, unless null.
   void tell(std::vector<Exerted<Real>>* list) { told_ = list; }
   // The touches of bodies a and b, a ≤ b: of a in b vertices and edges with an end inside, then edges that
   // pass through, each ascending; then those of b in a; of a body with itself
@@ -122,11 +122,11 @@ class Contacts {
   Touch<Real> leave_along_edges(const LaneView<Real>&, Touch<Real>);
   bool walk_out(const LaneView<Real>&, int tet, int before, const Real p[3], const Real q[3], Real way[3],
                 Real normal[3]) const;
-  void add_forces_with_rigid(int lane, const LaneView<Real>&);
-  void respond(const LaneView<Real>&, int a, int b, const Touch<Real>&) const;
+  void add_forces_with_rigid(int lane, const LaneView<Real>&, Friction<Real>*);
+  void respond(const LaneView<Real>&, int a, int b, const Touch<Real>&, Friction<Real>*) const;
   template <class Each>
   void for_each_beyond_wall(const LaneView<Real>&, int body, const Each&) const;
-  void add_wall_forces(const LaneView<Real>&) const;
+  void add_wall_forces(const LaneView<Real>&, Friction<Real>*) const;
 
   const World& world_;
   const Topology& topology_;

@@ -147,22 +147,11 @@ template <class Real>
 struct Rest {
   Real most_speed2;                      // largest |v|² of a node, before and after
   Real most_gain2, most_gain2_of_still;  // largest |Δv|², where it moved, and where it stood still
-  const Real *asleep, *speed2_before;
+  // The same where it may touch something: contact's rounding shakes single nodes, so of each by this, and of
+  // their mean by so much.
+  Real most_shake2, most_mean_gain2, most_mean_gain2_of_still;
+  const Real *asleep, *speed2_before, *touches;
   Real* stands;  // out: v is 0 now and x as before; `asleep` and `stands` are 0 or 1
-};
-
-// A wall square to an axis, and the surface nodes of a soft body that may be beyond it. The law is that of
-// contact (docs/contact.md), with the node's mass against the push.
-template <class Real>
-struct Wall {
-  const int* nodes;  // of the world
-  int count;
-  const Real *mass, *inverse_mass;  // a world node; inverse 0 where it never moves
-  int axis;
-  Real inward, place;  // inward: ±1 along the axis
-  Real beta, damping;  // of depth per step and of speed, as masses per step
-  Real slip_stop, friction, step;
-  const Real* asleep;  // [lane] > 0: no force
 };
 
 // Tets whose singular values are to lie between two limits, here squared.
@@ -188,8 +177,6 @@ struct Kernels {
   void (*integrate_resting)(const Motion<Real>&, const Rest<Real>&, Real* x, Real* v, Real* f);
   // The same for a body whose nodes keep their distances. They are drawn onto the nearest rigid place first.
   void (*move_rigid)(const RigidMotion<Real>&, Real* x, Real* v, Real* f);
-  // Adds the forces of the wall on what is beyond it.
-  void (*push_off)(const Wall<Real>&, const Real* x, const Real* v, Real* f);
   // [lane] The largest square of a velocity of the nodes [first, last) against their mean.
   void (*inner_speed2)(int first, int last, const Real* v, Real* speed2);
   // Which tets have a singular value beyond a limit, or are inverted, in some lane, ascending, and in which

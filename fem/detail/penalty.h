@@ -5,13 +5,11 @@
 
 namespace limber::fem::detail {
 
-// Penalty stiffness β m_eff/h², damping 2 ζ √(k m_eff), and the share of a slip that friction may stop in one
-// step.
+// Penalty stiffness β m_eff/h², damping 2 ζ √(k m_eff).
 inline constexpr double contact_beta = 0.4;       // vertices
 inline constexpr double contact_edge_beta = 0.2;  // points of edges: a vertex has six of them
 inline constexpr double surface_beta = 0.8;       // samples of surfaces, which share what a node can bear
 inline constexpr double contact_damping_ratio = 0.3;
-inline constexpr double contact_slip_stop = 0.5;
 
 template <class Real>
 Real dot(const Real a[3], const Real b[3]) {
@@ -30,28 +28,19 @@ Real damping_of(Real beta) {
   return Real(2 * contact_damping_ratio) * std::sqrt(beta);
 }
 
-// Normal force k d − c ṙ·n, never pulling; friction against the slip, at most μ times that, and at most what
-// takes a share of the slip away in one step. `mass_along` a unit vector is what is set against a push.
-// False: no force.
-template <class Real, class Mass>
-bool penalty_force(Real beta, Real depth, const Real normal[3], const Real relative_velocity[3],
-                   const Mass& mass_along, Real step, Real friction, Real force[3]) {
-  const Real mass = mass_along(normal);
-  const Real damping = damping_of(beta);
-  const Real speed = dot(relative_velocity, normal);
-  const Real push = mass / step * (beta * depth / step - damping * speed);
-  if (!(push > 0)) return false;
-  Real slip[3];
-  for (int c = 0; c < 3; ++c) slip[c] = relative_velocity[c] - speed * normal[c];
-  const Real slip_speed = std::sqrt(dot(slip, slip));
-  Real slip_way[3];
-  for (int c = 0; c < 3; ++c) slip_way[c] = slip_speed > 0 ? slip[c] / slip_speed : Real(0);
-  const Real slip_mass = mass_along(slip_way);
-  const Real most = friction * push, stop = Real(contact_slip_stop) * slip_mass / step * slip_speed;
-  const Real drag = stop > most ? most / slip_speed : Real(contact_slip_stop) * slip_mass / step;
-  for (int c = 0; c < 3; ++c) force[c] = push * normal[c] - drag * slip[c];
-  return true;
+// Normal force k d − c ṙ·n of a contact so deep, opening at that speed, against which so much mass is set;
+// ≤ 0: it would pull, and there is none.
+template <class Real>
+Real penalty_push(Real beta, Real depth, Real speed, Real mass, Real step) {
+  return mass / step * (beta * depth / step - damping_of(beta) * speed);
 }
+
+// A place that moves as Σ weight × node does.
+template <class Real>
+struct Share {
+  int node;  // of the world
+  Real weight;
+};
 
 // A force that a contact or a wall gave, for those who ask.
 template <class Real>

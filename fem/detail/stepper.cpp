@@ -52,6 +52,8 @@ Stepper<Real>::Stepper(const World& world, int lanes, Isa isa)
       kernels_(kernels<Real>(isa, lanes)),
       lanes_(lanes),
       stretch_limits_(world, kernels_),
+      friction_(std::size_t(lanes), Friction<Real>(world)),
+      pushes_on_lane_(world.bodies.size()),
       state_layout_(state_layout(lanes)),
       force_layout_(force_layout(lanes)),
       first_velocity_(lanes == 1 ? 4 : world.nodes * state_layout_.node),
@@ -60,11 +62,15 @@ Stepper<Real>::Stepper(const World& world, int lanes, Isa isa)
       next_change_(std::size_t(lanes), 0),
       controls_(std::size_t(lanes)),
       contact_(std::size_t(lanes), false),
-      rest_speed2_(Real(world.rest_speed_m_s * world.rest_speed_m_s)),
-      rest_gain2_(rest_speed2_ * Real(world.dt_s * world.dt_s)),  // gained within a second
-      still_gain2_(100 * rest_gain2_),                            // within a tenth of it
+      rest_(),
       speed2_before_(std::size_t(lanes), 0),
       inner_speed2_(std::size_t(lanes), 0) {
+  const Real speed2 = Real(world.rest_speed_m_s * world.rest_speed_m_s),
+             gain2 = speed2 * Real(world.dt_s * world.dt_s);  // gained within a second
+  rest_.most_speed2 = speed2, rest_.most_gain2 = gain2;
+  rest_.most_gain2_of_still = 100 * gain2;  // within a tenth of it
+  rest_.most_shake2 = speed2 / 16, rest_.most_mean_gain2 = 16 * gain2,
+  rest_.most_mean_gain2_of_still = 100 * gain2;
   if (world.touches_on_surfaces())
     surface_contacts_.emplace(world, kernels_, lanes);
   else
@@ -83,8 +89,10 @@ Stepper<Real>::Stepper(const World& world, int lanes, Isa isa)
                             (std::isfinite(body.max_stretch) || body.self_contact || body.phong));
   speed2_.assign(bodies, 0), travel_.assign(bodies, 0), inner_travel_.assign(bodies, 0);
   unchanged_.assign(bodies, 0), asleep_.assign(bodies, 0), stands_.assign(bodies, 0);
+  touches_.assign(bodies, 0);
   met_.assign(world.bodies.size() * bodies, false);
   all_asleep_.assign(world.bodies.size(), false), pushed_asleep_ = all_asleep_;
+  leader_.resize(world.bodies.size());
   for (int n = 0; n < world.nodes; ++n)
     for (int c = 0; c < 3; ++c) std::fill_n(&x(0, n, c), lanes, tables_.rest_positions[3 * n + c]);
   const std::vector<Real> still(std::size_t(3 * world.moving_nodes), 0);
@@ -214,7 +222,7 @@ void Stepper<Real>::step() {
     if (contact_[lane] && step_[lane] >= next_change_[lane]) follow_forces(lane);
   if (cost_.steps++ % Cost::sampled != Cost::sampled / 2) {
     find_sleepers(), add_contact_forces(), find_pushes(), add_stretch_limits(), add_elastic_forces(),
-        integrate();
+        add_friction(), integrate();
     return;
   }
   Stopwatch watch;
@@ -222,6 +230,7 @@ void Stepper<Real>::step() {
   find_sleepers(), add_contact_forces(), cost_.contact_s += spent();
   find_pushes(), cost_.controls_s += spent();
   add_stretch_limits(), add_elastic_forces(), cost_.elastic_s += spent();
+  add_friction(), cost_.contact_s += spent();
   integrate(), cost_.integration_s += spent();
 }
 
@@ -256,8 +265,8 @@ bool Stepper<Real>::goes_on(int lane, int body) const {
 }
 
 // A body that did not change in the last step, and whose boxes met only such bodies' then and now, will not
-// change in this one either: every force is what it was. Lanes without contact are idle, and may sleep
-// altogether.
+// change in this one either: every force is what it was. Friction goes on from body to body, so those that
+// rub one another sleep together. Lanes without contact are idle, and may sleep altogether.
 template <class Real>
 void Stepper<Real>::find_sleepers() {
   const int bodies = int(world_.bodies.size());
@@ -265,7 +274,23 @@ void Stepper<Real>::find_sleepers() {
   std::fill(pushed_asleep_.begin(), pushed_asleep_.end(), false);
   for (int lane = 0; lane < lanes_; ++lane) {
     const auto at = [&](int body) { return std::size_t(body * lanes_ + lane); };
-    for (int b = 0; b < bodies; ++b) asleep_[at(b)] = contact_[lane] ? unchanged_[at(b)] : 1;
+    for (int b = 0; b < bodies; ++b) {
+      asleep_[at(b)] = contact_[lane] ? unchanged_[at(b)] : 1;
+      touches_[at(b)] = 0;
+      for (int c = 0; c < 3 && world_.walls; ++c)
+        if (lower_[at(3 * b + c)] < Real(world_.bounds_m.lower[c]) ||
+            upper_[at(3 * b + c)] > Real(world_.bounds_m.upper[c]))
+          touches_[at(b)] = 1;
+    }
+    std::iota(leader_.begin(), leader_.end(), 0);
+    const auto leader = [&](int body) {
+      while (leader_[body] != body) body = leader_[body];
+      return body;
+    };
+    const auto join = [&](int a, int b) {
+      const int one = leader(a), two = leader(b);
+      leader_[std::max(one, two)] = std::min(one, two);
+    };
     const auto meet = [&](int a, int b) {
       const Real near =
           contacts_ ? Real(0) : surface_contacts_->offset(a, b);  // surfaces push before they meet
@@ -280,10 +305,18 @@ void Stepper<Real>::find_sleepers() {
         const std::size_t pair = at(a * bodies + b);
         const bool met = met_[pair], now = meet(a, b);
         met_[pair] = now;
+        if (now) touches_[at(a)] = touches_[at(b)] = 1;
         if (!met && !now) continue;
         if (unchanged_[at(a)] == 0) asleep_[at(b)] = 0;
         if (unchanged_[at(b)] == 0) asleep_[at(a)] = 0;
+        if (world_.bodies[a].pushed() && world_.bodies[b].pushed() &&
+            tables_.pair_friction[a * bodies + b] > 0)
+          join(a, b);
       }
+    for (int b = 0; b < bodies; ++b)
+      if (asleep_[at(b)] == 0) asleep_[at(leader(b))] = 0;
+    for (int b = 0; b < bodies; ++b)
+      if (asleep_[at(leader(b))] == 0) asleep_[at(b)] = 0;
     for (int b = 0; b < bodies; ++b) {
       if (!world_.bodies[b].moving) asleep_[at(b)] = 1;
       // What it touches sees that a step later.
@@ -302,9 +335,9 @@ template <class Real>
 void Stepper<Real>::add_contact_forces() {
   for (int lane = 0; lane < lanes_; ++lane)
     if (contact_[lane])
-      surface_contacts_ ? surface_contacts_->add_forces(lane, view(lane))
-                        : contacts_->add_forces(lane, view(lane));
-  if (contacts_) contacts_->add_forces_of_walls(view(0));
+      friction_[lane].begin(), surface_contacts_
+                                   ? surface_contacts_->add_forces(lane, view(lane), &friction_[lane])
+                                   : contacts_->add_forces(lane, view(lane), &friction_[lane]);
 }
 
 // What sleeps is looked at, too: whether it sleeps is no part of the state.
@@ -348,6 +381,29 @@ void Stepper<Real>::add_elastic_forces() {
     if (world_.topology.bodies[b].moving && !all_asleep_[b])
       kernels_.elastic(elements_of(tables_.elements, int(b)), state_.data(), &state_[first_velocity_],
                        f_.data());
+}
+
+template <class Real>
+void Stepper<Real>::add_friction(std::vector<Exerted<Real>>* told) {
+  for (std::size_t b = 0; b < forced_.size(); ++b) pushes_on_lane_[b] = pushes_on(b);
+  for (int lane = 0; lane < lanes_; ++lane) {
+    if (contact_[lane]) friction_[lane].add_forces(view(lane), pushes_on_lane_, told);
+    for (const Real*& pushes : pushes_on_lane_)
+      if (pushes) ++pushes;
+  }
+}
+
+template <class Real>
+std::vector<Exerted<Real>> Stepper<Real>::exerted(int lane) {
+  LIMBER_CHECK(lanes_ == 1 && lane == 0, lanes_, lane);
+  std::vector<Exerted<Real>> told;
+  const auto tell = [&](std::vector<Exerted<Real>>* list) {
+    surface_contacts_ ? surface_contacts_->tell(list) : contacts_->tell(list);
+  };
+  follow_forces(lane), find_sleepers();
+  tell(&told), add_contact_forces(), tell(nullptr);
+  find_pushes(), add_stretch_limits(), add_elastic_forces(), add_friction(&told);
+  return told;
 }
 
 // As Motion has them; null: none.
@@ -420,12 +476,12 @@ void Stepper<Real>::integrate() {
     std::copy_n(&speed2_[first], lanes_, speed2_before_.data());
     if (world_.bodies[b].kind == BodyKind::rigid)
       kernels_.move_rigid({motion, world_.rigid_tables[b].body()}, x, v, f_.data());
-    else if (may_stand(b))
-      kernels_.integrate_resting(
-          motion,
-          {rest_speed2_, rest_gain2_, still_gain2_, &asleep_[first], speed2_before_.data(), &stands_[first]},
-          x, v, f_.data());
-    else
+    else if (may_stand(b)) {
+      Rest<Real> rest = rest_;
+      rest.asleep = &asleep_[first], rest.touches = &touches_[first], rest.stands = &stands_[first];
+      rest.speed2_before = speed2_before_.data();
+      kernels_.integrate_resting(motion, rest, x, v, f_.data());
+    } else
       kernels_.integrate(motion, x, v, f_.data());
     for (int lane = 0; lane < lanes_; ++lane)
       unchanged_[first + lane] = stands_[first + lane] > 0 && speed2_before_[lane] == 0;
@@ -442,7 +498,7 @@ void Stepper<Real>::integrate() {
 template <class Real>
 bool Stepper<Real>::may_stand(std::size_t body) const {
   for (int lane = 0; lane < lanes_; ++lane)
-    if (contact_[lane] && speed2_[body * std::size_t(lanes_) + std::size_t(lane)] <= rest_speed2_)
+    if (contact_[lane] && speed2_[body * std::size_t(lanes_) + std::size_t(lane)] <= rest_.most_speed2)
       return true;
   return false;
 }

@@ -9,6 +9,7 @@
 #include "core/state.h"
 #include "fem/cost.h"
 #include "fem/detail/contact.h"
+#include "fem/detail/friction.h"
 #include "fem/detail/kernels.h"
 #include "fem/detail/stretch_limits.h"
 #include "fem/detail/surface_contact.h"
@@ -45,6 +46,8 @@ class Stepper {
   std::vector<Vec3> pushes_m_s2(
       int lane);            // of each node of the robot, by its control, in the step that begins
   bool is_clear(int lane);  // Batch::is_clear
+  // The forces of contact, walls and friction in the step that begins; to be loaded anew after it.
+  std::vector<Exerted<Real>> exerted(int lane);
   const Cost& cost() const { return cost_; }
 
  private:
@@ -59,6 +62,7 @@ class Stepper {
   void find_pushes();
   void add_stretch_limits();
   void add_elastic_forces();
+  void add_friction(std::vector<Exerted<Real>>* told = nullptr);
   void integrate();
   bool goes_on(int lane, int body) const;
   void move_by_keyframes(std::size_t body);
@@ -72,6 +76,8 @@ class Stepper {
   std::optional<Contacts<Real>> contacts_;
   std::optional<SurfaceContacts<Real>> surface_contacts_;
   StretchLimits<Real> stretch_limits_;
+  std::vector<Friction<Real>> friction_;     // [lane]
+  std::vector<const Real*> pushes_on_lane_;  // [body] as of Motion, at the lane at hand
   Layout state_layout_, force_layout_;
   int first_velocity_;
   using Numbers = std::vector<Real, LineAllocator<Real>>;
@@ -91,11 +97,13 @@ class Stepper {
   // Sleep (docs/dynamics.md), all [body][lane], 0 or 1: is as it was a step ago; takes no part in this step;
   // stood still in this step. And [pair of bodies][lane]: their boxes met a step ago.
   Numbers unchanged_, asleep_, stands_;
+  Numbers touches_;  // its box meets another's or a wall
   std::vector<bool> met_;
+  std::vector<int> leader_;                       // [body] of those that rub, the first; in the lane at hand
   std::vector<bool> all_asleep_, pushed_asleep_;  // [body] in all lanes; some force fell on it there
   std::vector<Control> controls_;                 // [lane]
   std::vector<bool> contact_;                     // [lane]
-  Real rest_speed2_, rest_gain2_, still_gain2_;
+  Rest<Real> rest_;
   Numbers speed2_before_, inner_speed2_;  // [lane]
   Cost cost_;
 };

@@ -111,14 +111,13 @@ void StretchLimits<Real>::add_forces(int lane, const LaneView<Real>& view) {
       }
       inverse_mass /= limit.stiffness;
       if (!(inverse_mass > 0)) continue;
-      Real force[3];
-      if (!penalty_force(
-              Real(surface_beta), limit.depth, limit.direction, relative,
-              [&](const Real*) { return 1 / inverse_mass; }, step_, Real(0), force))
-        continue;
+      const Real push = penalty_push(Real(surface_beta), limit.depth, dot(relative, limit.direction),
+                                     1 / inverse_mass, step_);
+      if (!(push > 0)) continue;
       for (int i = 0; i < 4; ++i)
         if (tables_.inverse_mass[limit.node[i]] > 0)
-          for (int c = 0; c < 3; ++c) view.f[view.force.at(limit.node[i], c)] += limit.weight[i] * force[c];
+          for (int c = 0; c < 3; ++c)
+            view.f[view.force.at(limit.node[i], c)] += limit.weight[i] * (push * limit.direction[c]);
     }
     for (const Limit& limit : limits_)
       for (const int node : limit.node) loads_[node] = 0;

@@ -265,11 +265,11 @@ Real SurfaceContacts<Real>::travel_of(const LaneView<Real>& view, int a, int b) 
 }
 
 template <class Real>
-void SurfaceContacts<Real>::add_forces(int lane, const LaneView<Real>& view) {
+void SurfaceContacts<Real>::add_forces(int lane, const LaneView<Real>& view, Friction<Real>* friction) {
   find(lane, view);
   if (touches_.empty()) return;
   share_loads(view);
-  for (const SurfaceTouch<Real>& touch : touches_) respond(touch);
+  for (const SurfaceTouch<Real>& touch : touches_) respond(touch, friction);
   for (const SurfaceTouch<Real>& touch : touches_)
     for (int i = touch.first_share; i < touch.last_share; ++i) {
       const int node = shares_[i].node;
@@ -861,7 +861,7 @@ void SurfaceContacts<Real>::share_loads(const LaneView<Real>& view) {
 }
 
 template <class Real>
-void SurfaceContacts<Real>::respond(const SurfaceTouch<Real>& touch) {
+void SurfaceContacts<Real>::respond(const SurfaceTouch<Real>& touch, Friction<Real>* friction) {
   const Real load = load_of(touch);
   const int side[2] = {touch.body, touch.against};
   Place relative;
@@ -886,30 +886,33 @@ void SurfaceContacts<Real>::respond(const SurfaceTouch<Real>& touch) {
   bool any_rigid = false;
   for (const int body : side) any_rigid |= body >= 0 && is_rigid(body);
   if (!any_rigid && !(borne[0] + borne[1] > 0)) return;
-  const auto mass_along = [&](const Real along[3]) {
-    Real inverse = loads / load;
-    for (const int body : side)
-      if (body >= 0 && is_rigid(body))
-        inverse += Real(bearings_[body].inverse_mass(touch.place, along, load));
-    return 1 / inverse;
-  };
-  Real force[3];
-  const int other = touch.against < 0 ? touch.body : touch.against;
-  if (!penalty_force(Real(surface_beta), touch.depth, touch.normal, relative.at, mass_along, step_,
-                     tables_.pair_friction[touch.body * bodies_ + other], force))
-    return;
+  Real inverse_mass = loads / load;
+  for (const int body : side)
+    if (body >= 0 && is_rigid(body))
+      inverse_mass += Real(bearings_[body].inverse_mass(touch.place, touch.normal, load));
+  const Real push =
+      penalty_push(Real(surface_beta), touch.depth, dot(relative.at, touch.normal), 1 / inverse_mass, step_);
+  if (!(push > 0)) return;
+  const Real force[3] = {push * touch.normal[0], push * touch.normal[1], push * touch.normal[2]};
   for (int i = touch.first_share; i < touch.last_share; ++i) {
     const auto [node, weight] = shares_[i];
     if (tables_.inverse_mass[node] > 0) forces_[node].row += weight * Row{force[0], force[1], force[2], 0};
   }
-  if (!told_) return;
   // What is set against nodes that never move on both sides, or against a wall, is borne by none.
   const Real share = touch.against < 0 ? borne[0] / all[0] : std::max(borne[0] / all[0], borne[1] / all[1]);
-  told_->push_back({touch.body,
-                    touch.against,
-                    {touch.place[0], touch.place[1], touch.place[2]},
-                    touch.depth,
-                    {share * force[0], share * force[1], share * force[2]}});
+  if (told_)
+    told_->push_back({touch.body,
+                      touch.against,
+                      {touch.place[0], touch.place[1], touch.place[2]},
+                      touch.depth,
+                      {share * force[0], share * force[1], share * force[2]}});
+  if (!friction) return;
+  const int other = touch.against < 0 ? touch.body : touch.against;
+  const Share* shares = shares_.data();
+  friction->add(touch.body, touch.against, touch.place, touch.normal,
+                tables_.pair_friction[touch.body * bodies_ + other] * push, shares + touch.first_share,
+                shares + touch.first_against, shares + touch.last_share, told_ ? int(told_->size()) - 1 : -1,
+                share);
 }
 
 template struct SurfaceTables<float>;

@@ -8,6 +8,7 @@
 
 #include "fem/detail/bearing.h"
 #include "fem/detail/contact.h"
+#include "fem/detail/friction.h"
 #include "fem/detail/lane_view.h"
 #include "fem/detail/penalty.h"
 #include "fem/detail/surface_tables.h"
@@ -31,8 +32,9 @@ class SurfaceContacts {
  public:
   SurfaceContacts(const World&, const Kernels<Real>&, int lanes);
   void forget(int lane);  // the lane holds another state now
-  // Adds to view.f the forces of all contacts and walls.
-  void add_forces(int lane, const LaneView<Real>& view);
+  // Adds to view.f the normal forces of all contacts and walls, and to `friction`, unless null, what they
+  // are.
+  void add_forces(int lane, const LaneView<Real>& view, Friction<Real>* friction = nullptr);
   // From now on add_forces also appends to this list, unless null.
   void tell(std::vector<Exerted<Real>>* list) { told_ = list; }
   // How near two bodies' boxes must be for contact.
@@ -124,7 +126,7 @@ class SurfaceContacts {
   void find_walls(int lane, const LaneView<Real>&, int body);
   void share_sample(int body, int sample, SurfaceTouch<Real>&);
   void share_loads(const LaneView<Real>&);
-  void respond(const SurfaceTouch<Real>&);
+  void respond(const SurfaceTouch<Real>&, Friction<Real>*);
   Real load_of(const SurfaceTouch<Real>&) const;
   bool is_rigid(int body) const;
 

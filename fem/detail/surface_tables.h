@@ -4,6 +4,8 @@
 #include <cstdint>
 #include <vector>
 
+#include "fem/detail/penalty.h"
+
 #include "core/contact_shape.h"
 
 namespace limber::fem::detail {
@@ -47,10 +49,7 @@ struct SurfaceTables {
   };
   std::vector<Slope> slopes;
   std::vector<int> first_slope;  // (nodes + 1); of nodes of phong bodies
-  struct Share {
-    int node;
-    Real weight;
-  };
+  using Share = detail::Share<Real>;
   // Appends the shares of which the place at rest Σ weight × rest place is where Phong Deformation moves it,
   // times `sign`: wᵢ, and of all nodes round i ½ wᵢ (X − Xᵢ)·g. `scratch` (nodes) holds zeros, before and
   // after.

@@ -214,7 +214,8 @@ TEST(Rigid, FrictionHoldsAndSlidesOnASlope) {
       Material material;
       material.friction = friction;
       WorldSpec spec;
-      spec.bodies = {rigid(grid({0.75, -0.25, 0}, {0.5, 0.5, 0.3}, 2, 2, 1), material)};
+      // Not where points of the slope lie under its leading edge: these press it from the front.
+      spec.bodies = {rigid(grid({0.77, -0.25, 0}, {0.5, 0.5, 0.3}, 2, 2, 1), material)};
       if (!on_floor)
         spec.bodies.push_back(
             {"slope", grid({0, -1, -0.5}, {6, 2, 0.5}, 12, 4, 1), material, {}, BodyKind::immovable});
@@ -231,8 +232,7 @@ TEST(Rigid, FrictionHoldsAndSlidesOnASlope) {
       // take 1.9 % of that.
       EXPECT_NEAR(after - before, gained, on_floor ? 1e-3 : 0.001 + 0.02 * gained);
       if (friction > tangent) {
-        // Friction stops a slip over a few steps, so it creeps (docs/contact.md).
-        EXPECT_LT(after, 4 * 10 * std::sin(angle) * world.dt_s);
+        EXPECT_LT(std::abs(after), 1e-4);
       }
     }
 }
@@ -290,7 +290,7 @@ TEST(Rigid, AStackStands) {
   spec.gravity_m_s2 = {0, 0, -10};
   const World world = build_world(spec);
   const State start = rest_state(world);
-  const State end = coast(world, start, 3000);
+  const State end = coast(world, start, 20000);  // it sways by a millimetre and comes to rest
   for (int b = 0; b < 4; ++b) {
     EXPECT_LT(mean_speed_m_s(world, end, b), 1e-3);
     EXPECT_LT((center_of_mass_m(world, end, b) - center_of_mass_m(world, start, b)).norm(), 0.006);

@@ -1,0 +1,220 @@
+#include "fem/detail/friction.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "fem/detail/contact.h"
+#include "fem/world.h"
+
+namespace limber::fem::detail {
+namespace {
+
+// Places are gone through so often at most, and until no impulse changes by more than this share of its
+// limit.
+constexpr int most_sweeps = 12;
+constexpr float settled = 1e-3f;
+
+void times(const double symmetric[6], const double t[3], double out[3]) {  // xx xy xz yy yz zz
+  const double* s = symmetric;
+  out[0] = s[0] * t[0] + s[1] * t[1] + s[2] * t[2];
+  out[1] = s[1] * t[0] + s[3] * t[1] + s[4] * t[2];
+  out[2] = s[2] * t[0] + s[4] * t[1] + s[5] * t[2];
+}
+
+}  // namespace
+
+template <class Real>
+Friction<Real>::Friction(const World& world)
+    : world_(world),
+      tables_(tables_of<Real>(world)),
+      dt_(Real(world.dt_s)),
+      slot_of_node_(std::size_t(world.nodes), -1) {
+  for (const Body& body : world.bodies)
+    if (body.kind == BodyKind::rigid) spins_.resize(world.bodies.size());
+}
+
+template <class Real>
+bool Friction<Real>::is_rigid(int body) const {
+  return body >= 0 && world_.bodies[std::size_t(body)].kind == BodyKind::rigid;
+}
+
+template <class Real>
+void Friction<Real>::begin() {
+  for (const Slot& slot : slots_) slot_of_node_[std::size_t(slot.node)] = -1;
+  for (Spin& spin : spins_) spin.met = false;
+  slots_.clear(), shares_.clear(), slips_.clear();
+}
+
+template <class Real>
+int Friction<Real>::slot_of(int node, int body) {
+  int& slot = slot_of_node_[std::size_t(node)];
+  if (slot < 0) {
+    slot = int(slots_.size());
+    slots_.push_back({node, body, {0, 0, 0}, is_rigid(body) ? Real(0) : tables_.inverse_mass[node]});
+  }
+  return slot;
+}
+
+template <class Real>
+void Friction<Real>::add(int body, int against, const Real place[3], const Real normal[3], Real most,
+                         const Share<Real>* first, const Share<Real>* second, const Share<Real>* last,
+                         int told, Real told_share) {
+  if (!(most > 0)) return;
+  Slip& slip = slips_.emplace_back();
+  slip.side[0] = body, slip.side[1] = against;
+  std::copy_n(place, 3, slip.place), std::copy_n(normal, 3, slip.normal);
+  std::fill_n(slip.impulse, 3, Real(0));
+  slip.most = dt_ * most, slip.told = told, slip.told_share = told_share;
+  slip.first = int(shares_.size()), slip.inverse_mass = 0;
+  for (const Share<Real>* share = first; share < last; ++share) {
+    if (share == second) slip.second = int(shares_.size());
+    const int slot = slot_of(share->node, share < second ? body : against);
+    shares_.push_back({slot, share->weight});
+    slip.inverse_mass += share->weight * share->weight * slots_[std::size_t(slot)].inverse_mass;
+  }
+  slip.last = int(shares_.size());
+  if (second == last) slip.second = slip.last;
+  for (const int side : slip.side)
+    if (is_rigid(side)) spins_[std::size_t(side)].met = true;
+}
+
+template <class Real>
+void Friction<Real>::predict(const LaneView<Real>& view, const std::vector<const Real*>& pushes) {
+  const auto velocity = [&](int node, int body, int c) {
+    Real v = view.v[view.state.at(node, c)];
+    const Real inverse_mass = tables_.inverse_mass[node];
+    if (!(inverse_mass > 0)) return v;
+    Real gain = view.f[view.force.at(node, c)] * inverse_mass + Real(world_.gravity_m_s2[c]);
+    if (const Real* push = pushes[std::size_t(body)])
+      gain += push[(3 * (node - world_.bodies[std::size_t(body)].first_node) + c) * view.stride];
+    return v + dt_ * gain;
+  };
+  for (Slot& slot : slots_)
+    for (int c = 0; c < 3 && !is_rigid(slot.body); ++c) slot.velocity[c] = velocity(slot.node, slot.body, c);
+  for (std::size_t b = 0; b < spins_.size(); ++b) {
+    Spin& spin = spins_[b];
+    if (!spin.met) continue;
+    const Topology::Body& body = world_.topology.bodies[b];
+    Bearing bearing;
+    bearing.measure(view, body, tables_.node_mass);
+    spin.inverse_mass = bearing.inverse_mass(), std::copy_n(bearing.center(), 3, spin.center);
+    std::copy_n(bearing.inverse_inertia(), 6, spin.inverse_inertia);
+    double momentum[3] = {0, 0, 0}, angular[3] = {0, 0, 0};
+    for (int n = body.first_node; n < body.last_node; ++n) {
+      double r[3], p[3], l[3];
+      for (int c = 0; c < 3; ++c) {
+        r[c] = double(view.x[view.state.at(n, c)]) - spin.center[c];
+        p[c] = double(tables_.node_mass[n]) * double(velocity(n, int(b), c));
+        momentum[c] += p[c];
+      }
+      cross(r, p, l);
+      for (int c = 0; c < 3; ++c) angular[c] += l[c];
+    }
+    for (int c = 0; c < 3; ++c) spin.velocity[c] = spin.inverse_mass * momentum[c];
+    times(spin.inverse_inertia, angular, spin.spin);
+  }
+}
+
+template <class Real>
+void Friction<Real>::find_relative_velocity(const Slip& slip, Real out[3]) const {
+  std::fill_n(out, 3, Real(0));
+  for (int k = slip.first; k < slip.last; ++k) {
+    const Slot& slot = slots_[std::size_t(shares_[std::size_t(k)].node)];
+    if (is_rigid(slot.body)) continue;
+    for (int c = 0; c < 3; ++c) out[c] += shares_[std::size_t(k)].weight * slot.velocity[c];
+  }
+  for (const int k : {0, 1}) {
+    if (!is_rigid(slip.side[k])) continue;
+    const Spin& spin = spins_[std::size_t(slip.side[k])];
+    double r[3], turning[3];
+    for (int c = 0; c < 3; ++c) r[c] = double(slip.place[c]) - spin.center[c];
+    cross(spin.spin, r, turning);
+    for (int c = 0; c < 3; ++c) out[c] += Real((k == 0 ? 1 : -1) * (spin.velocity[c] + turning[c]));
+  }
+}
+
+template <class Real>
+Real Friction<Real>::inverse_mass_along(const Slip& slip, const Real along[3]) const {
+  double inverse = double(slip.inverse_mass);
+  for (const int side : slip.side) {
+    if (!is_rigid(side)) continue;
+    const Spin& spin = spins_[std::size_t(side)];
+    double r[3], way[3], arm[3], turning[3];
+    for (int c = 0; c < 3; ++c) r[c] = double(slip.place[c]) - spin.center[c], way[c] = double(along[c]);
+    cross(r, way, arm);
+    times(spin.inverse_inertia, arm, turning);
+    inverse += spin.inverse_mass + dot(arm, turning);
+  }
+  return Real(inverse);
+}
+
+template <class Real>
+void Friction<Real>::apply(const Slip& slip, const Real impulse[3]) {
+  for (int k = slip.first; k < slip.last; ++k) {
+    const auto [index, weight] = shares_[std::size_t(k)];
+    Slot& slot = slots_[std::size_t(index)];
+    const Real gain = weight * slot.inverse_mass;
+    for (int c = 0; c < 3; ++c) slot.velocity[c] += gain * impulse[c];
+  }
+  for (const int k : {0, 1}) {
+    if (!is_rigid(slip.side[k])) continue;
+    Spin& spin = spins_[std::size_t(slip.side[k])];
+    double r[3], p[3], arm[3], turning[3];
+    for (int c = 0; c < 3; ++c)
+      r[c] = double(slip.place[c]) - spin.center[c], p[c] = (k == 0 ? 1 : -1) * double(impulse[c]);
+    cross(r, p, arm);
+    times(spin.inverse_inertia, arm, turning);
+    for (int c = 0; c < 3; ++c) spin.velocity[c] += spin.inverse_mass * p[c], spin.spin[c] += turning[c];
+  }
+}
+
+// What makes the slip of this place zero, all others' impulses as they are, no larger than friction allows.
+template <class Real>
+Real Friction<Real>::step_of(Slip& slip) {
+  Real slipping[3];
+  find_relative_velocity(slip, slipping);
+  const Real along_normal = dot(slipping, slip.normal);
+  for (int c = 0; c < 3; ++c) slipping[c] -= along_normal * slip.normal[c];
+  const Real speed = std::sqrt(dot(slipping, slipping));
+  if (!(speed > 0)) return 0;
+  Real way[3];
+  for (int c = 0; c < 3; ++c) way[c] = slipping[c] / speed;
+  const Real inverse_mass = inverse_mass_along(slip, way);
+  if (!(inverse_mass > 0)) return 0;
+  Real wanted[3];
+  for (int c = 0; c < 3; ++c) wanted[c] = slip.impulse[c] - slipping[c] / inverse_mass;
+  const Real size = std::sqrt(dot(wanted, wanted));
+  const Real scale = size > slip.most ? slip.most / size : Real(1);
+  Real change[3];
+  for (int c = 0; c < 3; ++c) change[c] = scale * wanted[c] - slip.impulse[c], slip.impulse[c] += change[c];
+  apply(slip, change);
+  return std::sqrt(dot(change, change)) / slip.most;
+}
+
+template <class Real>
+void Friction<Real>::add_forces(const LaneView<Real>& view, const std::vector<const Real*>& pushes,
+                                std::vector<Exerted<Real>>* told) {
+  if (slips_.empty()) return;
+  predict(view, pushes);
+  for (int sweep = 0; sweep < most_sweeps; ++sweep) {
+    Real most = 0;
+    for (Slip& slip : slips_) most = std::max(most, step_of(slip));
+    if (!(most > Real(settled))) break;
+  }
+  for (const Slip& slip : slips_) {
+    for (int k = slip.first; k < slip.last; ++k) {
+      const auto [index, weight] = shares_[std::size_t(k)];
+      const int node = slots_[std::size_t(index)].node;
+      if (!(tables_.inverse_mass[node] > 0)) continue;
+      for (int c = 0; c < 3; ++c) view.f[view.force.at(node, c)] += weight * (slip.impulse[c] / dt_);
+    }
+    if (told && slip.told >= 0)
+      for (int c = 0; c < 3; ++c)
+        (*told)[std::size_t(slip.told)].force[c] += slip.told_share * (slip.impulse[c] / dt_);
+  }
+}
+
+template class Friction<float>;
+template class Friction<double>;
+
+}  // namespace limber::fem::detail

@@ -1,0 +1,79 @@
+// Coulomb friction that holds without memory: chosen last in a step, when all other forces are known, so that
+// what touches does not slip in the velocities that the step ends with, as far as μ times the normal force
+// allows. One lane; method and figures: docs/contact.md, "Friction".
+#pragma once
+
+#include <vector>
+
+#include "fem/detail/bearing.h"
+#include "fem/detail/lane_view.h"
+#include "fem/detail/penalty.h"
+#include "fem/detail/tables.h"
+
+namespace limber::fem {
+struct World;
+}
+
+namespace limber::fem::detail {
+
+template <class Real>
+class Friction {
+ public:
+  explicit Friction(const World&);
+  // What touches in the step that begins; nothing yet.
+  void begin();
+  // Some place of `body` presses one of `against`, or a wall (−1): `most` is μ times the normal force, in
+  // newtons. Shares: those of the first place, then, from `second` on, minus those of the other. `told` is
+  // where among what is told the force is to be added, times `told_share`; −1: nowhere.
+  void add(int body, int against, const Real place[3], const Real normal[3], Real most,
+           const Share<Real>* first, const Share<Real>* second, const Share<Real>* last, int told = -1,
+           Real told_share = 1);
+  // When view.f holds all other forces: adds those of friction, and to what was told. `pushes` [body] as of
+  // Motion, at the lane, or null.
+  void add_forces(const LaneView<Real>& view, const std::vector<const Real*>& pushes,
+                  std::vector<Exerted<Real>>* told);
+
+ private:
+  // A node, in the order in which they were met.
+  struct Slot {
+    int node, body;
+    Real velocity[3];  // at the end of the step, as far as forces are known
+    Real inverse_mass;
+  };
+  struct Slip {
+    int side[2];              // body, against; −1: a wall
+    int first, second, last;  // of shares_
+    Real place[3], normal[3], most;
+    Real inverse_mass;  // of what is not rigid
+    Real impulse[3];    // on `body`, square to the normal
+    int told;
+    Real told_share;
+  };
+  // A rigid body's motion about its centre of mass.
+  struct Spin {
+    bool met = false;
+    double center[3], velocity[3], spin[3], inverse_mass, inverse_inertia[6];
+  };
+
+  bool is_rigid(int body) const;
+  int slot_of(int node, int body);
+  void predict(const LaneView<Real>& view, const std::vector<const Real*>& pushes);
+  Real step_of(Slip&);  // the impulse's change over the most it may be
+  void find_relative_velocity(const Slip&, Real out[3]) const;
+  Real inverse_mass_along(const Slip&, const Real along[3]) const;
+  void apply(const Slip&, const Real impulse[3]);
+
+  const World& world_;
+  const Tables<Real>& tables_;
+  Real dt_;
+  std::vector<int> slot_of_node_;  // −1: none
+  std::vector<Slot> slots_;
+  std::vector<Share<Real>> shares_;  // of slots
+  std::vector<Slip> slips_;
+  std::vector<Spin> spins_;  // a body; empty without rigid ones
+};
+
+extern template class Friction<float>;
+extern template class Friction<double>;
+
+}  // namespace limber::fem::detail
