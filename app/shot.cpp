@@ -274,8 +274,8 @@ Points Shot::arrows_at(int frame) const {
   ends.rowwise() = robot.transpose();
   const auto push =
       std::find_if(pushes_.rbegin(), pushes_.rend(), [&](const Push& p) { return p.first_frame <= frame; });
-  if (push != pushes_.rend() && push->control.manipulation != Manipulation::none) {
-    const Control& control = push->control;
+  const Control control = push != pushes_.rend() ? push->control : Control{};
+  if (control.manipulation != Manipulation::none) {
     const bool at_point = control.manipulation == Manipulation::control_point;
     Vec3 force_n = control.force_n.cast<double>();
     if (control.manipulation == Manipulation::interpolation || control.manipulation == Manipulation::hold)
@@ -285,7 +285,7 @@ Points Shot::arrows_at(int frame) const {
   // Each at the middle of its contacts, by their forces.
   std::vector<Vec3> force(std::size_t(bodies), Vec3::Zero()), place = force;
   std::vector<double> weight(std::size_t(bodies), 0);
-  for (const fem::ContactForce& contact : fem::contact_forces(world_, state)) {
+  for (const fem::ContactForce& contact : fem::contact_forces(world_, state, control)) {
     if (contact.body != world_.robot && contact.other != world_.robot) continue;
     const int other = contact.body == world_.robot ? contact.other : contact.body;
     if (other == world_.robot) continue;

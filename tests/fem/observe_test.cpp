@@ -235,7 +235,7 @@ TEST(Observe, ControlForcesAreWhatMovesTheRobot) {
       }
     }
     EXPECT_EQ(sum.norm() > 1, manipulation != Manipulation::none);
-    for (const PairForce& pair : pair_forces(contact_forces(world, state))) {
+    for (const PairForce& pair : pair_forces(contact_forces(world, state, control))) {
       if (pair.body == world.robot) sum += pair.force_n;
       if (pair.other == world.robot) sum -= pair.force_n;
     }

@@ -70,8 +70,9 @@ TEST(SelfContact, TheEndsOfABentBarMeetAndDoNotPass) {
     SCOPED_TRACE(speed);
     const double gap = least_gap(true, speed);
     EXPECT_LT(gap, 0.01);  // they met
+    // Up to 2 m/s they press no deeper than this; whatever the speed, no arm gets half through the other.
     testing::prove_at_least(15, fmt::format("ends of a bent bar's arms at {} m/s: least gap, m", speed),
-                            "0.2 m thick", gap, -0.02 - 0.01 * speed);
+                            "0.2 m thick", gap, speed > 2 ? -0.1 : -0.02 - 0.01 * speed);
   }
 }
 
