@@ -50,7 +50,7 @@ int Friction<Real>::slot_of(int node, int body) {
   int& slot = slot_of_node_[std::size_t(node)];
   if (slot < 0) {
     slot = int(slots_.size());
-    slots_.push_back({node, body, {0, 0, 0}, is_rigid(body) ? Real(0) : tables_.inverse_mass[node]});
+    slots_.push_back({node, body});
   }
   return slot;
 }
@@ -66,14 +66,16 @@ void Friction<Real>::add(int body, int against, const Real place[3], const Real 
   std::fill_n(slip.impulse, 3, Real(0));
   slip.most = dt_ * most, slip.told = told, slip.told_share = told_share;
   slip.first = int(shares_.size()), slip.inverse_mass = 0;
+  const int second_share = slip.first + int(second - first);
+  slip.last = slip.first + int(last - first);
+  slip.first_soft = is_rigid(body) ? second_share : slip.first;
+  slip.last_soft = is_rigid(against) ? second_share : slip.last;
   for (const Share<Real>* share = first; share < last; ++share) {
-    if (share == second) slip.second = int(shares_.size());
-    const int slot = slot_of(share->node, share < second ? body : against);
-    shares_.push_back({slot, share->weight});
-    slip.inverse_mass += share->weight * share->weight * slots_[std::size_t(slot)].inverse_mass;
+    const int of = share < second ? body : against;
+    const Real gain = is_rigid(of) ? Real(0) : share->weight * tables_.inverse_mass[share->node];
+    shares_.push_back({slot_of(share->node, of), share->weight, gain});
+    slip.inverse_mass += share->weight * gain;
   }
-  slip.last = int(shares_.size());
-  if (second == last) slip.second = slip.last;
   for (const int side : slip.side)
     if (is_rigid(side)) spins_[std::size_t(side)].met = true;
 }
@@ -89,8 +91,12 @@ void Friction<Real>::predict(const LaneView<Real>& view, const std::vector<const
       gain += push[(3 * (node - world_.bodies[std::size_t(body)].first_node) + c) * view.stride];
     return v + dt_ * gain;
   };
-  for (Slot& slot : slots_)
-    for (int c = 0; c < 3 && !is_rigid(slot.body); ++c) slot.velocity[c] = velocity(slot.node, slot.body, c);
+  velocities_.resize(slots_.size());
+  for (std::size_t k = 0; k < slots_.size(); ++k) {
+    const auto [node, body] = slots_[k];
+    if (is_rigid(body)) continue;
+    velocities_[k].row = Row{velocity(node, body, 0), velocity(node, body, 1), velocity(node, body, 2), 0};
+  }
   for (std::size_t b = 0; b < spins_.size(); ++b) {
     Spin& spin = spins_[b];
     if (!spin.met) continue;
@@ -117,12 +123,14 @@ void Friction<Real>::predict(const LaneView<Real>& view, const std::vector<const
 
 template <class Real>
 void Friction<Real>::find_relative_velocity(const Slip& slip, Real out[3]) const {
-  std::fill_n(out, 3, Real(0));
-  for (int k = slip.first; k < slip.last; ++k) {
-    const Slot& slot = slots_[std::size_t(shares_[std::size_t(k)].node)];
-    if (is_rigid(slot.body)) continue;
-    for (int c = 0; c < 3; ++c) out[c] += shares_[std::size_t(k)].weight * slot.velocity[c];
-  }
+  Velocity sum;
+  sum.row = Row{};
+  const SlotShare* const shares = shares_.data();
+  const Velocity* const velocities = velocities_.data();
+  for (int k = slip.first_soft; k < slip.last_soft; ++k)
+    sum.row += shares[k].weight * velocities[shares[k].slot].row;
+  std::copy_n(sum.at, 3, out);
+  if (spins_.empty()) return;
   for (const int k : {0, 1}) {
     if (!is_rigid(slip.side[k])) continue;
     const Spin& spin = spins_[std::size_t(slip.side[k])];
@@ -135,6 +143,7 @@ void Friction<Real>::find_relative_velocity(const Slip& slip, Real out[3]) const
 
 template <class Real>
 Real Friction<Real>::inverse_mass_along(const Slip& slip, const Real along[3]) const {
+  if (spins_.empty()) return slip.inverse_mass;
   double inverse = double(slip.inverse_mass);
   for (const int side : slip.side) {
     if (!is_rigid(side)) continue;
@@ -150,12 +159,12 @@ Real Friction<Real>::inverse_mass_along(const Slip& slip, const Real along[3]) c
 
 template <class Real>
 void Friction<Real>::apply(const Slip& slip, const Real impulse[3]) {
-  for (int k = slip.first; k < slip.last; ++k) {
-    const auto [index, weight] = shares_[std::size_t(k)];
-    Slot& slot = slots_[std::size_t(index)];
-    const Real gain = weight * slot.inverse_mass;
-    for (int c = 0; c < 3; ++c) slot.velocity[c] += gain * impulse[c];
-  }
+  const Row push = {impulse[0], impulse[1], impulse[2], 0};
+  const SlotShare* const shares = shares_.data();
+  Velocity* const velocities = velocities_.data();
+  for (int k = slip.first_soft; k < slip.last_soft; ++k)
+    velocities[shares[k].slot].row += shares[k].gain * push;
+  if (spins_.empty()) return;
   for (const int k : {0, 1}) {
     if (!is_rigid(slip.side[k])) continue;
     Spin& spin = spins_[std::size_t(slip.side[k])];
@@ -202,15 +211,15 @@ void Friction<Real>::add_forces(const LaneView<Real>& view, const std::vector<co
     if (!(most > Real(settled))) break;
   }
   for (const Slip& slip : slips_) {
+    const Real force[3] = {slip.impulse[0] / dt_, slip.impulse[1] / dt_, slip.impulse[2] / dt_};
     for (int k = slip.first; k < slip.last; ++k) {
-      const auto [index, weight] = shares_[std::size_t(k)];
-      const int node = slots_[std::size_t(index)].node;
+      const SlotShare& share = shares_[std::size_t(k)];
+      const int node = slots_[std::size_t(share.slot)].node;
       if (!(tables_.inverse_mass[node] > 0)) continue;
-      for (int c = 0; c < 3; ++c) view.f[view.force.at(node, c)] += weight * (slip.impulse[c] / dt_);
+      for (int c = 0; c < 3; ++c) view.f[view.force.at(node, c)] += share.weight * force[c];
     }
     if (told && slip.told >= 0)
-      for (int c = 0; c < 3; ++c)
-        (*told)[std::size_t(slip.told)].force[c] += slip.told_share * (slip.impulse[c] / dt_);
+      for (int c = 0; c < 3; ++c) (*told)[std::size_t(slip.told)].force[c] += slip.told_share * force[c];
   }
 }
 

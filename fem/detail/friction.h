@@ -34,15 +34,27 @@ class Friction {
                   std::vector<Exerted<Real>>* told);
 
  private:
-  // A node, in the order in which they were met.
+  // x y z and nothing: added and scaled at once.
+  typedef Real Row __attribute__((vector_size(4 * sizeof(Real)), may_alias));
+  // A node, in the order in which they were met, and its velocity at the end of the step, as far as forces
+  // are known.
   struct Slot {
     int node, body;
-    Real velocity[3];  // at the end of the step, as far as forces are known
-    Real inverse_mass;
+  };
+  struct Velocity {
+    union {
+      Row row;
+      Real at[4];
+    };
+  };
+  struct SlotShare {
+    int slot;
+    Real weight, gain;  // weight over the node's mass; 0 where it never moves, or is of a rigid body
   };
   struct Slip {
-    int side[2];              // body, against; −1: a wall
-    int first, second, last;  // of shares_
+    int side[2];                // body, against; −1: a wall
+    int first, last;            // of shares_
+    int first_soft, last_soft;  // of those the ones that are not of rigid bodies
     Real place[3], normal[3], most;
     Real inverse_mass;  // of what is not rigid
     Real impulse[3];    // on `body`, square to the normal
@@ -68,7 +80,8 @@ class Friction {
   Real dt_;
   std::vector<int> slot_of_node_;  // −1: none
   std::vector<Slot> slots_;
-  std::vector<Share<Real>> shares_;  // of slots
+  std::vector<Velocity> velocities_;  // a slot
+  std::vector<SlotShare> shares_;
   std::vector<Slip> slips_;
   std::vector<Spin> spins_;  // a body; empty without rigid ones
 };

@@ -485,7 +485,8 @@ TEST(Contact, NothingPassesThroughUpToAStatedSpeed) {
 TEST(Contact, ACubeGoesOverThePlateAndUnderTheNext) {
   Material material;
   material.poisson_ratio = 0.48;
-  material.friction = 0.1;  // with more, 400 N can wedge the cube under the second plate and leave it there
+  material.friction =
+      0;  // with 0.15 it is 22 mm deep at most, with 0.2 32, and 400 N can wedge it under the second plate
   const World world = build_world(testing::barriers(1, material));
   State state = rest_state(world);
   const auto push = [&](const Vec3& force_n) {
