@@ -14,6 +14,8 @@ namespace limber::app {
 namespace {
 
 constexpr int preferred_lanes = 16;
+// Goes up where the laws of motion change: plans made before are of another world.
+constexpr int edition = 1;
 constexpr int widths[] = {1, 4, 8, 16};
 
 // Nothing where nothing happens by itself.
@@ -35,6 +37,7 @@ void add_script(const fem::World& world, Hasher& hasher) {
 
 std::uint64_t hash_of(const fem::World& world) {
   Hasher hasher;
+  hasher.text("edition").value(edition);
   hasher.value(world.robot).matrix(world.bounds_m.lower).matrix(world.bounds_m.upper).value(int(world.walls));
   hasher.matrix(world.goal_shape_m);
   hasher.matrix(world.gravity_m_s2).value(world.dt_s).value(world.contact_dt_s).value(world.rest_speed_m_s);

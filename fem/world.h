@@ -70,8 +70,9 @@ struct WorldSpec {
   double max_dt_s = 0;               // 0: automatic; a scene may only lower the step
   Points goal_shape_m;  // (N × 3) to which interpolation draws the robot, wherever; empty: its rest shape
   // A soft body all of whose nodes are slower, and would gain less than this in a second, comes to a stand;
-  // one that stands goes on standing until a node would gain as much in a tenth of a second. 0: only where
-  // nothing would move.
+  // one that stands goes on standing until a node would gain as much in a tenth of a second. Where its box
+  // meets another's or a wall, whose rounding shakes single nodes, their mean counts for that
+  // (docs/dynamics.md, "Rest and sleep"). 0: only where nothing would move.
   double rest_speed_m_s = 0;
   double contact_offset_m = 0;  // ≥ 0: fine surfaces that near push each other
   bool part_overlaps = true;    // fine surfaces that overlap where bodies start are parted, else refused
