@@ -38,7 +38,7 @@ TEST_F(Controls, WithoutItsPlatesBarriers1IsSolvedInFewIterations) {
   ASSERT_EQ(scene.robot, 0);
   scene.bodies.resize(1);
   for (int seed = 1; seed <= 5; ++seed) {
-    const plan::Plan p = plan_of(scene, seed, 50);
+    const plan::Plan p = plan_of(scene, seed, 100);
     EXPECT_TRUE(p.solved()) << seed << ": " << plan::explain(p);
   }
 }

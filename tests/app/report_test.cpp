@@ -109,7 +109,8 @@ TEST_F(Report, PackedMotionUnpacksToTheSurfacesOfAllFrames) {
 
 // What the page's own viewer does with it, run by node.
 TEST_F(Report, TheViewerMovesSurfacesAsFilmsDo) {
-  plan(replaced("role = \"obstacle\"\n", "role = \"obstacle\"\ndeformation = \"phong\"\n"));
+  std::string text = replaced("role = \"obstacle\"\n", "role = \"obstacle\"\ndeformation = \"phong\"\n");
+  plan(text.replace(text.find("seed = 1"), 8, "seed = 3"));  // it presses the block
   ASSERT_EQ(limber_program({"report", out()}).code, exit_done);
   if (std::system("node --version > /dev/null 2>&1") != 0) GTEST_SKIP() << "nodejs is missing";
   const std::string script = std::string(limber_source_dir) + "/tools/readers/viewer.js";
