@@ -145,7 +145,7 @@ fem::World world_of(const PlanFolder& planned, const std::vector<PreparedBody>& 
   return build_world(planned.scene, bodies, State(planned.plan.tree.states[0]).positions);
 }
 
-std::vector<PreparedBody> read_bodies_of(const PlanFolder& planned, const fs::path& folder) {
+std::vector<PreparedBody> read_caged_bodies_of(const PlanFolder& planned, const fs::path& folder) {
   std::vector<PreparedBody> bodies = read_bodies(planned.scene, folder);
   for (std::size_t b = 0; b < bodies.size(); ++b) {
     const std::string& name = planned.scene.bodies[b].name;
@@ -154,6 +154,11 @@ std::vector<PreparedBody> read_bodies_of(const PlanFolder& planned, const fs::pa
           fmt::format("{}: the cage has changed since the plan was made; plan anew with limber plan",
                       body_folder(folder, planned.scene.bodies[b]).string()));
   }
+  return bodies;
+}
+
+std::vector<PreparedBody> read_bodies_of(const PlanFolder& planned, const fs::path& folder) {
+  std::vector<PreparedBody> bodies = read_caged_bodies_of(planned, folder);
   require_of_world(planned.plan, world_of(planned, bodies), folder);
   return bodies;
 }

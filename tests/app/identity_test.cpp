@@ -61,7 +61,7 @@ Cases pressed_cases(const fem::World& world, const scenes::Scene& scene) {
   EXPECT_TRUE(touches(world, cases.start));
   Rng rng(61, 0);
   for (int i = 0; i < rollouts; ++i) {
-    Control control = push(force_n * (0.7 * towards + 0.3 * rng.direction()), 600 + rng.below(200));
+    Control control = push(force_n * (0.4 * towards + 0.2 * rng.direction()), 600 + rng.below(200));
     control.manipulation = Manipulation(i % 4);
     control.node = rng.below(world.bodies[std::size_t(world.robot)].node_count());
     control.radius_m = 0.4f;
