@@ -73,6 +73,9 @@ void require_of_world(const plan::Plan&, const fem::World&, const fs::path& fold
 // The world of its scene, begun as the plan begins: bodies that overlap there are not parted once more.
 fem::World world_of(const PlanFolder&, const std::vector<PreparedBody>&);
 
+// The bodies of the plan's scene. Throws InputError when a cage has changed since the plan was made.
+std::vector<PreparedBody> read_caged_bodies_of(const PlanFolder&, const fs::path& folder);
+
 // The bodies that the plan was made with. Throws InputError when one has changed since, or the plan is not of
 // their world.
 std::vector<PreparedBody> read_bodies_of(const PlanFolder&, const fs::path& folder);

@@ -46,6 +46,19 @@ Outcome outcome_of(const Promises& table, const Json& motion, const Json& scene)
           text};
 }
 
+// Each body by itself, and whether it is the scene's.
+void check_bodies(const fs::path& folder, const scenes::Scene& scene, const std::vector<PreparedBody>& bodies,
+                  const VerifyDepth& depth, Promises& table) {
+  const bool is_trusted = depth.trusted.has_value();
+  const std::vector<fs::path> data = is_trusted ? depth.trusted->data : std::vector<fs::path>{};
+  for (std::size_t b = 0; b < bodies.size(); ++b) {
+    const scenes::BodySpec& body = scene.bodies[b];
+    const Origin origin = origin_of(scene, body, data, bodies[b]);
+    check_origin(body.name, origin, is_trusted, table);
+    check_body(body.name, bodies[b], body_folder(folder, body), origin.made_cage, depth.remake, table);
+  }
+}
+
 }  // namespace
 
 Outcome verify_plan(const fs::path& folder, const PlanFolder& planned,
@@ -63,12 +76,7 @@ Outcome verify_plan(const fs::path& folder, const PlanFolder& planned,
     scene.folder = trusted->scene.folder;
   }
   const std::vector<fs::path> data = trusted ? trusted->data : std::vector<fs::path>{};
-  for (std::size_t b = 0; b < bodies.size(); ++b) {
-    const scenes::BodySpec& body = scene.bodies[b];
-    const Origin origin = origin_of(scene, body, data, bodies[b]);
-    check_origin(body.name, origin, trusted.has_value(), table);
-    check_body(body.name, bodies[b], body_folder(folder, body), origin.made_cage, depth.remake, table);
-  }
+  check_bodies(folder, scene, bodies, depth, table);
   for (const scenes::BodySpec& body : scene.scenery)
     check_origin(body.name, origin_of_scenery(scene, body, data, folder), trusted.has_value(), table);
   check_goal_cage(goal_cage_of(scene, data, bodies), trusted.has_value(), table);
@@ -93,10 +101,23 @@ Outcome verify(const VerifyOptions& options) {
                  scenes::read_scene_file(scenes::find_scene(options.scene.scene), options.scene.sets),
                  options.scene.data};
     const PlanFolder planned = read_plan_folder(folder);
-    const std::vector<PreparedBody> bodies = read_bodies_of(planned, folder);
+    const std::vector<PreparedBody> bodies = read_caged_bodies_of(planned, folder);
+    const VerifyDepth depth{trusted, options.remake};
+    try {
+      require_of_world(planned.plan, world_of(planned, bodies), folder);
+    } catch (const InputError&) {
+      // A body that is not the scene's weighs something else, and then nothing of the plan fits: what is to
+      // be named is the body.
+      Promises table;
+      scenes::Scene scene = planned.scene;
+      if (trusted) scene.folder = trusted->scene.folder;
+      check_bodies(folder, scene, bodies, depth, table);
+      if (table.all_kept()) throw;
+      return outcome_of(table, {}, {});
+    }
     const fem::World world = build_world(planned.scene, bodies);
     MotionFigures figures;
-    const Outcome outcome = verify_plan(folder, planned, bodies, world, figures, {trusted, options.remake});
+    const Outcome outcome = verify_plan(folder, planned, bodies, world, figures, depth);
     if (options.observables) write_observables(*options.observables, world, figures);
     return outcome;
   }
