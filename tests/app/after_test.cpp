@@ -94,8 +94,9 @@ TEST_F(Program_slow, APlanThatIsNotPerturbedIsItself) {
 // Perturbed much and given little time to settle, some rest and some do not.
 TEST_F(Program_slow, RobustCallsAtRestWhatIsSlowAtItsEndAndNothingElse) {
   constexpr double slow_m_s = 0.02;  // planner.settle_speed_m_s
-  const std::string hasty = scene(replaced("seed = 1\niterations = 400\nmax_force_n = 100",
-                                           "seed = 3\niterations = 400\nmax_force_n = 100\nsettle_time_s = 1.2"));
+  const std::string hasty =
+      scene(replaced("seed = 1\niterations = 400\nmax_force_n = 100",
+                     "seed = 3\niterations = 400\nmax_force_n = 100\nsettle_time_s = 1.2"));
   ASSERT_EQ(limber_program({"plan", hasty, "-o", out()}).code, exit_done);
   const std::vector<std::string> words{"robust", out(), "-n", "12", "--forces", "0.4", "--turn", "30"};
   std::vector<std::string> as_json = words;
