@@ -2,6 +2,7 @@
 // the instruction set and the threads.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cstdlib>
 #include <thread>
 
@@ -31,9 +32,12 @@ Control push(const Vec3& force_n, int steps) {
   return control;
 }
 
+// Something pushes it that is no wall.
 bool touches(const fem::World& world, const State& state) {
-  const fem::Penetration deepest = deepest_penetration(world, state);
-  return deepest.depth_m > 0 && deepest.other >= 0;
+  const std::vector<fem::ContactForce> forces = fem::contact_forces(world, state, Control{});
+  return std::any_of(forces.begin(), forces.end(), [&](const fem::ContactForce& contact) {
+    return contact.other >= 0 && (contact.body == world.robot || contact.other == world.robot);
+  });
 }
 
 // Pushed towards the goal, or else towards one of the other bodies, until something is in the way, and still

@@ -437,7 +437,7 @@ List of_bodies() {
     bind(body);
   });
   list.back().part = "bodies/ball";  // the plan alone would be refused for its frames' times
-  add(ball, "a larger cage", "frame 1 is at step", [=](PreparedBody& body, auto&) {
+  add(ball, "a larger cage", "ball: cage made again", [=](PreparedBody& body, auto&) {
     const Eigen::RowVector3d middle = body.cage.positions.colwise().mean();
     body.cage.positions = ((body.cage.positions.rowwise() - middle) * 1.05).rowwise() + middle;
     bind(body);
