@@ -287,13 +287,17 @@ render::Image8 Shot::Painter::annotated(render::Image8 image, int frame) const {
                 .high = shot_.high_,
                 .color_srgb = film.color_by == scenes::ColorBy::volume ? render::diverging_srgb
                                                                        : render::sequential_srgb});
-  std::string clock;
-  if (film.clock) {
-    clock = fmt::format("{:.2f} s", double(frame) / shot_.plan_.trajectory.frames_per_second);
-    if (film.speed != 1) clock += fmt::format("   speed {:g}", film.speed);
-    clock += fmt::format("   {}/{}", frame + 1, shot_.frames());
+  const std::string clock = shot_.clock_at(frame);
+  if (!film.caption.empty() || !clock.empty()) render::draw_caption(image, film.caption, clock, shot_.words_);
+  if (film.scale_bar) {
+    const render::Camera camera = shot_.camera_of(frame);
+    const double pixels = 0.5 * image.height / std::tan(0.5 * camera.fov_deg * EIGEN_PI / 180) /
+                          (camera.target - camera.eye).norm() * shot_.scale_m_;
+    const bool taken = shot_.words_.corner == render::Corner::bottom_right;
+    render::draw_scale_bar(image, length_words(shot_.scale_m_), pixels,
+                           {.corner = taken ? render::Corner::bottom_left : render::Corner::bottom_right,
+                            .on_dark = shot_.words_.on_dark});
   }
-  if (!film.caption.empty() || !clock.empty()) render::draw_caption(image, film.caption, clock);
   return image;
 }
 

@@ -238,6 +238,7 @@ Outcome run(const PlanOptions& plan_options, const RenderOptions& render_options
   const scenes::Scene scene = read_scene(plan_options);
   if (render_options.frames.empty() && render_options.chunk.empty())
     render::require_film_possible(scene.film.frames_per_second, render_options.video.value_or("film.mp4"));
+  require_letters(scene.film);
   make_folder(plan_options.out);
   FolderLock lock(plan_options.out, FolderLock::alone);
   Outcome planned;

@@ -7,6 +7,7 @@
 #include "app/frame_list.h"
 #include "app/goal_terms.h"
 #include "app/plan_folder.h"
+#include "app/shot.h"
 #include "app/start.h"
 #include "core/error.h"
 #include "core/lock.h"
@@ -259,6 +260,7 @@ class Check {
     json_["film_possible"] = true;
     try {
       render::require_film_possible(scene_.film.frames_per_second, "film.mp4");
+      require_letters(scene_.film);
     } catch (const InputError& error) {
       json_["film_possible"] = false;
       warnings_.push_back(error.what());

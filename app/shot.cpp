@@ -18,7 +18,7 @@ namespace limber::app {
 namespace {
 
 constexpr int generation =
-    2;  // of pictures: raised when the same film comes out otherwise, so that it is painted anew
+    3;  // of pictures: raised when the same film comes out otherwise, so that it is painted anew
 constexpr double longest_arrow = 2;  // times that of the strongest push, which is as long as the robot
 constexpr int most_edges_of_tree = 4000;
 
@@ -57,7 +57,53 @@ std::vector<Eigen::Index> outermost_of(const Points& positions) {
   return outermost;
 }
 
+// A convex polygon round points of the plane, counter-clockwise (Andrew's monotone chain, 1979).
+std::vector<Eigen::Vector2d> convex_hull(std::vector<Eigen::Vector2d> points) {
+  std::sort(points.begin(), points.end(),
+            [](const auto& a, const auto& b) { return std::pair(a.x(), a.y()) < std::pair(b.x(), b.y()); });
+  std::vector<Eigen::Vector2d> hull;
+  for (int side = 0; side < 2; ++side, std::reverse(points.begin(), points.end())) {
+    const std::size_t first = hull.size();
+    for (const Eigen::Vector2d& p : points) {
+      while (hull.size() >= first + 2) {
+        const Eigen::Vector2d a = hull.back() - hull[hull.size() - 2], b = p - hull.back();
+        if (a.x() * b.y() - a.y() * b.x() > 0) break;
+        hull.pop_back();
+      }
+      hull.push_back(p);
+    }
+    hull.pop_back();
+  }
+  return hull;
+}
+
+bool holds(const std::vector<Eigen::Vector2d>& hull, const Eigen::Vector2d& p) {
+  for (std::size_t i = 0; i < hull.size(); ++i) {
+    const Eigen::Vector2d a = hull[(i + 1) % hull.size()] - hull[i], b = p - hull[i];
+    if (a.x() * b.y() - a.y() * b.x() < 0) return false;
+  }
+  return hull.size() > 2;
+}
+
+// 1, 2 or 5 times a power of ten, at most this.
+double round_length_m(double most_m) {
+  const double power = std::pow(10.0, std::floor(std::log10(most_m)));
+  return power * (most_m >= 5 * power ? 5 : most_m >= 2 * power ? 2 : 1);
+}
+
 }  // namespace
+
+std::string length_words(double length_m) {
+  return length_m >= 1      ? fmt::format("{:.6g} m", length_m)
+         : length_m >= 0.01 ? fmt::format("{:.6g} cm", 100 * length_m)
+                            : fmt::format("{:.6g} mm", 1000 * length_m);
+}
+
+void require_letters(const scenes::FilmSpec& film) {
+  if (const std::string missing = render::letters_missing(film.caption); !missing.empty())
+    throw InputError(fmt::format(
+        "film.caption: limber's font has no letters for {} (it has Latin, Greek and Cyrillic)", missing));
+}
 
 Shot::Shot(const scenes::Scene& scene, const std::string& camera, const plan::Plan& plan,
            const fem::World& world, const std::vector<PreparedBody>& bodies,
@@ -95,6 +141,7 @@ Shot::Shot(const scenes::Scene& scene, const std::string& camera, const plan::Pl
           fem::center_of_mass_m(world, frames_shown[std::size_t((row + 1) / 2)], world.robot).transpose();
   }
   if (scene.film.tree) find_tree();
+  place_words();
   look_hash_ = hash_of_look();
 }
 
@@ -105,11 +152,13 @@ void Shot::check() const {
     throw InputError("--passes scalar: of what? Add for example --set film.color_by=strain");
   if (!output_.passes.empty() && film.side_by_side)
     throw InputError("--passes are of one picture; add --set film.side_by_side=false");
-  const bool words = !film.caption.empty() || film.clock;
+  require_letters(film);
+  const bool words = !film.caption.empty() || film.clock || film.scale_bar;
   if ((film.transparent || output_.bits == 16) && (words || film.side_by_side))
     throw InputError(
-        fmt::format("{}: caption, clock and side_by_side need 8-bit pictures with a background; "
-                    "add --set film.caption= --set film.clock=false --set film.side_by_side=false",
+        fmt::format("{}: caption, clock, scale_bar and side_by_side need 8-bit pictures with a background; "
+                    "add --set film.caption= --set film.clock=false --set film.scale_bar=false --set "
+                    "film.side_by_side=false",
                     film.transparent ? "film.transparent" : "--bits 16"));
 }
 
@@ -186,6 +235,59 @@ render::Camera Shot::camera_of(int frame) const {
     camera.eye += way, camera.target += way;
   }
   return camera;
+}
+
+std::string Shot::clock_at(int frame) const {
+  const scenes::FilmSpec& film = scene_.film;
+  if (!film.clock) return {};
+  std::string words = fmt::format("{:.1f} s", double(frame) / plan_.trajectory.frames_per_second);
+  if (film.speed < 1) words += fmt::format(" · {:.3g}× slow motion", 1 / film.speed);
+  if (film.speed > 1) words += fmt::format(" · {:.3g}× time lapse", film.speed);
+  return words;
+}
+
+// The corner where they hide least of the bodies over the film; of equals the first.
+void Shot::place_words() {
+  constexpr int most_frames = 24, across = 16, down = 4;
+  const scenes::FilmSpec& film = scene_.film;
+  words_.on_dark = look_.background_bottom_srgb.mean() < 0.4;
+  if (film.scale_bar) {
+    const render::Camera camera = camera_of(0);
+    const double seen_m = 2 * (camera.target - camera.eye).norm() *
+                          std::tan(0.5 * camera.fov_deg * EIGEN_PI / 180) * look_.width / look_.height;
+    scale_m_ = round_length_m(0.2 * seen_m);
+  }
+  const std::string clock = clock_at(frames() - 1);
+  if (film.caption.empty() && clock.empty()) return;
+  std::map<render::Corner, int> hidden;
+  for (int i = 0; i < std::min(frames(), most_frames); ++i) {
+    const int frame = int(std::int64_t(i) * (frames() - 1) / std::max(1, most_frames - 1));
+    for (std::size_t b = 0; b < bodies_.size(); ++b) {
+      const std::vector<Eigen::Index> outermost = outermost_of(bodies_[b].surface.positions);
+      const ffd::Binding part{bodies_[b].binding.tet_from_vertex(outermost),
+                              bodies_[b].binding.weights(outermost, Eigen::all)};
+      Points places;
+      deform(bodies_[b], part,
+             fem::body_positions(world_, plan_.trajectory.frames[std::size_t(frame)], int(b)), places);
+      std::vector<Eigen::Vector2d> seen;
+      const render::Camera camera = camera_of(frame);
+      for (Eigen::Index p = 0; p < places.rows(); ++p) {
+        const Vec3 pixel = render::pixel_from_world(camera, places.row(p), look_.width, look_.height);
+        if (pixel.z() > 0) seen.push_back(pixel.head<2>());
+      }
+      const std::vector<Eigen::Vector2d> hull = convex_hull(std::move(seen));
+      for (const render::Corner corner : render::corners) {
+        const Eigen::Vector4d box =
+            render::place_of_caption(look_.width, look_.height, film.caption, clock, corner);
+        for (int x = 0; x < across; ++x)
+          for (int y = 0; y < down; ++y)
+            hidden[corner] += holds(hull, {box[0] + (box[2] - box[0]) * (x + 0.5) / across,
+                                           box[1] + (box[3] - box[1]) * (y + 0.5) / down});
+      }
+    }
+  }
+  words_.corner = *std::min_element(render::corners.begin(), render::corners.end(),
+                                    [&](auto a, auto b) { return hidden[a] < hidden[b]; });
 }
 
 void Shot::measure_depths() {
@@ -329,7 +431,7 @@ std::uint64_t Shot::hash_of_look() const {
   hasher.matrix(look_.stage.lower).matrix(look_.stage.upper).matrix(scene_.bounds_m.lower);
   hasher.matrix(scene_.bounds_m.upper);
   for (const bool flag : {film.bounds_lines, film.transparent, film.clock, film.cages, film.forces, film.path,
-                          film.tree, film.side_by_side})
+                          film.tree, film.side_by_side, film.scale_bar})
     hasher.value(int(flag));
   hasher.text(film.caption).value(int(film.color_by)).value(low_).value(high_).value(film.speed);
   hasher.value(film.frames_per_second).value(frames()).value(output_.bits);

@@ -9,6 +9,7 @@
 
 #include "app/plan_folder.h"
 #include "app/scene_world.h"
+#include "render/annotate.h"
 #include "render/camera.h"
 #include "render/image.h"
 #include "render/renderer.h"
@@ -27,6 +28,10 @@ struct Picture {
   std::variant<render::Image8, render::Raster8, render::Raster16> frame;
   std::map<std::string, std::variant<render::Raster8, render::Raster16>> passes;  // docs/files.md
 };
+
+std::string length_words(double length_m);  // "20 cm"
+// Throws InputError when the film's caption has letters that there is no picture of.
+void require_letters(const scenes::FilmSpec&);
 
 class Shot {
  public:
@@ -67,6 +72,8 @@ class Shot {
   Points outline_of_motion(int subject) const;
   void lay_out_camera(double aspect);
   void check() const;
+  void place_words();
+  std::string clock_at(int frame) const;
   void measure_depths();
   void measure_colors();
   void measure_forces();
@@ -87,6 +94,8 @@ class Shot {
   render::Look look_;                    // of one view
   std::vector<render::CameraKey> path_;  // over the share of the film
   Points followed_m_;                    // (frames × 3) the way of the body that the camera follows, or none
+  render::CaptionLook words_;            // where the words stand, and on what
+  double scale_m_ = 0;                   // what the bar of length is long
   double low_ = 0, high_ = 1;            // of the bar of colours
   double near_m_ = 0, far_m_ = 1;        // depths of all that is ever seen
   double strongest_push_n_ = 0, arrow_m_per_n_ = 0, arrow_radius_m_ = 0;

@@ -21,8 +21,46 @@ void fill(Image8& image, double left, double top, double right, double bottom, c
       std::copy_n(dot.rgb.data(), 3, &image.rgb[3 * (std::size_t(y) * image.width + x)]);
 }
 
-// A letter is as wide as a capital is high.
-double text_width(const std::string& text, double height_px) { return double(text.size()) * height_px; }
+using detail::text_width, detail::Weight;
+
+void write(Image8& image, const std::string& text, double left, double baseline, double height_px,
+           Weight weight = Weight::regular) {
+  detail::draw_text(image, text, left, baseline,
+                    {.height_px = height_px, .color_srgb = ink, .weight = weight});
+}
+
+// A caption's two lines: heights of their capitals, and where they stand.
+struct Lines {
+  double large_px = 0, small_px = 0, left = 0, baseline = 0, small_baseline = 0, width = 0;
+};
+Lines lines_of(int width, int height, const std::string& line, const std::string& small_line, Corner corner) {
+  const double margin = width / 40.0, room = width - 2 * margin;
+  const auto letter = [&](const std::string& text, double wanted, Weight weight) {
+    return text.empty() ? 0 : wanted * std::min(1.0, room / std::max(1.0, text_width(text, wanted, weight)));
+  };
+  Lines at;
+  at.large_px = letter(line, height / 42.0, Weight::semibold);
+  at.small_px = letter(small_line, height / 60.0, Weight::regular);
+  at.width = std::max(text_width(line, std::max(1.0, at.large_px), Weight::semibold),
+                      text_width(small_line, std::max(1.0, at.small_px)));
+  const bool top = corner == Corner::top_left || corner == Corner::top_right;
+  const double between = line.empty() || small_line.empty() ? 0 : 1.0 * at.small_px + 0.35 * at.large_px;
+  if (top)
+    at.baseline = margin + at.large_px, at.small_baseline = at.baseline + at.small_px + between;
+  else
+    at.small_baseline = height - margin, at.baseline = at.small_baseline - at.small_px - between;
+  const bool right = corner == Corner::bottom_right || corner == Corner::top_right;
+  at.left = right ? width - margin - at.width : margin;
+  return at;
+}
+
+detail::TextLook on_picture(double height_px, Weight weight, bool on_dark) {
+  return {.height_px = height_px,
+          .color_srgb = on_dark ? white : ink,
+          .weight = weight,
+          .rim_px = 0.14 * height_px,
+          .rim_srgb = on_dark ? ink : white};
+}
 
 }  // namespace
 
@@ -31,10 +69,11 @@ Image8 with_caption(const Image8& picture, const std::vector<std::string>& lines
   const double margin = picture.width / 50.0, room = picture.width - 2 * margin;
   double letter = picture.width / 90.0;  // height of a capital
   constexpr double first_line = 1.3, key_gap = 3;
+  const auto weight = [](std::size_t i) { return i == 0 ? Weight::semibold : Weight::regular; };
   const auto widest = [&] {
     double width = 0, row = 0;
     for (std::size_t i = 0; i < lines.size(); ++i)
-      width = std::max(width, text_width(lines[i], (i == 0 ? first_line : 1) * letter));
+      width = std::max(width, text_width(lines[i], (i == 0 ? first_line : 1) * letter, weight(i)));
     for (const LegendKey& key : keys) row += text_width(key.text, letter) + key_gap * letter;
     return std::max(width, row);
   };
@@ -46,38 +85,64 @@ Image8 with_caption(const Image8& picture, const std::vector<std::string>& lines
   std::copy(picture.rgb.begin(), picture.rgb.end(), image.rgb.begin());
   double baseline = picture.height + margin + letter;
   for (std::size_t i = 0; i < lines.size(); ++i, baseline += step)
-    detail::draw_text(image, lines[i], margin, baseline, (i == 0 ? first_line : 1) * letter, ink);
+    write(image, lines[i], margin, baseline, (i == 0 ? first_line : 1) * letter, weight(i));
   double left = margin;
   for (const LegendKey& key : keys) {
     fill(image, left, baseline - 1.1 * letter, left + 1.3 * letter, baseline + 0.2 * letter, key.color_srgb);
-    detail::draw_text(image, key.text, left + 1.8 * letter, baseline, letter, ink);
+    write(image, key.text, left + 1.8 * letter, baseline, letter);
     left += text_width(key.text, letter) + key_gap * letter;
   }
   return image;
 }
 
-void draw_caption(Image8& image, const std::string& line, const std::string& small_line) {
-  const double margin = image.width / 40.0, room = image.width - 2 * margin;
-  const auto letter = [&](const std::string& text, double wanted) {
-    return text.empty() ? 0 : std::min(wanted, room / double(text.size()));
+std::string letters_missing(const std::string& text) {
+  std::string missing;
+  for (std::size_t i = 0, length = 1; i < text.size(); i += length) {
+    length = detail::letter_at(text, i).second;
+    const std::string letter = text.substr(i, length);
+    if (!detail::has_letter(detail::letter_at(text, i).first) && missing.find(letter) == std::string::npos)
+      missing += letter;
+  }
+  return missing;
+}
+
+Eigen::Vector4d place_of_caption(int width, int height, const std::string& line,
+                                 const std::string& small_line, Corner corner) {
+  const Lines at = lines_of(width, height, line, small_line, corner);
+  const double top = line.empty() ? at.small_baseline - at.small_px : at.baseline - at.large_px,
+               bottom = small_line.empty() ? at.baseline + 0.4 * at.large_px
+                                           : at.small_baseline + 0.4 * at.small_px;
+  return {at.left, top, at.left + at.width, bottom};
+}
+
+void draw_caption(Image8& image, const std::string& line, const std::string& small_line,
+                  const CaptionLook& look) {
+  const Lines at = lines_of(image.width, image.height, line, small_line, look.corner);
+  const bool right = look.corner == Corner::bottom_right || look.corner == Corner::top_right;
+  const auto put = [&](const std::string& text, double baseline, double height_px, Weight weight) {
+    if (text.empty()) return;
+    const double left = right ? at.left + at.width - text_width(text, height_px, weight) : at.left;
+    detail::draw_text(image, text, left, baseline, on_picture(height_px, weight, look.on_dark));
   };
-  const double large = letter(line, image.height / 40.0), small = letter(small_line, image.height / 60.0);
-  const double baseline = image.height - margin;
-  const auto write = [&](const std::string& text, double y, double height) {
-    const double rim = 0.14 * height;  // pale, so that it reads on dark bodies too
-    for (const auto& [dx, dy] : {std::pair(-1.0, 0.0),
-                                 {1.0, 0.0},
-                                 {0.0, -1.0},
-                                 {0.0, 1.0},
-                                 {-0.7, -0.7},
-                                 {-0.7, 0.7},
-                                 {0.7, -0.7},
-                                 {0.7, 0.7}})
-      detail::draw_text(image, text, margin + rim * dx, y + rim * dy, height, white);
-    detail::draw_text(image, text, margin, y, height, ink);
+  put(small_line, at.small_baseline, at.small_px, Weight::regular);
+  put(line, at.baseline, at.large_px, Weight::semibold);
+}
+
+void draw_scale_bar(Image8& image, const std::string& words, double length_px, const CaptionLook& look) {
+  const double margin = image.width / 40.0, letter = image.height / 60.0, thick = image.height / 360.0;
+  const bool right = look.corner == Corner::bottom_right || look.corner == Corner::top_right;
+  const double left = right ? image.width - margin - length_px : margin, bottom = image.height - margin;
+  const Vec3 color = look.on_dark ? white : ink, rim = look.on_dark ? ink : white;
+  const double edge = std::max(1.0, 0.5 * thick), foot = 3 * thick;
+  const auto bar = [&](double wider, const Vec3& of) {
+    fill(image, left - wider, bottom - thick - wider, left + length_px + wider, bottom + wider, of);
+    for (const double x : {left, left + length_px - thick})
+      fill(image, x - wider, bottom - foot - wider, x + thick + wider, bottom + wider, of);
   };
-  write(small_line, baseline, small);
-  write(line, baseline - 1.9 * small, large);
+  bar(edge, rim);
+  bar(0, color);
+  detail::draw_text(image, words, left + 0.5 * (length_px - text_width(words, letter)),
+                    bottom - foot - 0.6 * letter, on_picture(letter, Weight::regular, look.on_dark));
 }
 
 void draw_color_bar(Image8& image, const ColorBar& bar) {
@@ -98,10 +163,10 @@ void draw_color_bar(Image8& image, const ColorBar& bar) {
   for (const auto& [value, label] : ticks) {
     const double y = bottom - (value - bar.low) / (bar.high - bar.low) * (bottom - top);
     fill(image, left + wide, y - 0.06 * letter, left + wide + 0.5 * letter, y + 0.06 * letter + 1, ink);
-    detail::draw_text(image, label, left + wide + 1.0 * letter, y + 0.5 * letter, letter, ink);
+    write(image, label, left + wide + 1.0 * letter, y + 0.5 * letter, letter);
   }
   const double width = text_width(bar.label, letter);
-  detail::draw_text(image, bar.label, image.width - margin - width, top - 1.6 * letter, letter, ink);
+  write(image, bar.label, image.width - margin - width, top - 1.6 * letter, letter);
 }
 
 std::vector<int> histogram_counts(const std::vector<double>& values, double low, double high, int bars) {
@@ -129,8 +194,7 @@ Image8 histogram(const std::vector<double>& values, const HistogramLook& look) {
     if (y > highest) continue;
     fill(image, left, py(y) - hair, right, py(y), grid);
     const std::string label = fmt::format("{:g}", y);
-    detail::draw_text(image, label, left - letter - text_width(label, letter), py(y) + 0.5 * letter, letter,
-                      ink);
+    write(image, label, left - letter - text_width(label, letter), py(y) + 0.5 * letter, letter);
   }
   const double bar_width = (look.high - look.low) / bars;
   for (int b = 0; b < bars; ++b)
@@ -141,12 +205,11 @@ Image8 histogram(const std::vector<double>& values, const HistogramLook& look) {
     if (x < look.low || x > look.high) continue;
     fill(image, px(x) - hair, bottom, px(x) + hair, bottom + 0.6 * letter, ink);
     const std::string label = fmt::format("{:g}", x);
-    detail::draw_text(image, label, px(x) - 0.5 * text_width(label, letter), bottom + 2.3 * letter, letter,
-                      ink);
+    write(image, label, px(x) - 0.5 * text_width(label, letter), bottom + 2.3 * letter, letter);
   }
-  detail::draw_text(image, look.y_label, left - 6 * letter, top - 2.5 * letter, letter, ink);
-  detail::draw_text(image, look.x_label, 0.5 * (left + right - text_width(look.x_label, letter)),
-                    bottom + 4.6 * letter, letter, ink);
+  write(image, look.y_label, left - 6 * letter, top - 2.5 * letter, letter);
+  write(image, look.x_label, 0.5 * (left + right - text_width(look.x_label, letter)), bottom + 4.6 * letter,
+        letter);
   return image;
 }
 

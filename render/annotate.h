@@ -1,6 +1,8 @@
-// Words on pictures: a caption with a legend below a picture, and a histogram. Printable ASCII only.
+// Words on pictures: a caption with a legend below a picture, captions, bars of colours and of length on it,
+// and a histogram. UTF-8; letters of Latin, Greek and Cyrillic alphabets (`letters_missing`).
 #pragma once
 
+#include <array>
 #include <functional>
 #include <string>
 #include <vector>
@@ -19,9 +21,25 @@ struct LegendKey {
 Image8 with_caption(const Image8& picture, const std::vector<std::string>& lines,
                     const std::vector<LegendKey>& keys = {});
 
-// Words on the picture itself, in its lower left corner: a line, and a smaller one below it; either may be
-// empty. Letters shrink until they fit.
-void draw_caption(Image8&, const std::string& line, const std::string& small_line);
+// The letters of a text that there is no picture of, each once.
+std::string letters_missing(const std::string& text);
+
+// Words on the picture itself, in a corner: a line, and a smaller one below it; either may be empty. Letters
+// shrink until they fit. Pale on dark ground, with a rim of the ground's value.
+enum class Corner { bottom_left, top_left, bottom_right, top_right };
+inline constexpr std::array corners{Corner::bottom_left, Corner::top_left, Corner::bottom_right,
+                                    Corner::top_right};
+struct CaptionLook {
+  Corner corner = Corner::bottom_left;
+  bool on_dark = false;
+};
+void draw_caption(Image8&, const std::string& line, const std::string& small_line, const CaptionLook& = {});
+// What that takes up of a picture of this size, pixels: left, top, right, bottom.
+Eigen::Vector4d place_of_caption(int width, int height, const std::string& line,
+                                 const std::string& small_line, Corner);
+
+// How long a length is on the picture: a bar of `length_px` and words over it, in a lower corner.
+void draw_scale_bar(Image8&, const std::string& words, double length_px, const CaptionLook&);
 
 // What a colour means, at the picture's right edge: `color_srgb` of 0 at the lower end, of 1 at the upper.
 struct ColorBar {

@@ -217,8 +217,9 @@ Image8 contact_sheet(const std::vector<fs::path>& frames, const std::vector<std:
   const int count = int(frames.size());
   const int columns = look.columns > 0 ? std::min(look.columns, count) : int(std::ceil(std::sqrt(count)));
   const int rows = (count + columns - 1) / columns;
-  std::size_t longest = 1;
-  for (const std::string& caption : captions) longest = std::max(longest, caption.size());
+  double longest = 1;  // as wide as so many capitals are high
+  for (const std::string& caption : captions)
+    longest = std::max(longest, detail::text_width(caption, 20) / 20);
 
   Image8 sheet;
   int tile_width = 0, tile_height = 0, caption_band = 0;
@@ -235,7 +236,7 @@ Image8 contact_sheet(const std::vector<fs::path>& frames, const std::vector<std:
       tile_height = std::max(1, int(std::lround(double(frame.height) * tile_width / frame.width)));
       if (!captions.empty()) {  // as large as reads well, and smaller where the longest would not fit
         caption_px = std::clamp(tile_width / 40.0, 6.0, 24.0);
-        caption_px = std::clamp(tile_width / double(longest), 4.0, caption_px);
+        caption_px = std::clamp(tile_width / longest, 4.0, caption_px);
         caption_band = int(std::ceil(3 * caption_px));
       }
       sheet =
@@ -251,7 +252,8 @@ Image8 contact_sheet(const std::vector<fs::path>& frames, const std::vector<std:
     place(frame, left, top);
     if (captions.empty()) continue;
     Image8 band = filled(tile_width, caption_band, look.background_srgb);
-    detail::draw_text(band, captions[f], 0, 1.9 * caption_px, caption_px, look.caption_srgb);
+    detail::draw_text(band, captions[f], 0, 1.9 * caption_px,
+                      {.height_px = caption_px, .color_srgb = look.caption_srgb});
     place(band, left, top + tile_height);
   }
   return sheet;

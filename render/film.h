@@ -27,9 +27,8 @@ struct SheetLook {
   Vec3 background_srgb = {1, 1, 1};
   Vec3 caption_srgb = {0.2, 0.22, 0.25};
 };
-// Frames in rows, a caption under each (captions: none, or one a frame, printable
-// ASCII; cut off where even small letters do not fit).
-// Throws InputError when a frame cannot be read or there is none.
+// Frames in rows, a caption under each (captions: none, or one a frame; cut off where even small letters do
+// not fit). Throws InputError when a frame cannot be read or there is none.
 Image8 contact_sheet(const std::vector<fs::path>& frames, const std::vector<std::string>& captions,
                      const SheetLook& = {});
 

@@ -196,17 +196,11 @@ Image8 plot_image(const std::vector<Curve>& curves, const PlotLook& look) {
   const Layout at = layout_of(curves, look);
   const Vec3 ink = Vec3::Constant(0.2), axis = Vec3::Constant(0.6), grid = Vec3::Constant(0.9),
              red(0.7, 0.33, 0.33);
-  constexpr double letter = 8;  // height and width of a capital
+  constexpr double letter = 8;  // height of a capital
   Image8 image = filled(look.width_px, look.height_px, Vec3::Ones());
   const auto text = [&](double x, double y, double share_left, const std::string& words, double size) {
-    std::string ascii;
-    for (std::size_t i = 0; i < words.size(); ++i) {  // the alphabet has no other letters; a minus is one
-      if (words.compare(i, 3, "−") == 0)
-        ascii += '-', i += 2;
-      else
-        ascii += words[i];
-    }
-    detail::draw_text(image, ascii, x - share_left * size * double(ascii.size()), y, size, ink);
+    detail::draw_text(image, words, x - share_left * detail::text_width(words, size), y,
+                      {.height_px = size, .color_srgb = ink});
   };
   text(at.left, 22, 0, look.title, 1.4 * letter);
   for (const double tick : at.y_ticks) {
@@ -231,7 +225,7 @@ Image8 plot_image(const std::vector<Curve>& curves, const PlotLook& look) {
       if (std::isfinite(y1) && std::isfinite(y2))
         draw_line(image, at.px(curve.x[i - 1]), at.py(y1), at.px(curve.x[i]), at.py(y2), 2, curve.color_srgb);
     }
-    const double width = 44 + letter * double(curve.name.size());
+    const double width = 44 + detail::text_width(curve.name, letter);
     if (at_x + width > at.right && at_x > at.left) at_x = at.left, at_y += 18;
     draw_line(image, at_x, at_y - 4, at_x + 20, at_y - 4, 4, curve.color_srgb);
     text(at_x + 27, at_y, 0, curve.name, letter);

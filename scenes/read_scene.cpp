@@ -826,9 +826,11 @@ FilmSpec read_film(const Node& table) {
   film.bounds_lines = flag(table, "bounds_lines");
   film.transparent = flag(table, "transparent");
   film.caption = text(table, "caption");
-  if (std::any_of(film.caption.begin(), film.caption.end(), [](char c) { return c < ' ' || c > '~'; }))
-    complain(child(table, "caption"), "film.caption has letters that cannot be drawn; use printable ASCII");
+  if (std::any_of(film.caption.begin(), film.caption.end(),
+                  [](unsigned char c) { return c < ' ' || c == 127; }))
+    complain(child(table, "caption"), "film.caption has letters that cannot be seen; it is one line");
   film.clock = flag(table, "clock");
+  film.scale_bar = flag(table, "scale_bar");
   film.color_by = read_color_by(text(table, "color_by"));
   if (table.find("color_range")) {
     film.color_range = vector2(table, "color_range");

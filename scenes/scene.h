@@ -222,8 +222,8 @@ struct FilmSpec {
   Vec3 background_srgb = Vec3::Zero();
   bool bounds_lines = true;  // draw the edges of the bounds as pale lines
   bool transparent = false;  // neither ground nor background
-  std::string caption;
-  bool clock = false;
+  std::string caption;       // UTF-8
+  bool clock = false, scale_bar = false;
   ColorBy color_by = ColorBy::body;
   std::optional<Eigen::Vector2d> color_range;  // nothing: over the whole motion
   bool cages = false, forces = false, path = false, tree = false, side_by_side = false;

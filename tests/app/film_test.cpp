@@ -46,7 +46,7 @@ TEST_F(Filmed_slow, EveryKeyOfTheFilmChangesThePicture) {
         "film.caption=Hello",       "film.bounds_lines=false",    "film.background=#102030",
         "film.transparent=true",    "camera.turn_deg=90",         "camera.follow=robot",
         "camera.direction=[1,0,0]", "bodies.robot.color=#00ff00", "bodies.robot.opacity=0.5",
-        "bodies.robot.metallic=1",  "bodies.robot.roughness=0.1"})
+        "bodies.robot.metallic=1",  "bodies.robot.roughness=0.1", "film.scale_bar=true"})
     EXPECT_NE(frame_3({"--set", set}), plain) << set;
   EXPECT_EQ(frame_3({}), plain);
   EXPECT_NE(frame_3({"--set", "bodies.robot.deformation=phong"}),
@@ -61,6 +61,8 @@ TEST_F(Filmed_slow, WhatWouldChangeTheMotionIsRefused) {
     EXPECT_THAT(refused.err, HasSubstr("the motion is planned already")) << set;
   }
   EXPECT_THAT(limber_program({"render", out(), "--camera", "left"}).err, HasSubstr("there are: main"));
+  EXPECT_THAT(limber_program({"render", out(), "--set", "film.caption=心"}).err,
+              HasSubstr("no letters for 心"));
   EXPECT_THAT(limber_program({"render", out(), "--as", "../x"}).err, HasSubstr("letters, digits"));
   EXPECT_THAT(limber_program({"render", out(), "--passes", "scalar"}).err, HasSubstr("film.color_by=strain"));
   EXPECT_THAT(limber_program({"render", out(), "--bits", "16", "--set", "film.clock=true"}).err,

@@ -321,6 +321,7 @@ const std::vector<Row> rows{
     {"film.transparent", "film.transparent=true", film},
     {"film.caption", "film.caption=words", film},
     {"film.clock", "film.clock=true", film},
+    {"film.scale_bar", "film.scale_bar=true", film},
     {"film.color_by", "film.color_by=speed", film},
     {"film.color_range", "film.color_range=[0, 0.2]", film},
     {"film.cages", "film.cages=true", film},

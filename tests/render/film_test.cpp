@@ -194,7 +194,7 @@ TEST(Sheet, CaptionsAreReadable) {
   std::map<std::vector<std::uint8_t>, char> seen;
   for (char letter = '!'; letter <= '~'; ++letter) {
     Image8 box = filled(24, 36, {1, 1, 1});
-    detail::draw_text(box, std::string(1, letter), 0, 26, 18, {0, 0, 0});
+    detail::draw_text(box, std::string(1, letter), 0, 26, {.height_px = 18, .color_srgb = {0, 0, 0}});
     EXPECT_NE(box, filled(24, 36, {1, 1, 1})) << letter;
     const auto [other, is_new] = seen.insert({box.rgb, letter});
     EXPECT_TRUE(is_new) << letter << " looks like " << other->second;

@@ -365,7 +365,8 @@ TEST(Sets, EditBeforeReading) {
   EXPECT_EQ(std::get<BoxModel>(read_scene(good, "s", {"bodies.robot.bevel_m=0.2"}).bodies[0].model).bevel_m,
             0.2);
   EXPECT_EQ(read_scene(good, "s", {"film.frames_per_second=60"}).film.frames_per_second, 60);
-  EXPECT_THROW(read_scene(good, "s", {"film.caption=\"Größe\""}), InputError);
+  EXPECT_EQ(read_scene(good, "s", {"film.caption=\"Größe\""}).film.caption, "Größe");
+  EXPECT_THROW(read_scene(good, "s", {"film.caption=\"two\\nlines\""}), InputError);
   EXPECT_EQ(read_scene(good, "s", {"description=two words"}).description, "two words");
   EXPECT_EQ(read_scene(good, "s", {"planner.seed=1", "planner.seed=2"}).planner.seed, 2);
   EXPECT_EQ(read_scene(good, "s", {"camera.keyframes.0.eye_m=[1,2,3]"}).cameras[0].keyframes[0].eye_m,
@@ -858,9 +859,9 @@ std::string all_of(const Scene& s) {
   t += fmt::format("\n{} {} {} {} {} {} {}", f.width_px, f.height_px, f.frames_per_second,
                    v(f.background_srgb), f.bounds_lines, f.sheet_columns, f.sheet_rows);
   for (const BodySpec& body : s.scenery) t += fmt::format(" {}", body.triangles);
-  return t + fmt::format("\n{} {} {} {} {} {} {} {} {} {} {} {} {}", f.speed, f.transparent, f.caption,
+  return t + fmt::format("\n{} {} {} {} {} {} {} {} {} {} {} {} {} {}", f.speed, f.transparent, f.caption,
                          f.clock, int(f.color_by), range[0], range[1], f.cages, f.forces, f.path, f.tree,
-                         f.side_by_side, s.scenery.size());
+                         f.side_by_side, f.scale_bar, s.scenery.size());
 }
 
 }  // namespace
