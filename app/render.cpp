@@ -103,7 +103,7 @@ scenes::Scene filmed_as(const scenes::Scene& planned, const std::vector<std::str
                       (last == "color" || last == "opacity" || last == "roughness" || last == "metallic" ||
                        (last == "deformation" && all_touched_at_cages(planned)));
     const bool film = key.starts_with("film.") && key != "film.speed" && key != "film.frames_per_second";
-    if (!look && !film && !key.starts_with("camera.") && !key.starts_with("cameras."))
+    if (!look && !film && key != "cameras" && !key.starts_with("camera.") && !key.starts_with("cameras."))
       throw InputError(fmt::format(
           "--set {}: the motion is planned already; what can be set here are film (but speed and "
           "frames_per_second), camera, cameras, and color, opacity, roughness and metallic of bodies (and "

@@ -240,7 +240,8 @@ render::Camera Shot::camera_of(int frame) const {
 std::string Shot::clock_at(int frame) const {
   const scenes::FilmSpec& film = scene_.film;
   if (!film.clock) return {};
-  std::string words = fmt::format("{:.1f} s", double(frame) / plan_.trajectory.frames_per_second);
+  const int decimals = film.speed < 0.5 ? 2 : 1;
+  std::string words = fmt::format("{:.{}f} s", double(frame) / plan_.trajectory.frames_per_second, decimals);
   if (film.speed < 1) words += fmt::format(" · {:.3g}× slow motion", 1 / film.speed);
   if (film.speed > 1) words += fmt::format(" · {:.3g}× time lapse", film.speed);
   return words;

@@ -53,6 +53,36 @@ TEST_F(Filmed_slow, EveryKeyOfTheFilmChangesThePicture) {
             frame_3({"--set", "bodies.robot.deformation=linear"}));
 }
 
+// Wherever the bodies are in the picture, no letter is on them.
+TEST_F(Filmed_slow, WordsStandWhereNoBodyIs) {
+  std::set<std::pair<bool, bool>> corners;
+  for (const double x : {-1.0, 1.0})
+    for (const double z : {-1.0, 1.0}) {
+      const std::string camera = fmt::format(
+          "cameras=[{{ name = \"near\", keyframes = [{{ at = 0, eye_m = [{0}, -9, {1}], target_m = [{0}, 0, "
+          "{1}] }}] }}]",
+          1.8 + 2.2 * x, 0.8 + 1.7 * z);
+      const std::vector<std::string> plain{"--camera", "near",   "--set", camera,
+                                           "--passes", "object", "--set", "film.bounds_lines=false"};
+      std::vector<std::string> with_words = plain;
+      with_words.insert(with_words.end(), {"--set", "film.caption=Hello", "--set", "film.clock=true"});
+      const render::Image8 before = frame_3(plain);
+      const render::Raster16 object = render::read_png_16(picture("0003.object.png"));
+      const render::Image8 after = frame_3(with_words);
+      int words = 0, on_body = 0;
+      double middle_x = 0, middle_y = 0;
+      for (std::size_t i = 0; i < object.levels.size(); ++i) {
+        if (std::equal(&before.rgb[3 * i], &before.rgb[3 * i] + 3, &after.rgb[3 * i])) continue;
+        ++words, on_body += object.levels[i] != 0;
+        middle_x += double(i % std::size_t(before.width)), middle_y += double(i / std::size_t(before.width));
+      }
+      ASSERT_GT(words, 20);
+      EXPECT_EQ(on_body, 0) << camera;
+      corners.insert({middle_x / words < before.width / 2.0, middle_y / words < before.height / 2.0});
+    }
+  EXPECT_GT(corners.size(), 1u) << "bodies stood in the way of none";
+}
+
 TEST_F(Filmed_slow, WhatWouldChangeTheMotionIsRefused) {
   for (const char* set : {"film.frames_per_second=10", "film.speed=0.5", "planner.seed=3", "goal.radius_m=1",
                           "bodies.robot.material.density_kg_m3=7"}) {

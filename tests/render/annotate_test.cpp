@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <numeric>
 
+#include "render/detail/lettering.h"
+
 namespace limber::render {
 namespace {
 
@@ -42,6 +44,67 @@ TEST(Caption, ALineOfAnyLengthFits) {
         if (pixel(image, x, y) != white) last = std::max(last, x);
     EXPECT_LT(last, 395) << length;
     EXPECT_GT(last, length == 300 ? 300 : 10) << "and no smaller than need be";
+  }
+}
+
+// Left, top, right and bottom of what is not white.
+Eigen::Vector4i ink_of(const Image8& image) {
+  Eigen::Vector4i box(image.width, image.height, -1, -1);
+  for (int y = 0; y < image.height; ++y)
+    for (int x = 0; x < image.width; ++x)
+      if (pixel(image, x, y) != Vec3::Ones())
+        box = {std::min(box[0], x), std::min(box[1], y), std::max(box[2], x), std::max(box[3], y)};
+  return box;
+}
+
+TEST(Lettering, IsAsHighAndAsWideAsItSays) {
+  using detail::text_width;
+  for (const double height : {9.0, 20.0, 41.0}) {
+    const double width = text_width("HEIGHT", height);
+    EXPECT_NEAR(width, text_width("HEIG", height) + text_width("HT", height), 1e-9);
+    EXPECT_NEAR(text_width("HEIGHT", 2 * height), 2 * width, 0.02 * width);
+    Image8 image = filled(400, 100, {1, 1, 1});
+    detail::draw_text(image, "HH", 10, 80, {.height_px = height, .color_srgb = {0, 0, 0}});
+    const Eigen::Vector4i ink = ink_of(image);
+    EXPECT_NEAR(80 - ink[1], height, 1.5);
+    EXPECT_EQ(ink[3], 79);
+    EXPECT_GE(ink[0], 10);
+    EXPECT_LE(ink[2], 10 + text_width("HH", height));
+  }
+}
+
+TEST(Lettering, DrawsAsMuchAsThePictureHas) {
+  for (const auto& [x, y] :
+       {std::pair(-20.0, 10.0), {45.0, 10.0}, {5.0, -3.0}, {5.0, 70.0}, {-500.0, 500.0}}) {
+    Image8 image = filled(50, 50, {1, 1, 1});
+    detail::draw_text(image, "Wg", x, y, {.height_px = 20, .color_srgb = {0, 0, 0}, .rim_px = 3});
+    SUCCEED();
+  }
+  Image8 half = filled(50, 50, {1, 1, 1}), whole = filled(100, 50, {1, 1, 1});
+  const detail::TextLook look{.height_px = 20, .color_srgb = {0, 0, 0}};
+  detail::draw_text(half, "Wg", 30, 30, look);
+  detail::draw_text(whole, "Wg", 30, 30, look);
+  for (int y = 0; y < 50; ++y)
+    for (int x = 0; x < 50; ++x) EXPECT_EQ(pixel(half, x, y), pixel(whole, x, y));
+}
+
+TEST(Lettering, SaysWhichLettersItLacks) {
+  EXPECT_EQ(letters_missing("Größe 5× – λ, Ж: 3 µm"), "");
+  EXPECT_EQ(letters_missing("a 心 b 心 肺"), "心肺");
+  EXPECT_EQ(letters_missing("\xff"), detail::has_letter(0xfffd) ? "" : "\xff");
+}
+
+TEST(ScaleBar, IsAsLongAsItShouldBe) {
+  for (const Corner corner : {Corner::bottom_left, Corner::bottom_right}) {
+    Image8 image = filled(640, 360, {0.5, 0.5, 0.5});
+    draw_scale_bar(image, "5 cm", 123, {.corner = corner});
+    int longest = 0;
+    for (int y = 0; y < image.height; ++y) {
+      int run = 0;
+      for (int x = 0; x < image.width; ++x)
+        longest = std::max(longest, run = pixel(image, x, y).maxCoeff() < 0.3 ? run + 1 : 0);
+    }
+    EXPECT_EQ(longest, 123);
   }
 }
 
