@@ -59,9 +59,9 @@ TEST_F(Filmed_slow, WordsStandWhereNoBodyIs) {
   for (const double x : {-1.0, 1.0})
     for (const double z : {-1.0, 1.0}) {
       const std::string camera = fmt::format(
-          "cameras=[{{ name = \"near\", keyframes = [{{ at = 0, eye_m = [{0}, -9, {1}], target_m = [{0}, 0, "
+          "cameras=[{{ name = \"near\", keyframes = [{{ at = 0, eye_m = [{0}, -4, {1}], target_m = [{0}, 1, "
           "{1}] }}] }}]",
-          1.8 + 2.2 * x, 0.8 + 1.7 * z);
+          2 + 2.3 * x, 0.45 + 1.1 * z);
       const std::vector<std::string> plain{"--camera", "near",   "--set", camera,
                                            "--passes", "object", "--set", "film.bounds_lines=false"};
       std::vector<std::string> with_words = plain;
