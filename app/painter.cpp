@@ -290,9 +290,7 @@ render::Image8 Shot::Painter::annotated(render::Image8 image, int frame) const {
   const std::string clock = shot_.clock_at(frame);
   if (!film.caption.empty() || !clock.empty()) render::draw_caption(image, film.caption, clock, shot_.words_);
   if (film.scale_bar) {
-    const render::Camera camera = shot_.camera_of(frame);
-    const double pixels = 0.5 * image.height / std::tan(0.5 * camera.fov_deg * EIGEN_PI / 180) /
-                          (camera.target - camera.eye).norm() * shot_.scale_m_;
+    const double pixels = shot_.scale_m_ * shot_.pixels_a_metre(shot_.camera_of(frame));
     const bool taken = shot_.words_.corner == render::Corner::bottom_right;
     render::draw_scale_bar(image, length_words(shot_.scale_m_), pixels,
                            {.corner = taken ? render::Corner::bottom_left : render::Corner::bottom_right,

@@ -3,6 +3,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 
@@ -12,6 +13,7 @@
 #include "core/version.h"
 #include "fem/control_forces.h"
 #include "fem/observe.h"
+#include "render/film.h"
 
 namespace limber::app {
 
@@ -57,11 +59,18 @@ std::vector<Eigen::Index> outermost_of(const Points& positions) {
   return outermost;
 }
 
+// The binding of those vertices alone.
+ffd::Binding outermost_part(const PreparedBody& body) {
+  const std::vector<Eigen::Index> outermost = outermost_of(body.surface.positions);
+  return {body.binding.tet_from_vertex(outermost), body.binding.weights(outermost, Eigen::all)};
+}
+
 // A convex polygon round points of the plane, counter-clockwise (Andrew's monotone chain, 1979).
 std::vector<Eigen::Vector2d> convex_hull(std::vector<Eigen::Vector2d> points) {
   std::sort(points.begin(), points.end(),
             [](const auto& a, const auto& b) { return std::pair(a.x(), a.y()) < std::pair(b.x(), b.y()); });
   std::vector<Eigen::Vector2d> hull;
+  if (points.empty()) return hull;
   for (int side = 0; side < 2; ++side, std::reverse(points.begin(), points.end())) {
     const std::size_t first = hull.size();
     for (const Eigen::Vector2d& p : points) {
@@ -179,9 +188,7 @@ Points Shot::outline_of_motion(int subject) const {
   for (std::size_t b = 0; b < bodies_.size(); ++b) {
     if (subject >= 0 && int(b) != subject) continue;
     const PreparedBody& body = bodies_[b];
-    const std::vector<Eigen::Index> outermost = outermost_of(body.surface.positions);
-    const ffd::Binding part{body.binding.tet_from_vertex(outermost),
-                            body.binding.weights(outermost, Eigen::all)};
+    const ffd::Binding part = outermost_part(body);
     Points places;
     for (const State& state : plan_.trajectory.frames) {
       const Points nodes = fem::body_positions(world_, state, int(b));
@@ -247,48 +254,51 @@ std::string Shot::clock_at(int frame) const {
   return words;
 }
 
+double Shot::pixels_a_metre(const render::Camera& camera) const {
+  return 0.5 * look_.height / std::tan(0.5 * camera.fov_deg * EIGEN_PI / 180) /
+         (camera.target - camera.eye).norm();
+}
+
 // The corner where they hide least of the bodies over the film; of equals the first.
 void Shot::place_words() {
   constexpr int most_frames = 24, across = 16, down = 4;
   const scenes::FilmSpec& film = scene_.film;
   words_.on_dark = look_.background_bottom_srgb.mean() < 0.4;
-  if (film.scale_bar) {
-    const render::Camera camera = camera_of(0);
-    const double seen_m = 2 * (camera.target - camera.eye).norm() *
-                          std::tan(0.5 * camera.fov_deg * EIGEN_PI / 180) * look_.width / look_.height;
-    scale_m_ = round_length_m(0.2 * seen_m);
-  }
+  if (film.scale_bar) scale_m_ = round_length_m(0.2 * look_.width / pixels_a_metre(camera_of(0)));
   const std::string clock = clock_at(frames() - 1);
   if (film.caption.empty() && clock.empty()) return;
-  std::map<render::Corner, int> hidden;
-  for (int i = 0; i < std::min(frames(), most_frames); ++i) {
-    const int frame = int(std::int64_t(i) * (frames() - 1) / std::max(1, most_frames - 1));
-    for (std::size_t b = 0; b < bodies_.size(); ++b) {
-      const std::vector<Eigen::Index> outermost = outermost_of(bodies_[b].surface.positions);
-      const ffd::Binding part{bodies_[b].binding.tet_from_vertex(outermost),
-                              bodies_[b].binding.weights(outermost, Eigen::all)};
-      Points places;
+  // Places within the words of each corner, where two views are side by side those in their own one.
+  const int width = look_.width * (film.side_by_side ? 2 : 1);
+  std::array<std::vector<Eigen::Vector2d>, render::corners.size()> places_of;
+  for (std::size_t c = 0; c < places_of.size(); ++c) {
+    const Eigen::Vector4d box =
+        render::place_of_caption(width, look_.height, film.caption, clock, render::corners[c]);
+    for (int x = 0; x < across; ++x)
+      for (int y = 0; y < down; ++y)
+        places_of[c].emplace_back(std::fmod(box[0] + (box[2] - box[0]) * (x + 0.5) / across, look_.width),
+                                  box[1] + (box[3] - box[1]) * (y + 0.5) / down);
+  }
+  std::array<int, render::corners.size()> hidden{};
+  Points outermost;
+  for (std::size_t b = 0; b < bodies_.size(); ++b) {
+    const ffd::Binding part = outermost_part(bodies_[b]);
+    for (const int frame : render::spread_over(frames(), most_frames)) {
       deform(bodies_[b], part,
-             fem::body_positions(world_, plan_.trajectory.frames[std::size_t(frame)], int(b)), places);
-      std::vector<Eigen::Vector2d> seen;
+             fem::body_positions(world_, plan_.trajectory.frames[std::size_t(frame)], int(b)), outermost);
       const render::Camera camera = camera_of(frame);
-      for (Eigen::Index p = 0; p < places.rows(); ++p) {
-        const Vec3 pixel = render::pixel_from_world(camera, places.row(p), look_.width, look_.height);
+      std::vector<Eigen::Vector2d> seen;
+      for (Eigen::Index p = 0; p < outermost.rows(); ++p) {
+        const Vec3 pixel = render::pixel_from_world(camera, outermost.row(p), look_.width, look_.height);
         if (pixel.z() > 0) seen.push_back(pixel.head<2>());
       }
       const std::vector<Eigen::Vector2d> hull = convex_hull(std::move(seen));
-      for (const render::Corner corner : render::corners) {
-        const Eigen::Vector4d box =
-            render::place_of_caption(look_.width, look_.height, film.caption, clock, corner);
-        for (int x = 0; x < across; ++x)
-          for (int y = 0; y < down; ++y)
-            hidden[corner] += holds(hull, {box[0] + (box[2] - box[0]) * (x + 0.5) / across,
-                                           box[1] + (box[3] - box[1]) * (y + 0.5) / down});
-      }
+      for (std::size_t c = 0; c < places_of.size(); ++c)
+        hidden[c] += int(std::count_if(places_of[c].begin(), places_of[c].end(),
+                                       [&](const Eigen::Vector2d& place) { return holds(hull, place); }));
     }
   }
-  words_.corner = *std::min_element(render::corners.begin(), render::corners.end(),
-                                    [&](auto a, auto b) { return hidden[a] < hidden[b]; });
+  words_.corner =
+      render::corners[std::size_t(std::min_element(hidden.begin(), hidden.end()) - hidden.begin())];
 }
 
 void Shot::measure_depths() {

@@ -74,6 +74,7 @@ class Shot {
   void check() const;
   void place_words();
   std::string clock_at(int frame) const;
+  double pixels_a_metre(const render::Camera&) const;  // at the distance of what it looks at
   void measure_depths();
   void measure_colors();
   void measure_forces();

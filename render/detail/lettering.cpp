@@ -15,9 +15,9 @@
 #include "core/error.h"
 
 // The font's files, as they are, between two names each.
-#define LIMBER_INCLUDE_BYTES(name, file)                                                                  \
-  asm(".section .rodata\n.global " #name "\n.balign 16\n" #name ":\n.incbin \"" file "\"\n.global " #name \
-      "_end\n" #name "_end:\n.byte 0\n.text\n");                                                          \
+#define LIMBER_INCLUDE_BYTES(name, file)                                                 \
+  asm(".pushsection .rodata\n.global " #name "\n.balign 16\n" #name ":\n.incbin \"" file \
+      "\"\n.global " #name "_end\n" #name "_end:\n.byte 0\n.popsection\n");              \
   extern "C" const unsigned char name[], name##_end[]
 LIMBER_INCLUDE_BYTES(limber_font_regular, LIMBER_FONTS "/OpenSans-Regular.ttf");
 LIMBER_INCLUDE_BYTES(limber_font_semibold, LIMBER_FONTS "/OpenSans-Semibold.ttf");

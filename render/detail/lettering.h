@@ -11,7 +11,7 @@ namespace limber::render::detail {
 
 enum class Weight { regular, semibold };
 
-// UTF-8 in, whole pixels not asked for; what the font has no letter for comes out as its box. The height is
+// UTF-8; places need not be whole pixels; what the font has no letter for comes out as its box. The height is
 // that of a capital.
 double text_width(std::string_view, double height_px, Weight = Weight::regular);
 struct TextLook {
