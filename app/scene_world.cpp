@@ -1,6 +1,7 @@
 #include "app/scene_world.h"
 
 #include <numbers>
+#include <set>
 
 #include "app/seen.h"
 #include "app/write_robot.h"
@@ -448,11 +449,35 @@ ContactShape shape_of_cage(const TetMesh& cage) {
   return meshing::make_contact_shape({cage.positions, boundary_triangles(cage.tets)}, cage);
 }
 
-// Whether parts of a surface can meet without folding it flat: it is far from convex.
+double hull_volume(const Points& positions) {
+  const ConvexShell hull = meshing::convex_hull(positions);
+  return volume(SurfaceMesh{hull.vertices, hull.triangles});
+}
+
+// The farthest along evenly many directions.
+Points some_extreme_points(const Points& positions) {
+  constexpr int along_an_edge = 6;  // of a cube, through whose surface the directions go
+  std::set<Eigen::Index> rows;
+  for (int i = -along_an_edge; i <= along_an_edge; ++i)
+    for (int j = -along_an_edge; j <= along_an_edge; ++j)
+      for (int axis = 0; axis < 3; ++axis) {
+        Vec3 direction;
+        direction[axis] = along_an_edge, direction[(axis + 1) % 3] = i, direction[(axis + 2) % 3] = j;
+        const Eigen::VectorXd heights = positions * direction;
+        Eigen::Index least, most;
+        heights.minCoeff(&least), heights.maxCoeff(&most);
+        rows.insert({least, most});
+      }
+  return positions(std::vector<Eigen::Index>(rows.begin(), rows.end()), Eigen::all);
+}
+
+// Whether parts of a surface can meet without folding it flat: it is far from convex. The hull of some points
+// is within that of all, and says so at once of most models.
 bool can_reach_itself(const PreparedBody& body) {
   constexpr double convex = 0.9;  // of its hull
-  const ConvexShell hull = meshing::convex_hull(body.surface.positions);
-  return std::abs(volume(body.surface)) < convex * volume(SurfaceMesh{hull.vertices, hull.triangles});
+  const double filled = std::abs(volume(body.surface));
+  return filled < convex * hull_volume(some_extreme_points(body.surface.positions)) ||
+         filled < convex * hull_volume(body.surface.positions);
 }
 
 // Contact at the fine surfaces, unless all bodies are touched at their cages.

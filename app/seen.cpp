@@ -64,8 +64,6 @@ double gap_to_wall(const Box& bounds, const Side& side, const Box& surface) {
   return std::max(0.0, gap);
 }
 
-constexpr double no_limit = 1e100;  // m
-
 class Surfaces {
  public:
   Surfaces(const fem::World& world, const std::vector<PreparedBody>& bodies)
@@ -105,8 +103,8 @@ class Surfaces {
                               gap_to_wall(world_.bounds_m, side, {near, near})});
       } else {
         const meshing::PlacedSurface& other = *now[std::size_t(side.other)];
-        frame.gaps.push_back({side.body, side.other, meshing::gap(one, other, no_limit).distance_m,
-                              gap_near(one, other, press.place_m)});
+        const double near = gap_near(one, other, press.place_m);
+        frame.gaps.push_back({side.body, side.other, meshing::gap(one, other, near).distance_m, near});
       }
     }
     return frame;

@@ -39,41 +39,67 @@ std::array<int, 4> first_tetrahedron(const std::vector<Vec3>& points) {
   return {a, b, c, d};
 }
 
+// Points are put in one by one. Each that is still outside hangs on one face that sees it, so what is inside
+// is not asked again (Barber, Dobkin and Huhdanpaa, The quickhull algorithm for convex hulls, 1996): a point
+// above a face that goes is above one of those that come, or inside. For if it is above some face that stays,
+// then, since what it sees is connected, above two that meet at the rim, and so above the new one between
+// them.
 std::vector<Face> hull_faces(const std::vector<Vec3>& points) {
   const auto at = [&](int i) -> const Vec3& { return points[std::size_t(i)]; };
+  const auto sees = [&](const Face& f, int p) {
+    return detail::orientation(at(f[0]), at(f[1]), at(f[2]), at(p)) > 0;
+  };
   auto [a, b, c, d] = first_tetrahedron(points);
   if (detail::orientation(at(a), at(b), at(c), at(d)) > 0) std::swap(b, c);
-  std::vector<Face> faces = {{a, b, c}, {a, d, b}, {b, d, c}, {c, d, a}};
+  struct Seen {
+    Face face;
+    std::vector<int> by;  // of those outside
+  };
+  std::vector<Seen> faces = {{{a, b, c}, {}}, {{a, d, b}, {}}, {{b, d, c}, {}}, {{c, d, a}, {}}};
+  std::vector<char> outside(points.size(), 0);
+  const auto hang = [&](int p, std::size_t first_face) {
+    const auto seen = std::find_if(faces.begin() + std::ptrdiff_t(first_face), faces.end(),
+                                   [&](const Seen& f) { return sees(f.face, p); });
+    outside[std::size_t(p)] = seen != faces.end();
+    if (seen != faces.end()) seen->by.push_back(p);
+  };
+  for (int p = 0; p < int(points.size()); ++p) hang(p, 0);
 
   // Far points first: most of the others are then inside at once.
   const Vec3 center = (at(a) + at(b) + at(c) + at(d)) / 4;
-  std::vector<int> order(points.size());
+  std::vector<int> order(points.size()), loose;
   std::iota(order.begin(), order.end(), 0);
   std::stable_sort(order.begin(), order.end(), [&](int i, int j) {
     return (at(i) - center).squaredNorm() > (at(j) - center).squaredNorm();
   });
-  std::vector<Face> kept;
   std::vector<std::array<int, 2>> sides;
   for (int p : order) {
+    if (!outside[std::size_t(p)]) continue;
     throw_if_stopped();
-    kept.clear(), sides.clear();
-    for (const Face& f : faces) {
-      if (detail::orientation(at(f[0]), at(f[1]), at(f[2]), at(p)) <= 0) {
-        kept.push_back(f);
-      } else {
-        for (std::size_t k = 0; k < 3; ++k) sides.push_back({f[k], f[(k + 1) % 3]});
+    sides.clear(), loose.clear();
+    std::size_t kept = 0;
+    for (Seen& f : faces) {
+      if (!sees(f.face, p)) {
+        if (&faces[kept] != &f) faces[kept] = std::move(f);
+        ++kept;
+        continue;
       }
+      for (std::size_t k = 0; k < 3; ++k) sides.push_back({f.face[k], f.face[(k + 1) % 3]});
+      loose.insert(loose.end(), f.by.begin(), f.by.end());
     }
-    if (sides.empty()) continue;
+    faces.resize(kept);
     // The rim: sides of visible faces whose other side is not visible. With exact signs it is one loop.
     std::vector<std::array<int, 2>> sorted = sides;
     std::sort(sorted.begin(), sorted.end());
     for (const auto& side : sides)
       if (!std::binary_search(sorted.begin(), sorted.end(), std::array<int, 2>{side[1], side[0]}))
-        kept.push_back({side[0], side[1], p});
-    faces.swap(kept);
+        faces.push_back({{side[0], side[1], p}, {}});
+    for (const int q : loose)
+      if (q != p) hang(q, kept);
   }
-  return faces;
+  std::vector<Face> all;
+  for (const Seen& f : faces) all.push_back(f.face);
+  return all;
 }
 
 // A vertex inside a flat face or on a straight edge has fewer than three folded edges.

@@ -1,8 +1,9 @@
 #include "meshing/surface_overlap.h"
 
+#include <Eigen/SVD>
+
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 #include "core/error.h"
 #include "core/highest_along.h"
@@ -278,16 +279,30 @@ SurfaceGap gap(const PlacedSurface& a, const PlacedSurface& b, double farthest_m
 
 namespace {
 
+// Between 0 and π, by cosine and sine: no function of angles need be asked.
+struct Angle {
+  double cos = 1, sin = 0;
+  static Angle of(double cosine) {
+    const double c = std::clamp(cosine, -1.0, 1.0);
+    return {c, std::sqrt(1 - c * c)};
+  }
+  static Angle straight() { return {-1, 0}; }
+};
+Angle operator+(const Angle& a, const Angle& b) {  // π where it would be more
+  const double sin = a.sin * b.cos + a.cos * b.sin;
+  const bool more = sin < 0 || (a.cos < 0 && b.cos < 0);
+  return more ? Angle::straight() : Angle{a.cos * b.cos - a.sin * b.sin, sin};
+}
+
 // That holds the normals of a node's triangles. A piece of surface all of whose normals have a common
 // half-space hardly ever passes through itself (Volino and Magnenat-Thalmann 1994).
 struct Cone {
   Vec3 axis;
-  double half_angle;
+  Angle half_angle;
 };
-double angle_between(const Vec3& a, const Vec3& b) { return std::acos(std::clamp(a.dot(b), -1.0, 1.0)); }
 bool in_one_half(const Cone& a, const Cone& b) {
-  const double both = a.half_angle + b.half_angle;
-  return both < std::numbers::pi && a.axis.dot(b.axis) > -std::cos(both);
+  const Angle both = a.half_angle + b.half_angle;
+  return both.cos > -1 && a.axis.dot(b.axis) > -both.cos;
 }
 
 std::vector<Cone> cones_of(const PlacedSurface& surface) {
@@ -295,21 +310,21 @@ std::vector<Cone> cones_of(const PlacedSurface& surface) {
   for (std::size_t n = cones.size(); n-- > 0;) {
     const auto& place = surface.shape().tree.nodes[n];
     Cone& cone = cones[n];
-    cone = {surface.nodes()[n].area_vector.normalized(), 0};
+    cone = {surface.nodes()[n].area_vector.normalized(), {}};
+    double least = 1;  // cosine
     if (place.leaf()) {
-      double least = 1;
       for (int t = place.begin; t < place.end; ++t) {
         const Tri tri = surface.corners(t);
         const Vec3 area = (tri[1] - tri[0]).cross(tri[2] - tri[0]);
         least = std::min(least, cone.axis.dot(area) / area.norm());
       }
-      cone.half_angle = least > -1 ? std::acos(std::min(1.0, least)) : std::numbers::pi;
     } else {
-      for (const int child : {place.left, place.right})
-        cone.half_angle = std::max(cone.half_angle, angle_between(cone.axis, cones[std::size_t(child)].axis) +
-                                                        cones[std::size_t(child)].half_angle);
+      for (const int child : {place.left, place.right}) {
+        const Cone& part = cones[std::size_t(child)];
+        least = std::min(least, (Angle::of(cone.axis.dot(part.axis)) + part.half_angle).cos);
+      }
     }
-    if (!(cone.half_angle < std::numbers::pi)) cone.half_angle = std::numbers::pi;
+    cone.half_angle = least > -1 ? Angle::of(least) : Angle::straight();
   }
   return cones;
 }
@@ -319,6 +334,28 @@ class OwnSurface {
  public:
   OwnSurface(const PlacedSurface& now, const PlacedSurface& at_rest)
       : now_(now), rest_(at_rest), near_m_(own_neighbourhood * at_rest.box().size().maxCoeff()) {}
+
+  // Whether every vertex is so near to where some rigid motion takes it from rest that no two places meet
+  // which were not near there. Of triangles it then holds, too, however the vertices were moved.
+  bool keeps_its_shape() const {
+    const Points &rest = rest_.positions(), &now = now_.positions();
+    if (rest.rows() == 0) return true;
+    const Eigen::RowVector3d rest_center = rest.colwise().mean(), center = now.colwise().mean();
+    // Kabsch, A solution for the best rotation to relate two sets of vectors (1976).
+    const Eigen::Matrix3d covariance = (rest.rowwise() - rest_center).transpose() * (now.rowwise() - center);
+    const Eigen::JacobiSVD<Eigen::Matrix3d> svd(covariance, Eigen::ComputeFullU | Eigen::ComputeFullV);
+    Eigen::Matrix3d turn = svd.matrixU() * svd.matrixV().transpose();  // of rows, from the right
+    if (turn.determinant() < 0) {
+      Eigen::Matrix3d u = svd.matrixU();
+      u.col(2) = -u.col(2);
+      turn = u * svd.matrixV().transpose();
+    }
+    const double most = 0.499 * near_m_;
+    for (Eigen::Index v = 0; v < rest.rows(); ++v)
+      if (!((now.row(v) - center - (rest.row(v) - rest_center) * turn).squaredNorm() <= most * most))
+        return false;
+    return true;
+  }
 
   std::vector<Crossing> crossings(std::vector<int>& corners) const {
     std::vector<Crossing> found;
@@ -430,6 +467,7 @@ class OwnSurface {
 SurfaceOverlap self_overlap(const PlacedSurface& now, const PlacedSurface& at_rest) {
   LIMBER_CHECK(&now.shape() == &at_rest.shape());
   const OwnSurface own(now, at_rest);
+  if (own.keeps_its_shape()) return {};
   std::vector<int> seeds;
   const std::vector<Crossing> crossings = own.crossings(seeds);
   if (crossings.empty()) return {};

@@ -28,7 +28,8 @@ Friction<Real>::Friction(const World& world)
     : world_(world),
       tables_(tables_of<Real>(world)),
       dt_(Real(world.dt_s)),
-      slot_of_node_(std::size_t(world.nodes), -1) {
+      slot_of_node_(std::size_t(world.nodes), -1),
+      wall_loads_(6 * world.bodies.size()) {
   for (const Body& body : world.bodies)
     if (body.kind == BodyKind::rigid) spins_.resize(world.bodies.size());
 }
@@ -43,6 +44,7 @@ void Friction<Real>::begin() {
   for (const Slot& slot : slots_) slot_of_node_[std::size_t(slot.node)] = -1;
   for (Spin& spin : spins_) spin.met = false;
   slots_.clear(), shares_.clear(), slips_.clear();
+  wall_nodes_of_slot_.clear(), wall_nodes_.clear(), wall_tellings_.clear(), wall_shares_.clear();
 }
 
 template <class Real>
@@ -51,6 +53,7 @@ int Friction<Real>::slot_of(int node, int body) {
   if (slot < 0) {
     slot = int(slots_.size());
     slots_.push_back({node, body});
+    wall_nodes_of_slot_.push_back({-1, -1, -1, -1, -1, -1});
   }
   return slot;
 }
@@ -60,6 +63,7 @@ void Friction<Real>::add(int body, int against, const Real place[3], const Real 
                          const Share<Real>* first, const Share<Real>* second, const Share<Real>* last,
                          int told, Real told_share) {
   if (!(most > 0)) return;
+  if (against < 0 && !is_rigid(body)) return bear(body, normal, dt_ * most, first, last, told);
   Slip& slip = slips_.emplace_back();
   slip.side[0] = body, slip.side[1] = against;
   std::copy_n(place, 3, slip.place), std::copy_n(normal, 3, slip.normal);
@@ -78,6 +82,48 @@ void Friction<Real>::add(int body, int against, const Real place[3], const Real 
   }
   for (const int side : slip.side)
     if (is_rigid(side)) spins_[std::size_t(side)].met = true;
+}
+
+template <class Real>
+void Friction<Real>::bear(int body, const Real normal[3], Real most, const Share<Real>* first,
+                          const Share<Real>* last, int told) {
+  int axis = 0;
+  while (axis < 2 && normal[axis] == 0) ++axis;
+  const int side = normal[axis] > 0 ? axis : 3 + axis, first_share = int(wall_shares_.size());
+  for (const Share<Real>* share = first; share < last; ++share) {
+    if (!(tables_.inverse_mass[share->node] > 0)) continue;
+    const int slot = slot_of(share->node, body);
+    int& wall_node = wall_nodes_of_slot_[std::size_t(slot)][std::size_t(side)];
+    if (wall_node < 0) {
+      wall_node = int(wall_nodes_.size());
+      wall_nodes_.push_back({slot, body, side, 0, 0, false, {0, 0, 0}});
+    }
+    wall_nodes_[std::size_t(wall_node)].load += share->weight * most;
+    if (told >= 0) wall_shares_.push_back({wall_node, share->weight * most});
+  }
+  if (told >= 0) wall_tellings_.push_back({told, first_share, int(wall_shares_.size())});
+}
+
+// Weights of Phong Deformation may be negative, and so may what a node bears in all; it then holds nothing,
+// and the others so much less that the wall exerts no more than μ times what presses it.
+template <class Real>
+void Friction<Real>::limit_wall_nodes() {
+  const auto load_of = [&](const WallNode& node) -> WallLoad& {
+    return wall_loads_[std::size_t(6 * node.body + node.side)];
+  };
+  for (const WallNode& node : wall_nodes_)
+    load_of(node).all += node.load, load_of(node).positive += std::max(node.load, Real(0));
+  for (const Slip& slip : slips_)
+    for (int k = slip.first_soft; k < slip.last_soft; ++k)
+      for (const int wall_node : wall_nodes_of_slot_[std::size_t(shares_[std::size_t(k)].slot)])
+        if (wall_node >= 0) wall_nodes_[std::size_t(wall_node)].meets_others = true;
+  for (WallNode& node : wall_nodes_) {
+    for (const int other : wall_nodes_of_slot_[std::size_t(node.slot)])
+      node.meets_others |= other >= 0 && &wall_nodes_[std::size_t(other)] != &node;
+    const WallLoad& of_all = load_of(node);
+    node.most = of_all.all > 0 ? std::max(node.load, Real(0)) * (of_all.all / of_all.positive) : Real(0);
+  }
+  for (const WallNode& node : wall_nodes_) load_of(node) = WallLoad{};
 }
 
 template <class Real>
@@ -200,16 +246,43 @@ Real Friction<Real>::step_of(Slip& slip) {
   return std::sqrt(dot(change, change)) / slip.most;
 }
 
+// The same of a node at a wall.
+template <class Real>
+Real Friction<Real>::step_of(WallNode& node) {
+  if (!(node.most > 0)) return 0;
+  Velocity& velocity = velocities_[std::size_t(node.slot)];
+  const Real inverse_mass = tables_.inverse_mass[slots_[std::size_t(node.slot)].node];
+  Real wanted[3], square = 0;
+  for (int c = 0; c < 3; ++c) {
+    wanted[c] = c == node.side % 3 ? Real(0) : node.impulse[c] - velocity.at[c] / inverse_mass;
+    square += wanted[c] * wanted[c];
+  }
+  const Real scale = square > node.most * node.most ? node.most / std::sqrt(square) : Real(1);
+  Real change2 = 0;
+  for (int c = 0; c < 3; ++c) {
+    const Real change = scale * wanted[c] - node.impulse[c];
+    node.impulse[c] += change, velocity.at[c] += inverse_mass * change, change2 += change * change;
+  }
+  return std::sqrt(change2) / node.most;
+}
+
 template <class Real>
 void Friction<Real>::add_forces(const LaneView<Real>& view, const std::vector<const Real*>& pushes,
                                 std::vector<Exerted<Real>>* told) {
-  if (slips_.empty()) return;
-  predict(view, pushes);
+  if (slips_.empty() && wall_nodes_.empty()) return;
+  predict(view, pushes), limit_wall_nodes();
+  for (WallNode& node : wall_nodes_)
+    if (!node.meets_others) step_of(node);
   for (int sweep = 0; sweep < most_sweeps; ++sweep) {
     Real most = 0;
     for (Slip& slip : slips_) most = std::max(most, step_of(slip));
+    for (WallNode& node : wall_nodes_)
+      if (node.meets_others) most = std::max(most, step_of(node));
     if (!(most > Real(settled))) break;
   }
+  for (const WallNode& node : wall_nodes_)
+    for (int c = 0; c < 3; ++c)
+      view.f[view.force.at(slots_[std::size_t(node.slot)].node, c)] += node.impulse[c] / dt_;
   for (const Slip& slip : slips_) {
     const Real force[3] = {slip.impulse[0] / dt_, slip.impulse[1] / dt_, slip.impulse[2] / dt_};
     for (int k = slip.first; k < slip.last; ++k) {
@@ -221,6 +294,13 @@ void Friction<Real>::add_forces(const LaneView<Real>& view, const std::vector<co
     if (told && slip.told >= 0)
       for (int c = 0; c < 3; ++c) (*told)[std::size_t(slip.told)].force[c] += slip.told_share * force[c];
   }
+  for (const WallTelling& telling : wall_tellings_)
+    for (int k = telling.first; told && k < telling.last; ++k) {
+      const auto [wall_node, most] = wall_shares_[std::size_t(k)];
+      const WallNode& node = wall_nodes_[std::size_t(wall_node)];
+      for (int c = 0; c < 3 && node.load > 0; ++c)
+        (*told)[std::size_t(telling.told)].force[c] += most / node.load * node.impulse[c] / dt_;
+    }
 }
 
 template class Friction<float>;

@@ -1,8 +1,11 @@
 // Coulomb friction that holds without memory: chosen last in a step, when all other forces are known, so that
 // what touches does not slip in the velocities that the step ends with, as far as μ times the normal force
-// allows. One lane; method and figures: docs/contact.md, "Friction".
+// allows. Bodies rub one another place by place, and a soft body a wall node by node: hundreds of samples of
+// a flat side press a wall, and all of them hold its few nodes still. One lane; method and figures:
+// docs/contact.md, "Friction".
 #pragma once
 
+#include <array>
 #include <vector>
 
 #include "fem/detail/bearing.h"
@@ -22,9 +25,10 @@ class Friction {
   explicit Friction(const World&);
   // What touches in the step that begins; nothing yet.
   void begin();
-  // Some place of `body` presses one of `against`, or a wall (−1): `most` is μ times the normal force, in
-  // newtons. Shares: those of the first place, then, from `second` on, minus those of the other. `told` is
-  // where among what is told the force is to be added, times `told_share`; −1: nowhere.
+  // Some place of `body` presses one of `against`, or a wall (−1), whose normal is along an axis: `most` is μ
+  // times the normal force, in newtons. Shares: those of the first place, then, from `second` on, minus those
+  // of the other. `told` is where among what is told the force is to be added, times `told_share`; −1:
+  // nowhere.
   void add(int body, int against, const Real place[3], const Real normal[3], Real most,
            const Share<Real>* first, const Share<Real>* second, const Share<Real>* last, int told = -1,
            Real told_share = 1);
@@ -61,6 +65,25 @@ class Friction {
     int told;
     Real told_share;
   };
+  // A node of a soft body and one of the walls, 0 … 2 the lower ones, 3 … 5 the upper.
+  struct WallNode {
+    int slot, body, side;
+    Real load, most;    // μ h N: its shares of what presses the wall; and what of that it may exert
+    bool meets_others;  // another wall or body, too
+    Real impulse[3];
+  };
+  // Where the friction of a place at a wall is to be added: its shares, from `first` on, to what wall nodes
+  // bear.
+  struct WallTelling {
+    int told, first, last;
+  };
+  struct WallShare {
+    int wall_node;
+    Real most;
+  };
+  struct WallLoad {
+    Real all = 0, positive = 0;
+  };
   // A rigid body's motion about its centre of mass.
   struct Spin {
     bool met = false;
@@ -69,6 +92,10 @@ class Friction {
 
   bool is_rigid(int body) const;
   int slot_of(int node, int body);
+  void bear(int body, const Real normal[3], Real most, const Share<Real>* first, const Share<Real>* last,
+            int told);
+  void limit_wall_nodes();
+  Real step_of(WallNode&);
   void predict(const LaneView<Real>& view, const std::vector<const Real*>& pushes);
   Real step_of(Slip&);  // the impulse's change over the most it may be
   void find_relative_velocity(const Slip&, Real out[3]) const;
@@ -83,6 +110,11 @@ class Friction {
   std::vector<Velocity> velocities_;  // a slot
   std::vector<SlotShare> shares_;
   std::vector<Slip> slips_;
+  std::vector<std::array<int, 6>> wall_nodes_of_slot_;  // by side; −1: none
+  std::vector<WallNode> wall_nodes_;
+  std::vector<WallLoad> wall_loads_;  // [6 body + side]; empty between steps
+  std::vector<WallTelling> wall_tellings_;
+  std::vector<WallShare> wall_shares_;
   std::vector<Spin> spins_;  // a body; empty without rigid ones
 };
 

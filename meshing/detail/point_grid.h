@@ -34,17 +34,26 @@ class PointGrid {
   // until it returns true; returns whether it did.
   template <class Visit>
   bool any_within(const Vec3& p, double radius, Visit visit) const {
+    return any_cell(p, radius, [&](int cell) {
+      for (int n = first_[std::size_t(cell)]; n >= 0; n = next_[std::size_t(n)]) {
+        const double d = (points_[std::size_t(n)] - p).squaredNorm();
+        if (d <= radius * radius && visit(n, d)) return true;
+      }
+      return false;
+    });
+  }
+
+  // The same of cells that may hold such points, numbered as cell_of does.
+  template <class Visit>
+  bool any_cell(const Vec3& p, double radius, Visit visit) const {
     const Vec3 r = Vec3::Constant(radius), from = p - r, to = p + r;
     for (int k = place(from, 2); k <= place(to, 2); ++k)
       for (int j = place(from, 1); j <= place(to, 1); ++j)
         for (int i = place(from, 0); i <= place(to, 0); ++i)
-          for (int n = first_[std::size_t((k * cells_[1] + j) * cells_[0] + i)]; n >= 0;
-               n = next_[std::size_t(n)]) {
-            const double d = (points_[std::size_t(n)] - p).squaredNorm();
-            if (d <= radius * radius && visit(n, d)) return true;
-          }
+          if (visit((k * cells_[1] + j) * cells_[0] + i)) return true;
     return false;
   }
+  int cells() const { return int(first_.size()); }
 
  private:
   int place(const Vec3& p, int axis) const {

@@ -30,9 +30,17 @@ class SpacingMap {
     }
     std::sort(order.begin(), order.end());  // neighbours in space are neighbours in memory
     std::vector<SurfaceSpot> sorted;
-    for (const auto& [cell, i] : order) sorted.push_back(spots_[std::size_t(i)]);
+    cells_.resize(std::size_t(grid_.cells()));
+    for (const auto& [cell, i] : order) {
+      Cell& of = cells_[std::size_t(cell)];
+      if (of.begin == of.end) of.begin = int(sorted.size());
+      sorted.push_back(spots_[std::size_t(i)]);
+      of.end = int(sorted.size());
+      const Vec3& p = sorted.back().position;
+      of.box = of.end - of.begin == 1 ? Box{p, p} : Box{of.box.lower.cwiseMin(p), of.box.upper.cwiseMax(p)};
+    }
     spots_ = std::move(sorted);
-    for (const SurfaceSpot& s : spots_) grid_.add(s.position), fine_grid_.add(s.position);
+    for (const SurfaceSpot& s : spots_) fine_grid_.add(s.position);
 
     std::vector<Vec3> smooth(spots_.size());
     spacing_.resize(spots_.size());
@@ -49,17 +57,36 @@ class SpacingMap {
   }
 
   double measured(const SurfaceSpot& at) const {
+    constexpr double rounding = 1e-9;
+    const double flat = 0.1 * limits_.missed_m, least = limits_.least_m * limits_.least_m,
+                 farthest = limits_.most_flat_m * limits_.most_flat_m;
     double least_squared = limits_.most_m * limits_.most_m, bend = 0;
-    grid_.any_within(at.position, limits_.most_flat_m, [&](int n, double squared_distance) {
-      const SurfaceSpot& other = spots_[std::size_t(n)];
-      if (other.normal.dot(at.normal) <= same_side) return false;
-      const double fall = (at.position - other.position).dot(at.normal);
-      bend = std::max(bend, std::abs(fall));
-      if (fall > 0 && squared_distance >= limits_.least_m * limits_.least_m)
-        least_squared = std::min(least_squared, squared_distance * 2 * limits_.missed_m / fall);
+    grid_.any_cell(at.position, limits_.most_flat_m, [&](int index) {
+      const Cell& cell = cells_[std::size_t(index)];
+      if (cell.begin == cell.end) return false;
+      // No point of the cell falls farther, or is nearer; most cells of what is flat change nothing.
+      const Vec3 middle = 0.5 * (cell.box.lower + cell.box.upper), half = 0.5 * cell.box.size();
+      const double most_fall = (1 + rounding) * (std::abs((at.position - middle).dot(at.normal)) +
+                                                 half.dot(at.normal.cwiseAbs())),
+                   nearest =
+                       (1 - rounding) * ((at.position - middle).cwiseAbs() - half).cwiseMax(0).squaredNorm();
+      if (nearest > farthest ||
+          ((bend >= flat || most_fall < flat) &&
+           most_fall * least_squared <= 2 * limits_.missed_m * std::max(nearest, least)))
+        return false;
+      for (int n = cell.begin; n < cell.end; ++n) {
+        const SurfaceSpot& other = spots_[std::size_t(n)];
+        const Vec3 way = other.position - at.position;
+        const double squared_distance = way.squaredNorm();
+        if (squared_distance > farthest || other.normal.dot(at.normal) <= same_side) continue;
+        const double fall = -way.dot(at.normal);
+        bend = std::max(bend, std::abs(fall));
+        if (fall > 0 && squared_distance >= least)
+          least_squared = std::min(least_squared, squared_distance * 2 * limits_.missed_m / fall);
+      }
       return false;
     });
-    if (bend < 0.1 * limits_.missed_m) return limits_.most_flat_m;
+    if (bend < flat) return limits_.most_flat_m;
     return std::max(limits_.least_m, std::sqrt(least_squared));
   }
 
@@ -88,8 +115,14 @@ class SpacingMap {
     });
   }
 
+  struct Cell {
+    int begin = 0, end = 0;
+    Box box;
+  };
+
   SampleSpacing limits_;
-  std::vector<SurfaceSpot> spots_;
+  std::vector<SurfaceSpot> spots_;  // by the cells of grid_
+  std::vector<Cell> cells_;
   std::vector<double> spacing_;
   PointGrid grid_, fine_grid_;
 };

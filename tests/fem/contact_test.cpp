@@ -413,6 +413,60 @@ TEST(Contact, FrictionHoldsAndSlidesOnASlope) {
     }
 }
 
+// At its fine surface on a wall of the bounds: friction is found node by node there, and told sample by
+// sample. It holds, and it slides as Coulomb says, every sample against the way it goes.
+TEST(Contact, AFineSurfaceHoldsAndSlidesOnTheFloor) {
+  const double tangent = 0.4, angle = std::atan(tangent);
+  for (const bool phong : {false, true})
+    for (const double friction : {0.45, 0.2}) {
+      Material material;
+      material.youngs_modulus_pa = 5e3, material.friction = friction, material.damping_ratio = 0.3;
+      WorldSpec spec;
+      spec.bodies = {{"slab", grid({1, -0.5, 0}, {1, 1, 0.5}, 4, 4, 2), material, {}, BodyKind::deformable}};
+      BodySpec& body = spec.bodies[0];
+      body.shape = testing::shape_of(
+          body.cage, testing::rounded_box_surface(bounding_box(body.cage.positions), 0.02), 0.03, 0.04);
+      body.phong = phong;
+      spec.contact_offset_m = 0.005, spec.rest_speed_m_s = 0.001;
+      spec.bounds_m = {Vec3(-60, -60, 0), Vec3(60, 60, 20)};
+      spec.gravity_m_s2 = 9.81 * Vec3(std::sin(angle), 0, -std::cos(angle));
+      const World world = build_world(spec);
+      const std::string where = fmt::format("{}, μ {}", phong ? "phong" : "linear", friction);
+      Control coast;
+      coast.steps = int(6 / world.dt_s);
+      const State landed = propagate(world, rest_state(world), coast).end;
+      if (friction > tangent) {
+        coast.steps = int(1 / world.dt_s);
+        const State end = propagate(world, landed, coast).end;
+        EXPECT_LT((center_of_mass_m(world, end, 0) - center_of_mass_m(world, landed, 0)).norm(), 1e-3)
+            << where;
+        EXPECT_EQ(mean_speed_m_s(world, end, 0), 0) << where << ": it does not sleep";
+        continue;
+      }
+      Vec3 all = Vec3::Zero();
+      for (const ContactForce& contact : contact_forces(world, landed)) {
+        ASSERT_EQ(contact.other, -1);
+        EXPECT_LT(contact.force_n.x(), 0) << where;
+        // By Phong Deformation some weights are negative, and the sum alone is bounded so.
+        const double bound = (phong ? 2 : 1 + 1e-4) * friction * contact.force_n.z();
+        EXPECT_LE(contact.force_n.head<2>().norm(), bound) << where;
+        all += contact.force_n;
+      }
+      EXPECT_NEAR(all.head<2>().norm(), friction * all.z(), 2e-3 * friction * all.z()) << where;
+      EXPECT_LT(all.x(), 0) << where;
+      coast.steps = int(0.5 / world.dt_s);
+      const Rollout rollout = propagate(world, landed, coast);
+      const auto momentum = [&](const State& state) {
+        double sum = 0;
+        for (int n = 0; n < world.nodes; ++n) sum += world.tables64.node_mass[n] * state.velocities[3 * n];
+        return sum;
+      };
+      const double gained = 9.81 * std::cos(angle) * (tangent - friction) * coast.steps * world.dt_s;
+      EXPECT_NEAR((momentum(rollout.end) - momentum(landed)) / world.bodies[0].mass_kg, gained, 0.02 * gained)
+          << where;
+    }
+}
+
 // A soft slab, as soft as our scenes' bodies are, on a slope that friction holds: it comes to rest and stays.
 // Touched at its cage, on the floor and on a static body, and at its fine surface, moved either way.
 TEST(Contact, ASoftSlabRestsOnASlope) {

@@ -243,6 +243,34 @@ TEST(SelfOverlap, OfAWoundBarIsWhatItsPitchLeavesOfItsWidth) {
               self_overlap(bar, wound(0.9)).depth_m, 1e-6);
 }
 
+// Two arms that stand a little farther apart than what counts as one place, each pushed by a little more than
+// half of it: hardly out of shape, and through one another.
+TEST(SelfOverlap, IsSeenOfBodiesThatNearlyKeepTheirShape) {
+  const SurfaceMesh bar = made_bar({4, 0.5, 0.5}, {80, 6, 6});
+  const double between = 1.05 * own_neighbourhood * 1.75;  // of the length of the hairpin
+  const auto folded = [&](const Vec3& p) {                 // a hairpin
+    const double radius = 0.5 * between + 0.5 - p.y();
+    const double bend = std::numbers::pi * 0.25, s = p.x() - 2;
+    if (std::abs(s) < bend) {
+      const double angle = s / 0.5;
+      return Vec3(radius * std::cos(angle), radius * std::sin(angle), p.z());
+    }
+    return Vec3(-(std::abs(s) - bend), s < 0 ? -radius : radius, p.z());
+  };
+  const SurfaceMesh hairpin = mapped(bar, folded);
+  for (const double closed : {0.9, 1.2}) {
+    const auto close = [&](const Vec3& p) {
+      const double part = std::clamp(-p.x() / 0.6, 0.0, 1.0);
+      return Vec3(p.x(), p.y() - (p.y() < 0 ? -1 : 1) * part * 0.5 * closed * between, p.z());
+    };
+    const double depth = self_overlap(hairpin, close).depth_m;
+    if (closed < 1)
+      EXPECT_EQ(depth, 0);
+    else
+      EXPECT_NEAR(depth, 0.2 * between, 0.02 * between) << depth;
+  }
+}
+
 // Coarse cells: where the bar passes through itself no vertex need be inside.
 TEST(SelfOverlap, IsFoundOnEdgesToo) {
   const SurfaceMesh bar = made_bar({14, 0.5, 1}, {35, 1, 1});
