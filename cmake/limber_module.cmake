@@ -27,11 +27,12 @@ function(limber_module NAME)
   set_property(GLOBAL PROPERTY LIMBER_OWNS_${NAME} "${M_OWNS}")
 endfunction()
 
-# limber_tests(NAME SOURCES … USES module …): the executable NAME_tests; one ctest a TEST, labelled NAME, or NAME_slow where
-# the TEST's suite ends in _slow. What is labelled _slow stays out of the sanitizer runs, and is
-# not built for them either where the whole executable is slow.
+# limber_tests(NAME [LONG] SOURCES … USES module …): the executable NAME_tests; one ctest a TEST, labelled NAME, or NAME_slow
+# where the TEST's suite ends in _slow. What is labelled _slow stays out of the sanitizer runs, and is
+# not built for them either where the whole executable is slow. The slow ones of what is LONG are labelled NAME_slow_long:
+# tools/test leaves them to `tools/test long`.
 function(limber_tests NAME)
-  cmake_parse_arguments(T "" "" "SOURCES;USES" ${ARGN})
+  cmake_parse_arguments(T "LONG" "" "SOURCES;USES" ${ARGN})
   add_executable(${NAME}_tests ${T_SOURCES})
   foreach(module ${T_USES})
     target_link_libraries(${NAME}_tests PRIVATE limber_${module})
@@ -48,8 +49,13 @@ function(limber_tests NAME)
   endif()
   foreach(part "-*_slow.*|${NAME}" "*_slow.*|${NAME}_slow")
     string(REGEX MATCH "^(.*)[|](.*)$" part "${part}")
-    gtest_discover_tests(${NAME}_tests TEST_PREFIX ${NAME}. TEST_FILTER "${CMAKE_MATCH_1}" DISCOVERY_TIMEOUT 60
-                         PROPERTIES LABELS ${CMAKE_MATCH_2} TIMEOUT 600 ${environment})
+    set(filter "${CMAKE_MATCH_1}")
+    set(label "${CMAKE_MATCH_2}")
+    if(T_LONG AND label MATCHES "_slow$")
+      string(APPEND label "_long")
+    endif()
+    gtest_discover_tests(${NAME}_tests TEST_PREFIX ${NAME}. TEST_FILTER "${filter}" DISCOVERY_TIMEOUT 60
+                         PROPERTIES LABELS ${label} TIMEOUT 600 ${environment})
   endforeach()
 endfunction()
 

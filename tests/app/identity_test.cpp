@@ -46,6 +46,24 @@ bool touches(const fem::World& world, const State& state) {
   return push_on_robot_n(world, state).has_value();
 }
 
+// Of some directions the one in which a push from here keeps the robot at something longest.
+Vec3 direction_that_presses(const fem::World& world, const State& start, double force_n,
+                            const std::vector<Vec3>& directions) {
+  constexpr int pieces = 12, steps = 50;
+  Vec3 best = directions.front();
+  int most = -1;
+  for (const Vec3& direction : directions) {
+    int touching = 0;
+    State state = start;
+    for (int i = 0; i < pieces; ++i) {
+      state = propagate(world, state, push(force_n * direction, steps)).end;
+      touching += touches(world, state);
+    }
+    if (touching > most) most = touching, best = direction;
+  }
+  return best;
+}
+
 // Pushed towards the goal, or else towards one of the other bodies, until something is in the way, and on to
 // where that pushes hardest within 0.2 s; then in many ways against it.
 Cases pressed_cases(const fem::World& world, const scenes::Scene& scene) {
@@ -76,7 +94,12 @@ Cases pressed_cases(const fem::World& world, const scenes::Scene& scene) {
     cases.start = next;
   }
   EXPECT_TRUE(hardest);
-  if (hardest) towards = -hardest->normalized();
+  std::vector<Vec3> directions{towards};
+  if (hardest) directions.push_back(-hardest->normalized());
+  const Vec3 here = center_of_mass_m(world, cases.start, world.robot);
+  for (int b = 0; b < int(world.bodies.size()); ++b)
+    if (b != world.robot) directions.push_back((center_of_mass_m(world, cases.start, b) - here).normalized());
+  towards = direction_that_presses(world, cases.start, 0.4 * force_n, directions);
   Rng rng(61, 0);
   for (int i = 0; i < rollouts; ++i) {
     Control control = push(force_n * (0.4 * towards + 0.2 * rng.direction()), 600 + rng.below(200));
