@@ -17,7 +17,7 @@
 namespace limber::app {
 namespace {
 
-constexpr int rollouts = 16;
+constexpr int rollouts = 20;
 constexpr int least_contact_steps = 3000;
 
 struct Cases {
@@ -46,26 +46,18 @@ bool touches(const fem::World& world, const State& state) {
   return push_on_robot_n(world, state).has_value();
 }
 
-// Of some directions the one in which a push from here keeps the robot at something longest.
-Vec3 direction_that_presses(const fem::World& world, const State& start, double force_n,
-                            const std::vector<Vec3>& directions) {
-  constexpr int pieces = 12, steps = 50;
-  Vec3 best = directions.front();
-  int most = -1;
-  for (const Vec3& direction : directions) {
-    int touching = 0;
-    State state = start;
-    for (int i = 0; i < pieces; ++i) {
-      state = propagate(world, state, push(force_n * direction, steps)).end;
-      touching += touches(world, state);
-    }
-    if (touching > most) most = touching, best = direction;
+// Of 600 steps' pushes from here the tenths after which the robot touches something.
+int tenths_pressed(const fem::World& world, State state, const Vec3& force_n) {
+  int tenths = 0;
+  for (int i = 0; i < 10; ++i) {
+    state = propagate(world, state, push(force_n, 60)).end;
+    tenths += touches(world, state);
   }
-  return best;
+  return tenths;
 }
 
 // Pushed towards the goal, or else towards one of the other bodies, until something is in the way, and on to
-// where that pushes hardest within 0.2 s; then in many ways against it.
+// where that pushes hardest within 0.2 s; then, from there or from rest there, in many ways against it.
 Cases pressed_cases(const fem::World& world, const scenes::Scene& scene) {
   Cases cases;
   const State rest = rest_state(world);
@@ -94,19 +86,29 @@ Cases pressed_cases(const fem::World& world, const scenes::Scene& scene) {
     cases.start = next;
   }
   EXPECT_TRUE(hardest);
+  // From rest it springs back less, unless all are falling.
+  State at_rest = cases.start;
+  std::fill(at_rest.velocities.begin(), at_rest.velocities.end(), 0.f);
   std::vector<Vec3> directions{towards};
   if (hardest) directions.push_back(-hardest->normalized());
   const Vec3 here = center_of_mass_m(world, cases.start, world.robot);
   for (int b = 0; b < int(world.bodies.size()); ++b)
     if (b != world.robot) directions.push_back((center_of_mass_m(world, cases.start, b) - here).normalized());
-  towards = direction_that_presses(world, cases.start, 0.4 * force_n, directions);
+  int longest = -1;
+  for (const State& start : {State(cases.start), at_rest})
+    for (const Vec3& direction : directions)
+      if (const int tenths = tenths_pressed(world, start, 0.8 * force_n * direction); tenths > longest)
+        longest = tenths, cases.start = start, towards = direction;
+  // What pulls to a place pulls to one beyond what is in the way.
+  const Points& cage = world.bodies[std::size_t(world.robot)].cage.positions;
+  const Vec3 beyond = here + 0.5 * bounding_box(cage).size().maxCoeff() * towards;
   Rng rng(61, 0);
   for (int i = 0; i < rollouts; ++i) {
-    Control control = push(force_n * (0.4 * towards + 0.2 * rng.direction()), 600 + rng.below(200));
+    Control control = push(force_n * (0.8 * towards + 0.2 * rng.direction()), 600 + rng.below(200));
     control.manipulation = Manipulation(i % 4);
     control.node = rng.below(world.bodies[std::size_t(world.robot)].node_count());
     control.radius_m = 0.4f;
-    control.target_m = scene.goal.center_of_mass_m.cast<float>();
+    control.target_m = beyond.cast<float>();
     control.max_force_n = float(force_n);
     cases.controls.push_back(control);
   }
