@@ -74,8 +74,8 @@ std::vector<Face> hull_faces(const std::vector<Vec3>& points) {
   });
   std::vector<std::array<int, 2>> sides;
   for (int p : order) {
-    if (!outside[std::size_t(p)]) continue;
     throw_if_stopped();
+    if (!outside[std::size_t(p)]) continue;
     sides.clear(), loose.clear();
     std::size_t kept = 0;
     for (Seen& f : faces) {
