@@ -396,7 +396,7 @@ int run_command_line(int argc, const char* const* argv) {
   render_command
       .add_option("--set", render_options.sets,
                   "edit how it is filmed: film.KEY=VALUE, camera.KEY=VALUE, bodies.NAME.color=… (also "
-                  "opacity, roughness, metallic, deformation)")
+                  "opacity, look, roughness, metallic, deformation)")
       ->type_name("KEY=VALUE")
       ->allow_extra_args(false);
   bool still = false;

@@ -270,12 +270,12 @@ std::string body_text(const Organ& organ, const NewSceneOptions& options, double
     return text;
   }
   text += fmt::format("cage = {{ tets = {} }}\n", organ.bone ? bone_tets : options.tets);
-  if (organ.bone) return text + "color = \"#e8dfc8\"\nroughness = 0.7\n";
+  if (organ.bone) return text + "color = \"#e8dfc8\"\nlook = \"bone\"\n";
   text += fmt::format(
       "material = {{ youngs_modulus_pa = {:g}, poisson_ratio = 0.45, density_kg_m3 = {:g}, friction = 0.05 "
       "}}\n",
       u.youngs_modulus_pa, u.density_kg_m3);
-  text += fmt::format("color = \"{}\"\nroughness = 0.3\n", u.color);
+  text += fmt::format("color = \"{}\"\nlook = \"tissue\"\n", u.color);
   if (robot) return text;
   const Vec3 half = 0.5 * scale * organ.box.size();
   const Vec3 lower(center.x() - 2 * half.x(), center.y() - 2 * half.y(), center.z() - 2 * half.z()),

@@ -2,6 +2,7 @@
 
 #include <set>
 
+#include "app/look.h"
 #include "app/node_values.h"
 #include "app/shot.h"
 #include "fem/observe.h"
@@ -21,6 +22,10 @@ const render::LineLook way_lines{.color_srgb = {0.85, 0.35, 0.05}, .width_px = 3
 const render::LineLook tree_lines{.color_srgb = {0.25, 0.28, 0.36}, .width_px = 1, .opacity = 0.45};
 // Above the first, a coarse stand-in of the second casts the shadow of a surface.
 constexpr int most_triangles_that_cast = 60'000, triangles_of_caster = 20'000;
+
+constexpr int fine_cells = 300;  // of the maps that find crevices, along a body
+
+double size_of(const SurfaceMesh& mesh) { return bounding_box(mesh.positions).diagonal(); }
 
 using Edges = Eigen::Matrix<int, Eigen::Dynamic, 2, Eigen::RowMajor>;
 
@@ -102,7 +107,7 @@ struct Shot::Painter::View {
     for (std::size_t s = 0; s < shot.scenery_.size(); ++s)
       if (shot.scenery_[s].triangles.rows() > 0)
         renderer.add_mesh(shot.scenery_[s].triangles, shot.scenery_[s].positions,
-                          look_of(shot.scene_.scenery[s]));
+                          look_of(shot.scene_.scenery[s], size_of(shot.scenery_[s])));
     for (std::size_t b = 0; b < shot.bodies_.size(); ++b) add_caster(b);
     const scenes::FilmSpec& film = shot.scene_.film;
     if (film.bounds_lines) renderer.add_lines(render::edges_of(shot.scene_.bounds_m), {});
@@ -118,14 +123,6 @@ struct Shot::Painter::View {
       }
   }
 
-  static render::MeshLook look_of(const scenes::BodySpec& body) {
-    return {.name = body.name,
-            .color_srgb = body.color_srgb,
-            .roughness = body.roughness,
-            .metallic = body.metallic,
-            .opacity = body.opacity};
-  }
-
   bool has_caster(std::size_t b) const {
     return !cages && shot.bodies_[b].surface.triangles.rows() > most_triangles_that_cast;
   }
@@ -133,13 +130,14 @@ struct Shot::Painter::View {
   void add_body(std::size_t b) {
     const PreparedBody& prepared = shot.bodies_[b];
     const Triangles& hull = shot.world_.bodies[b].surface;
-    render::MeshLook look = look_of(shot.scene_.bodies[b]);
+    render::MeshLook look = look_of(shot.scene_.bodies[b], size_of(prepared.surface));
     look.casts_shadow = !has_caster(b);
-    if (cages) look.crease_angle_deg = 0;
+    if (cages) look.crease_angle_deg = 0, look.grain = 0;
     meshes.push_back(cages ? renderer.add_mesh(hull, prepared.cage.positions, look)
                            : renderer.add_mesh(prepared.surface.triangles, prepared.surface.positions, look));
     rest_normals.push_back(vertex_normals(prepared.surface.positions, prepared.surface.triangles));
     hulls.push_back(prepared.cage.positions);
+    crevices.push_back(open_in_crevices(b));
     if (!cages && !shot.scene_.film.cages) return;
     cage_edges.push_back(edges_of(hull));
     cage_lines_of.push_back(renderer.add_lines(ends_of(cage_edges[b], prepared.cage.positions), cage_lines));
@@ -149,9 +147,9 @@ struct Shot::Painter::View {
   void add_caster(std::size_t b) {
     Caster& made = casters.emplace_back();
     if (!has_caster(b)) return;
-    render::MeshLook look = look_of(shot.scene_.bodies[b]);
-    look.seen = false;
     const SurfaceMesh& surface_at_rest = shot.bodies_[b].surface;
+    render::MeshLook look = look_of(shot.scene_.bodies[b], size_of(surface_at_rest));
+    look.seen = false;
     made.stand_in = render::coarse_caster(surface_at_rest, triangles_of_caster);
     made.mesh =
         renderer.add_mesh(made.stand_in.triangles, made.stand_in.positions(surface_at_rest.positions), look);
@@ -189,28 +187,47 @@ struct Shot::Painter::View {
     return colors;
   }
 
-  // What bodies hide of one another's sky, found between the cages.
+  // What the occluders hide of a body's sky, found at the nodes of its cage.
+  Eigen::VectorXd hidden_by(const std::vector<render::Occluder>& occluders, std::size_t b) const {
+    const fem::Body& body = shot.world_.bodies[b];
+    const Points hull_normals = vertex_normals(hulls[b], body.surface);
+    Points points(Eigen::Index(body.surface_nodes.size()), 3), outward(points.rows(), 3);
+    for (Eigen::Index i = 0; i < points.rows(); ++i) {
+      points.row(i) = hulls[b].row(body.surface_nodes[std::size_t(i)]);
+      outward.row(i) = hull_normals.row(body.surface_nodes[std::size_t(i)]);
+    }
+    const Eigen::VectorXd hidden = render::sky_occlusion(points, outward, occluders);
+    Eigen::VectorXd of_node = Eigen::VectorXd::Zero(hulls[b].rows());
+    std::vector<bool> on_surface(std::size_t(hulls[b].rows()), false);
+    for (Eigen::Index i = 0; i < points.rows(); ++i) {
+      of_node[body.surface_nodes[std::size_t(i)]] = hidden[i];
+      on_surface[std::size_t(body.surface_nodes[std::size_t(i)])] = true;
+    }
+    return on_mesh(b, of_node, on_surface);
+  }
+
+  // The cage knows no crevices: of the sky that it leaves open at rest, the share that the fine surface does.
+  Eigen::ArrayXd open_in_crevices(std::size_t b) const {
+    const PreparedBody& prepared = shot.bodies_[b];
+    if (cages || !shot.output_.occlusion || shot.scene_.bodies[b].opacity < 1) return {};
+    const SurfaceMesh& fine = prepared.surface;
+    const Eigen::VectorXd coarse = hidden_by({{prepared.cage.positions, shot.world_.bodies[b].surface}}, b),
+                          hidden =
+                              render::sky_occlusion(fine.positions, rest_normals[b],
+                                                    {{{fine.positions, fine.triangles}}}, {}, fine_cells);
+    return ((1 - hidden.array()) / (1 - coarse.array()).max(0.05)).min(1.0);
+  }
+
+  // What bodies hide of one another's sky, found between the cages, and what of their own in crevices.
   void occlude() {
     if (!shot.output_.occlusion) return;
     std::vector<render::Occluder> occluders;
     for (std::size_t b = 0; b < hulls.size(); ++b)
       if (shot.scene_.bodies[b].opacity == 1) occluders.push_back({hulls[b], shot.world_.bodies[b].surface});
     for (std::size_t b = 0; b < hulls.size(); ++b) {
-      const fem::Body& body = shot.world_.bodies[b];
-      const Points hull_normals = vertex_normals(hulls[b], body.surface);
-      Points points(Eigen::Index(body.surface_nodes.size()), 3), outward(points.rows(), 3);
-      for (Eigen::Index i = 0; i < points.rows(); ++i) {
-        points.row(i) = hulls[b].row(body.surface_nodes[std::size_t(i)]);
-        outward.row(i) = hull_normals.row(body.surface_nodes[std::size_t(i)]);
-      }
-      const Eigen::VectorXd hidden = render::sky_occlusion(points, outward, occluders);
-      Eigen::VectorXd of_node = Eigen::VectorXd::Zero(hulls[b].rows());
-      std::vector<bool> on_surface(std::size_t(hulls[b].rows()), false);
-      for (Eigen::Index i = 0; i < points.rows(); ++i) {
-        of_node[body.surface_nodes[std::size_t(i)]] = hidden[i];
-        on_surface[std::size_t(body.surface_nodes[std::size_t(i)])] = true;
-      }
-      renderer.set_occlusion(meshes[b], on_mesh(b, of_node, on_surface));
+      Eigen::VectorXd hidden = hidden_by(occluders, b);
+      if (crevices[b].size() > 0) hidden = 1 - (1 - hidden.array()) * crevices[b];
+      renderer.set_occlusion(meshes[b], hidden);
     }
   }
 
@@ -267,6 +284,7 @@ struct Shot::Painter::View {
   std::vector<int> meshes, cage_lines_of, arrows;
   std::vector<Caster> casters;              // a body
   std::vector<Points> hulls, rest_normals;  // a body; the cage's nodes as they are now
+  std::vector<Eigen::ArrayXd> crevices;     // a body; empty: none
   std::vector<Edges> cage_edges;
   Points surface, normals;
 };

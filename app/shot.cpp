@@ -7,6 +7,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "app/look.h"
 #include "app/node_values.h"
 #include "core/error.h"
 #include "core/hash.h"
@@ -20,7 +21,7 @@ namespace limber::app {
 namespace {
 
 constexpr int generation =
-    3;  // of pictures: raised when the same film comes out otherwise, so that it is painted anew
+    4;  // of pictures: raised when the same film comes out otherwise, so that it is painted anew
 constexpr double longest_arrow = 2;  // times that of the strongest push, which is as long as the robot
 constexpr int most_edges_of_tree = 4000;
 
@@ -129,7 +130,7 @@ Shot::Shot(const scenes::Scene& scene, const std::string& camera, const plan::Pl
                                  fmt::join(names, ", ")));
   const int views = scene.film.side_by_side ? 2 : 1;
   look_.width = size_px.first / views, look_.height = size_px.second;
-  look_.background_top_srgb = look_.background_bottom_srgb = scene.film.background_srgb;
+  set_light(look_, scene.film);
   double ground_m = scene.bounds_m.lower.z();
   for (const SurfaceMesh& mesh : scenery)
     ground_m = std::min(ground_m, bounding_box(mesh.positions).lower.z());
@@ -263,7 +264,7 @@ double Shot::pixels_a_metre(const render::Camera& camera) const {
 void Shot::place_words() {
   constexpr int most_frames = 24, across = 16, down = 4;
   const scenes::FilmSpec& film = scene_.film;
-  words_.on_dark = look_.background_bottom_srgb.mean() < 0.4;
+  words_.on_dark = look_.ground_srgb.mean() < 0.4;
   if (film.scale_bar) scale_m_ = round_length_m(0.2 * look_.width / pixels_a_metre(camera_of(0)));
   const std::string clock = clock_at(frames() - 1);
   if (film.caption.empty() && clock.empty()) return;
@@ -438,7 +439,8 @@ void Shot::find_tree() {
 std::uint64_t Shot::hash_of_look() const {
   const scenes::FilmSpec& film = scene_.film;
   Hasher hasher;
-  hasher.text(version).value(generation).value(look_.width).value(look_.height).matrix(film.background_srgb);
+  hasher.text(version).value(generation).value(look_.width).value(look_.height).value(int(film.look));
+  if (film.background_srgb) hasher.matrix(*film.background_srgb);
   hasher.matrix(look_.stage.lower).matrix(look_.stage.upper).matrix(scene_.bounds_m.lower);
   hasher.matrix(scene_.bounds_m.upper);
   for (const bool flag : {film.bounds_lines, film.transparent, film.clock, film.cages, film.forces, film.path,
@@ -462,7 +464,11 @@ std::uint64_t Shot::hash_of_look() const {
     for (const int n : force.nodes) hasher.value(n);
   }
   const auto add_look = [&](const scenes::BodySpec& body) {
-    hasher.matrix(body.color_srgb).value(body.opacity).value(body.roughness).value(body.metallic);
+    hasher.matrix(body.color_srgb)
+        .value(int(body.look))
+        .value(body.opacity)
+        .value(body.roughness)
+        .value(body.metallic);
   };
   for (std::size_t b = 0; b < bodies_.size(); ++b) {
     hasher.value(limber::hash_of(bodies_[b].surface)).value(limber::hash_of(bodies_[b].cage));

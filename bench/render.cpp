@@ -207,8 +207,10 @@ class Stage {
     MeshLook fine_look{"body", Vec3(0xc0, 0x39, 0x2b) / 255}, coarse_look{"coarse"};
     fine_look.casts_shadow = false, fine_look.crease_angle_deg = 180;
     coarse_look.seen = false;
+    fine_look.translucency = 0.8, fine_look.scatter_m = 0.05, fine_look.grain = 0.16,
+    fine_look.grain_m = 0.03;
     if (veil) {
-      fine_look.opacity = 0.3;
+      fine_look.opacity = 0.3, fine_look.sheet = true;
       coarse_look.casts_shadow = false;
       for (const double x : {-0.1, 0.08}) {
         const SurfaceMesh organ = sphere_mesh({x, 0, 0.5}, 0.15, 60);

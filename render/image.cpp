@@ -16,17 +16,19 @@ constexpr double knee = 0.7;
 
 std::uint8_t level(double srgb) { return std::uint8_t(std::lround(255 * std::clamp(srgb, 0.0, 1.0))); }
 
-// Sign, exponent and the upper 10 bits of the mantissa pick the entry, so its value is right to 1/2048.
-constexpr int dropped_bits = 13;
+// Sign, exponent and the upper 13 bits of the mantissa pick the entry, so its value is right to 1/16384.
+constexpr int dropped_bits = 10;
 constexpr std::uint32_t first_key = std::bit_cast<std::uint32_t>(0x1p-13f) >> dropped_bits;
 constexpr std::uint32_t last_key = std::bit_cast<std::uint32_t>(16.0f) >> dropped_bits;
 
-const std::array<std::uint8_t, last_key - first_key + 1>& level_table() {
+// In 256ths of a level.
+const std::vector<std::uint16_t>& level_table() {
   static const auto table = [] {
-    std::array<std::uint8_t, last_key - first_key + 1> t;
+    std::vector<std::uint16_t> t(last_key - first_key + 1);
     for (std::uint32_t k = 0; k < t.size(); ++k) {
       const std::uint32_t middle = ((first_key + k) << dropped_bits) | (1u << (dropped_bits - 1));
-      t[k] = level(srgb_from_linear(tone_mapped(double(std::bit_cast<float>(middle)))));
+      t[k] = std::uint16_t(
+          std::lround(256 * 255 * srgb_from_linear(tone_mapped(double(std::bit_cast<float>(middle))))));
     }
     return t;
   }();
@@ -76,21 +78,46 @@ double tone_unmapped(double shown) {
   return shown <= knee ? shown : knee - (1 - knee) * std::log((1 - std::min(shown, 0.9999)) / (1 - knee));
 }
 
-void tone_mapped(std::span<const float> rgba, std::uint8_t* rgb) {
-  const auto& table = level_table();
-  const auto lookup = [&](float x) {
-    // Not (x > first) also catches NaN, which a shader may leave but must not spread.
-    if (!(x > 0x1p-13f)) return table[0];
-    return table[std::min(std::bit_cast<std::uint32_t>(x) >> dropped_bits, last_key) - first_key];
-  };
-  for (std::size_t p = 0; p < rgba.size() / 4; ++p)
-    for (std::size_t c = 0; c < 3; ++c) rgb[3 * p + c] = lookup(rgba[4 * p + c]);
+namespace {
+
+constexpr int dither_run = dither_columns / 8;
+
+constexpr int reversed(int three_bits) {
+  return (three_bits & 1) << 2 | (three_bits & 2) | (three_bits & 4) >> 2;
+}
+
+// Ordered dither (Bayer 1973) whose tile is drawn out along the row: what is added to a value in 256ths of a
+// level before it is cut off. Of the 64 thresholds of a tile one holds for a whole run of pixels; those of
+// rows below one another differ by half a level, then by a quarter, and begin elsewhere from run to run.
+constexpr int threshold(int y, int run) {
+  return 2 + 32 * reversed((y + 3 * run) & 7) + 4 * reversed(run & 7);
+}
+
+}  // namespace
+
+void tone_mapped(std::span<const float> rgba, int y, std::uint8_t* rgb) {
+  const std::vector<std::uint16_t>& table = level_table();
+  const std::size_t pixels = rgba.size() / 4;
+  for (std::size_t begin = 0; begin < pixels; begin += dither_run) {
+    const int added = threshold(y, int(begin / dither_run));
+    const auto level_of = [&](float x) {
+      // Not (x > first) also catches NaN, which a shader may leave but must not spread.
+      if (!(x > 0x1p-13f)) return std::uint8_t(0);
+      const std::uint32_t key = std::min(std::bit_cast<std::uint32_t>(x) >> dropped_bits, last_key);
+      return std::uint8_t((table[key - first_key] + added) >> 8);
+    };
+    for (std::size_t p = begin; p < std::min(begin + dither_run, pixels); ++p)
+      for (std::size_t c = 0; c < 3; ++c) rgb[3 * p + c] = level_of(rgba[4 * p + c]);
+  }
 }
 
 Image8 tone_mapped(const Image& image) {
   Image8 shown{image.width, image.height,
                std::vector<std::uint8_t>(std::size_t(image.width) * image.height * 3)};
-  tone_mapped(image.rgba, shown.rgb.data());
+  const std::size_t width = std::size_t(image.width);
+  for (int y = 0; y < image.height; ++y)
+    tone_mapped(std::span(image.rgba).subspan(4 * width * std::size_t(y), 4 * width), y,
+                &shown.rgb[3 * width * std::size_t(y)]);
   return shown;
 }
 

@@ -46,10 +46,13 @@ Vec3 linear_from_srgb(const Vec3&);
 double tone_mapped(double linear);
 double tone_unmapped(double shown);  // inverse, for colours that must come out as they were asked for; < 1
 
-// Tone map, then sRGB; within one level of the formulas (a table over the bits of the float).
+// Tone map, then sRGB, dithered: over a tile of dither_rows × dither_columns pixels of one colour the mean is
+// that colour's within a fiftieth of a level, and no pixel is off by a whole level. Slow gradients show no
+// bands. Rows keep long runs of one level, so that PNG files stay small: docs/rendering.md.
+constexpr int dither_rows = 8, dither_columns = 256;
 Image8 tone_mapped(const Image&);
-// A row of that: four floats a pixel to three levels a pixel.
-void tone_mapped(std::span<const float> rgba, std::uint8_t* rgb);
+// Row y of that: four floats a pixel to three levels a pixel.
+void tone_mapped(std::span<const float> rgba, int y, std::uint8_t* rgb);
 // The same to 16 bit; and with alpha, for images with a transparent background.
 Raster16 tone_mapped_16(const Image&);
 Raster8 tone_mapped_alpha(const Image&);

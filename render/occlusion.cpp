@@ -13,7 +13,6 @@ namespace limber::render {
 
 namespace {
 
-constexpr int cells = 150;           // along the longer side of a map
 constexpr int axes = 32;             // each is looked along both ways
 constexpr double off_surface = 1.5;  // cells; √2 is just enough for a plane never to hide its own points
 
@@ -27,7 +26,8 @@ Vec3 axis(int i) {
 // How far along an axis the first and the last surface lie, cell by cell.
 class DepthMap {
  public:
-  DepthMap(const Vec3& along, const Box& box) {
+  // cells: along the longer side.
+  DepthMap(const Vec3& along, const Box& box, int cells) {
     const Vec3 x = along.unitOrthogonal(), y = along.cross(x);
     // The half sizes of the box as the axis sees it.
     const Vec3 half = 0.5 * box.size();
@@ -88,7 +88,8 @@ class DepthMap {
 }  // namespace
 
 Eigen::VectorXd sky_occlusion(const Points& points, const Points& normals,
-                              std::span<const Occluder> occluders, const std::optional<Ground>& ground) {
+                              std::span<const Occluder> occluders, const std::optional<Ground>& ground,
+                              int cells) {
   LIMBER_CHECK(points.rows() == normals.rows(), points.rows(), normals.rows());
   LIMBER_CHECK(points.allFinite() && normals.allFinite(), points.rows());
   Box box;
@@ -104,7 +105,7 @@ Eigen::VectorXd sky_occlusion(const Points& points, const Points& normals,
   std::vector<Vec3f> placed;
   for (int i = 0; i < axes; ++i) {
     const Vec3 along = axis(i);
-    DepthMap map(along, box);
+    DepthMap map(along, box, cells);
     for (const Occluder& occluder : occluders) {
       placed.resize(std::size_t(occluder.positions.rows()));
       for (Eigen::Index v = 0; v < occluder.positions.rows(); ++v)

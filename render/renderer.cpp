@@ -15,6 +15,7 @@
 #include "core/progress.h"
 #include "render/detail/finish.h"
 #include "render/detail/gl_context.h"
+#include "render/detail/grain.h"
 #include "render/detail/ground_shade.h"
 #include "render/detail/layer_lists.h"
 #include "render/detail/line_quads.h"
@@ -35,8 +36,6 @@ constexpr int ground_key_cells = 768, ground_sky_cells = 384;
 // A level patch at height h hides the share h²/(π(h²+r²)²) of the sky from a place r beside its foot. Half a
 // narrow and half a wide Gaussian (deviations in units of h) keep within 0.03 of what it sums to over a disk.
 constexpr double sky_spreads[] = {0.5, 1.6};
-const Vec3 key_light(0.80, 0.78, 0.75);
-const Vec3 sky_light(0.42, 0.445, 0.48);
 
 struct Mesh {
   MeshLook look;
@@ -45,6 +44,8 @@ struct Mesh {
   Eigen::VectorXd occlusion = {};  // empty: none
 
   bool transparent() const { return look.opacity < 1; }
+  bool grained() const { return look.grain > 0 && !transparent(); }
+  bool translucent() const { return look.translucency > 0 && !transparent(); }
   bool casts() const { return look.casts_shadow && (!look.seen || look.opacity >= 0.5); }
 };
 
@@ -72,6 +73,9 @@ void validate(const Look& look) {
           "the key light must stand at least 3 degrees above the horizon");
   require(0 <= look.key_size_deg && look.key_size_deg <= 30,
           fmt::format("key_size_deg is {}, but must lie between 0 and 30", look.key_size_deg));
+  for (const Vec3* light : {&look.key_light, &look.sky_light})
+    require(light->allFinite() && light->minCoeff() >= 0 && light->maxCoeff() <= 4,
+            "key_light and sky_light must lie between 0 and 4 in each channel");
   require(!look.ground_height_m || std::isfinite(*look.ground_height_m), "ground_height_m is not finite");
 }
 
@@ -84,6 +88,11 @@ void validate(const MeshLook& look) {
   in(look.metallic, 0, 1, "metallic");
   in(look.opacity, 0, 1, "opacity");
   in(look.crease_angle_deg, 0, 180, "crease_angle_deg");
+  in(look.translucency, 0, 1, "translucency");
+  in(look.scatter_m, 1e-9, 1e9, "scatter_m");
+  in(look.sheen, 0, 1, "sheen");
+  in(look.grain, 0, 1, "grain");
+  in(look.grain_m, 1e-9, 1e9, "grain_m");
   for (int c = 0; c < 3; ++c) in(look.color_srgb[c], 0, 1, "a channel of its colour");
 }
 
@@ -198,7 +207,8 @@ struct Renderer::Impl {
   Box stage_box;
   double near_m = 1, far_m = 1;
   Mat4 clip_from_world = Mat4::Identity(), shadow_from_world = Mat4::Identity();
-  double shadow_texel_m = 1;
+  double shadow_texel_m = 1, shadow_depth_m = 1;
+  const Texture* entry_map = nullptr;  // of targets
   Eigen::Matrix3d shadow_from_normal = Eigen::Matrix3d::Identity();
   double shadow_softness = 0;  // radius of the half-shade over depth, both in units of the shadow map
   GroundFrame ground;
@@ -281,7 +291,7 @@ void Renderer::Impl::draw_shadow_map() {
     if (mesh.casts()) for_corners(mesh.card.box(), include);
   const double side = std::max({seen.size().x(), seen.size().y(), 1e-6}) * (1 + 8.0 / shadow_size);
   const double depth = std::max(seen.size().z(), 1e-6);
-  shadow_texel_m = side / shadow_size;
+  shadow_texel_m = side / shadow_size, shadow_depth_m = 1.02 * depth;
 
   Mat4 clip_from_light = Mat4::Identity();
   clip_from_light.diagonal() << 2 / side, 2 / side, -2 / (1.02 * depth), 1;
@@ -310,6 +320,21 @@ void Renderer::Impl::draw_shadow_map() {
   }
   glDisable(GL_CULL_FACE);
   glDisable(GL_POLYGON_OFFSET_FILL);
+  entry_map = &targets.shadow_map;
+  const auto stands_in = [](const Mesh& mesh) { return mesh.casts() && !mesh.look.seen; };
+  if (std::none_of(meshes.begin(), meshes.end(), stands_in) ||
+      std::none_of(meshes.begin(), meshes.end(), [](const Mesh& mesh) { return mesh.translucent(); }))
+    return;
+  // The shadow map has the far sides of stand-ins only.
+  entry_map = &targets.entry_map;
+  glBindFramebuffer(GL_FRAMEBUFFER, targets.entry_frame);
+  glViewport(0, 0, Targets::entry_size, Targets::entry_size);
+  glClear(GL_DEPTH_BUFFER_BIT);
+  for (Mesh& mesh : meshes) {
+    if (!mesh.casts()) continue;
+    use_depth(clip_from, clip_planes);
+    mesh.card.draw();
+  }
 }
 
 void Renderer::Impl::shade_ground_maps() {
@@ -361,6 +386,8 @@ const Program& Renderer::Impl::use_mesh(const Mesh& mesh, const std::string& def
   const std::vector<Plane> planes = planes_of(mesh);
   std::string all = plane_defines(planes) + defines;
   if (mesh.card.tinted()) all += "#define TINTED\n";
+  if (mesh.translucent()) all += "#define TRANSLUCENT\n";
+  if (mesh.grained()) all += "#define GRAINED\n";
   if (!clip_planes.empty()) all += "#define FLAT_INSIDE\n";
   const Program& p = mesh_programs.with(all);
   p.use();
@@ -381,8 +408,8 @@ const Program& Renderer::Impl::use_mesh(const Mesh& mesh, const std::string& def
   p.set("up", look.up);
   p.set("toward_key", look.toward_key);
   p.set("toward_box", toward_soft_box(look));
-  p.set("key_light", key_light);
-  p.set("sky_light", sky_light);
+  p.set("key_light", look.key_light);
+  p.set("sky_light", look.sky_light);
   p.set("ground_color", look.ground_height_m ? linear_from_srgb(look.ground_srgb) : Vec3(Vec3::Zero()));
   p.set("ground_key", look.toward_key.dot(look.up));
   p.set("ground_height", ground.height_m);
@@ -399,6 +426,24 @@ const Program& Renderer::Impl::use_mesh(const Mesh& mesh, const std::string& def
   p.set("roughness", mesh.look.roughness);
   p.set("metallic", mesh.look.metallic);
   p.set("opacity", mesh.look.opacity);
+  p.set("sheet", int(mesh.look.sheet));
+  p.set("sheen", mesh.look.sheen);
+  if (mesh.translucent()) {
+    const Vec3 albedo = linear_from_srgb(mesh.look.color_srgb);
+    const Vec3 reach = Vec3::Constant(0.3) + 0.7 * albedo / std::max(albedo.maxCoeff(), 1e-3);
+    p.set("translucency", mesh.look.translucency);
+    p.set("scatter", Vec3(mesh.look.scatter_m / shadow_depth_m * reach));
+    p.set("scatter_radius", 1.5 * mesh.look.scatter_m / (shadow_texel_m * shadow_size));
+    p.set("entry_depth", 3);
+    entry_map->bind(3);
+    glBindSampler(3, targets.blended);
+  }
+  if (mesh.grained()) {
+    p.set("grain", mesh.look.grain);
+    p.set("grains_a_metre", 1 / (grain_waves * mesh.look.grain_m));
+    p.set("grain_map", 4);
+    targets.grain(mesh.look.woven).bind(4);
+  }
   p.set("object", int(&mesh - meshes.data()));
   return p;
 }
@@ -568,19 +613,23 @@ void Renderer::Impl::finish(const RowReader& read) {
   const auto shown_as = [](const Vec3& srgb) {
     return Vec3(linear_from_srgb(srgb).unaryExpr(&tone_unmapped));
   };
-  const double key_share = key_light.y() * look.toward_key.dot(look.up);
-  const Backdrop backdrop{.background_top = shown_as(look.background_top_srgb),
-                          .background_bottom = shown_as(look.background_bottom_srgb),
-                          .ground_seen = ground_seen,
-                          .ground = ground,
-                          .ground_color = shown_as(look.ground_srgb),
-                          .key_shade = &key_shade,
-                          .sky_shade = &sky_shade,
-                          .key_share = key_share / (key_share + sky_light.y()),
-                          .fade_middle = stage_box.center(),
-                          .fade_begin_m = 0.7 * stage_box.diagonal(),
-                          .fade_end_m = 2.6 * stage_box.diagonal() + 1e-6,
-                          .transparent = look.transparent_background};
+  const Vec3 key = look.key_light * look.toward_key.dot(look.up), all = key + look.sky_light;
+  const Vec3 key_share = key.cwiseQuotient(all.cwiseMax(1e-9));
+  const Backdrop backdrop{
+      .background_top = shown_as(look.background_top_srgb),
+      .background_bottom = shown_as(look.background_bottom_srgb),
+      .ground_seen = ground_seen,
+      .ground = ground,
+      .ground_color = shown_as(look.ground_srgb),
+      .key_shade = &key_shade,
+      .sky_shade = &sky_shade,
+      .far_ground_color = shown_as(look.far_ground_srgb.value_or(look.background_bottom_srgb)),
+      .key_share = key_share,
+      .fade_middle = stage_box.center(),
+      .fade_begin_m = 0.5 * stage_box.diagonal(),
+      .fade_end_m = 4 * stage_box.diagonal() + 1e-6,
+      .haze_m = 18 * stage_box.diagonal() + 1e-6,
+      .transparent = look.transparent_background};
   const Finish finished(backdrop, camera, look.width, look.height);
   std::vector<float> row(4 * std::size_t(look.width));
   for (int y = 0; y < look.height; ++y) {
@@ -639,6 +688,7 @@ int Renderer::add_mesh(const Triangles& triangles, const Points& rest_positions,
   limber::validate(SurfaceMesh{rest_positions, triangles}, fmt::format("mesh '{}'", look.name));
   impl_->context.make_current();
   impl_->meshes.push_back({look, MeshOnCard(triangles, rest_positions, look.crease_angle_deg)});
+  if (impl_->meshes.back().grained()) impl_->meshes.back().card.set_rest(rest_positions);
   return int(impl_->meshes.size()) - 1;
 }
 
@@ -760,7 +810,7 @@ Image8 Renderer::draw_shown(const Camera& camera, Passes* passes, StageTimes* ti
   impl_->draw(
       camera,
       [&](int y, std::span<const float> row) {
-        tone_mapped(row, &image.rgb[3 * std::size_t(width) * std::size_t(y)]);
+        tone_mapped(row, y, &image.rgb[3 * std::size_t(width) * std::size_t(y)]);
       },
       passes, times);
   return image;

@@ -19,13 +19,17 @@ struct Look {
   // 4 samples a pixel that share one shading (MSAA); supersampling then counts for nothing. Not faster where
   // triangles are about as small as pixels: see docs/rendering.md.
   bool multisampling = false;
+  // Where a ground is seen, overhead and at the horizon; else at the top and the bottom of the picture.
   Vec3 background_top_srgb = {0.80, 0.84, 0.88};
   Vec3 background_bottom_srgb = {0.93, 0.94, 0.95};
-  Vec3 ground_srgb = {0.93, 0.935, 0.94};  // where nothing shades it
+  Vec3 ground_srgb = {0.93, 0.935, 0.94};  // round the stage, where nothing shades it
+  std::optional<Vec3> far_ground_srgb;     // away from it, before the haze of the horizon; else the horizon's
   std::optional<double> ground_height_m;   // along up; none: no ground
   Vec3 up = {0, 0, 1};
   Vec3 toward_key = {-0.8, -0.35, 1.0};  // towards the key light, above the horizon
   double key_size_deg = 7;  // half angle the key light is seen under: softness of shadows, 0 … 30
+  // Linear: what a white, matt surface square to the light sends, 0 … 4. A warm key and a cool sky part them.
+  Vec3 key_light = {0.80, 0.78, 0.75}, sky_light = {0.42, 0.445, 0.48};
   // The box over the whole motion. Shadow maps and the ground's fade are laid out for it, so nothing swims
   // from frame to frame. Empty: laid out anew for what each frame shows.
   Box stage;
@@ -46,6 +50,18 @@ struct MeshLook {
   double roughness = 0.45;  // 0.05 … 1
   double metallic = 0;      // 0 … 1
   double opacity = 1;       // of each layer that a ray of sight meets; below 0.5 it casts no shadow
+  // Opacity is that of a thin sheet seen face on; slanting, a ray stays in it longer: 1 − (1 − opacity)^(1 /
+  // cos).
+  bool sheet = false;
+  // Light that enters and comes out elsewhere: round the edge of the unlit side, and through thin parts.
+  double translucency = 0;  // 0 … 1
+  double scatter_m =
+      0.03;  // > 0; behind so much of the stuff 1/e of that light is left, less of the colours it lacks
+  double sheen = 0;  // 0 … 1; fibres that light up towards grazing angles
+  // A fine relief that goes with the mesh: a function of the place at rest.
+  double grain = 0;       // 0 … 1; its slope
+  double grain_m = 0.01;  // > 0; its wavelength at rest; what is finer than a sample fades out
+  bool woven = false;     // threads that cross, instead of irregular
   // Edges sharper than this at rest are drawn sharp; 180: all smooth.
   double crease_angle_deg = 50;
   // A coarse closed mesh that is not seen may cast the shadows of a fine one within it that casts none: only

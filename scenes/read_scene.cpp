@@ -428,6 +428,41 @@ void check_inside(const BodySpec& body, const Box& bounds, const Node& position,
   }
 }
 
+template <class Look>
+Look named(const std::string& word, std::initializer_list<std::pair<const char*, Look>> looks) {
+  for (const auto& [name, look] : looks)
+    if (word == name) return look;
+  LIMBER_CHECK(false, word);
+}
+
+BodyLook read_look(const std::string& word) {
+  return named<BodyLook>(word, {{"plain", BodyLook::plain},
+                                {"rubber", BodyLook::rubber},
+                                {"tissue", BodyLook::tissue},
+                                {"bone", BodyLook::bone},
+                                {"fabric", BodyLook::fabric},
+                                {"skin", BodyLook::skin}});
+}
+
+// Where the scene does not say.
+double roughness_of(BodyLook look) {
+  switch (look) {
+    case BodyLook::plain:
+      return 0.45;
+    case BodyLook::rubber:
+      return 0.5;
+    case BodyLook::tissue:
+      return 0.32;
+    case BodyLook::bone:
+      return 0.65;
+    case BodyLook::fabric:
+      return 0.9;
+    case BodyLook::skin:
+      return 0.55;
+  }
+  LIMBER_CHECK(false, int(look));
+}
+
 BodySpec read_body(const Node& table, const Box& bounds) {
   BodySpec body;
   body.name = text(table, "name");
@@ -445,7 +480,11 @@ BodySpec read_body(const Node& table, const Box& bounds) {
   body.model = read_model(child(table, "model"), what);
   body.color_srgb = read_body_color(table, body.role);
   body.opacity = number(table, "opacity");
-  body.roughness = number(table, "roughness"), body.metallic = number(table, "metallic");
+  body.look = table.find("look")                                            ? read_look(text(table, "look"))
+              : body.kind == Kind::deformable && body.role != Role::scenery ? BodyLook::rubber
+                                                                            : BodyLook::plain;
+  body.roughness = maybe_number(table, "roughness").value_or(roughness_of(body.look));
+  body.metallic = number(table, "metallic");
   const Node& pose = child(table, "pose");
   body.pose = {vector(pose, "position_m"), direction(pose, "axis", (what + ".pose.axis").c_str()),
                number(pose, "angle_deg"), text(pose, "anchor")};
@@ -822,7 +861,11 @@ FilmSpec read_film(const Node& table) {
     complain(child(table, "speed"), fmt::format("film.frames_per_second over film.speed are {:g} states a "
                                                 "second of motion, more than 10,000; raise speed",
                                                 film.frames_per_second / film.speed));
-  film.background_srgb = as_color(text(table, "background"));
+  film.look = named<FilmLook>(text(table, "look"), {{"studio", FilmLook::studio},
+                                                    {"dark", FilmLook::dark},
+                                                    {"clinical", FilmLook::clinical},
+                                                    {"paper", FilmLook::paper}});
+  if (table.find("background")) film.background_srgb = as_color(text(table, "background"));
   film.bounds_lines = flag(table, "bounds_lines");
   film.transparent = flag(table, "transparent");
   film.caption = text(table, "caption");

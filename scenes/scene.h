@@ -102,6 +102,10 @@ enum class Deformation { linear, phong };
 // Of soft bodies that are touched at their surface, where the scene does not say; and what is no limit.
 constexpr double usual_max_stretch = 2, any_stretch = 1000;
 
+// What a body's surface is of, and the light it is filmed in: docs/rendering.md.
+enum class BodyLook { plain, rubber, tissue, bone, fabric, skin };
+enum class FilmLook { studio, dark, clinical, paper };
+
 struct BodySpec {
   std::string name;  // letters, digits, _ and -: it names a folder
   Role role = Role::obstacle;
@@ -123,6 +127,7 @@ struct BodySpec {
   FixedSpec fixed;
   Vec3 velocity_m_s = Vec3::Zero(), angular_velocity_rad_s = Vec3::Zero();  // at the start
   Vec3 color_srgb = Vec3::Zero();                                           // 0 … 1
+  BodyLook look = BodyLook::plain;
   double opacity = 1, roughness = 0.45, metallic = 0;
   int triangles = 0;  // scenery: its surface is simplified to about so many; 0: as it is
   std::string where;  // "scene.toml:12:24": its place in the text, for complaints
@@ -219,10 +224,11 @@ struct FilmSpec {
   int width_px = 0, height_px = 0;
   int frames_per_second = 0;
   double speed = 1;  // a second of film shows so many of the motion
-  Vec3 background_srgb = Vec3::Zero();
-  bool bounds_lines = true;  // draw the edges of the bounds as pale lines
-  bool transparent = false;  // neither ground nor background
-  std::string caption;       // UTF-8
+  FilmLook look = FilmLook::studio;
+  std::optional<Vec3> background_srgb;  // nothing: the look's
+  bool bounds_lines = true;             // draw the edges of the bounds as pale lines
+  bool transparent = false;             // neither ground nor background
+  std::string caption;                  // UTF-8
   bool clock = false, scale_bar = false;
   ColorBy color_by = ColorBy::body;
   std::optional<Eigen::Vector2d> color_range;  // nothing: over the whole motion

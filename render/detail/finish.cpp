@@ -13,6 +13,7 @@ namespace limber::render::detail {
 namespace {
 
 constexpr double sky_darkening = 0.85;  // of what the map says
+constexpr float sky_rise = 4;           // the sky has its upper colour from 30° on: 1 / sin² of that
 
 using Halves = std::uint16_t __attribute__((vector_size(8)));
 using Words = std::uint32_t __attribute__((vector_size(16)));
@@ -48,6 +49,8 @@ bool any(Words mask) {
 Floats root(const Floats& x) {
   return Floats{std::sqrt(x[0]), std::sqrt(x[1]), std::sqrt(x[2]), std::sqrt(x[3])};
 }
+
+Floats colour(const Vec3& rgb) { return Floats{float(rgb.x()), float(rgb.y()), float(rgb.z()), 0}; }
 
 // Two cells side by side at each of two places.
 Floats pairs(const float* one, const float* other) {
@@ -136,17 +139,16 @@ void Finish::put_over_ground(int y, float* rgba) const {
   const float step_down = float(-b.ground.up.dot(step)), first_down = float(-b.ground.up.dot(first));
   const float eye_height = float(b.ground.up.dot(camera_.eye) - b.ground.height_m);
   const Lookup key_shade(*b.key_shade, middle), sky_shade(*b.sky_shade, middle);
-  const float key_share = float(b.key_share), sky_share = float((1 - b.key_share) * sky_darkening);
+  const Floats key_share = colour(b.key_share),
+               sky_share = colour(sky_darkening * (Vec3::Ones() - b.key_share));
   const float fade_begin = float(b.fade_begin_m), per_fade = float(1 / (b.fade_end_m - b.fade_begin_m));
 
-  const float share = float(0.5 + 0.5 * height);
-  Floats background, ground;
-  for (int c = 0; c < 3; ++c) {
-    background[c] =
-        float(b.background_bottom[c] + double(share) * (b.background_top[c] - b.background_bottom[c]));
-    ground[c] = float(b.ground_color[c]);
-  }
-  background[3] = ground[3] = 0;
+  const Floats top = colour(b.background_top), bottom = colour(b.background_bottom),
+               ground = colour(b.ground_color), far_ground = colour(b.far_ground_color);
+  const Floats upright = bottom + float(0.5 + 0.5 * height) * (top - bottom);
+  // Of the sky by sin² of the ray's height, so that its colour has no kink at the horizon.
+  const float haze_2 = float(b.haze_m * b.haze_m);
+  const float row_2 = float(1 + height * tangent * height * tangent), pixel_2 = float(pixel * pixel);
 
   for (int x0 = 0; x0 < width_; x0 += 4) {
     const int count = std::min(4, width_ - x0);
@@ -154,7 +156,7 @@ void Finish::put_over_ground(int y, float* rgba) const {
     bool covered = true;
     for (int i = 0; i < count; ++i) covered &= block[4 * i + 3] >= 1;
     if (covered) continue;
-    Floats shown{}, light{};
+    Floats shown{}, key{}, sky{}, haze{}, rise{};
     const Floats x = float(x0) + Floats{0, 1, 2, 3}, down = first_down + x * step_down;
     const Words downward = Words(down > 1e-6f);
     if (b.ground_seen && any(downward)) {
@@ -165,16 +167,28 @@ void Finish::put_over_ground(int y, float* rgba) const {
       if (any(Words(distance_2 > fade_begin * fade_begin)))
         fade = clamped((root(distance_2) - fade_begin) * per_fade, 0, 1);
       shown = std::bit_cast<Floats>(downward & std::bit_cast<Words>(1 - fade * fade * (3 - 2 * fade)));
-      if (any(Words(shown > 0))) light = 1 - key_share * key_shade(u, v) - sky_share * sky_shade(u, v);
+      if (any(Words(shown > 0))) key = key_shade(u, v), sky = sky_shade(u, v);
+      haze = distance_2 / (distance_2 + haze_2);
+    }
+    if (b.ground_seen) {
+      const Floats from_middle = x - 0.5f * float(width_ - 1);
+      rise = clamped(-down, 0, INFINITY);
+      rise = rise * rise / (row_2 + pixel_2 * from_middle * from_middle);
     }
     for (int i = 0; i < count; ++i) {
       Floats pixel_rgba;
       std::memcpy(&pixel_rgba, block + 4 * i, sizeof pixel_rgba);
       const float open = 1 - pixel_rgba[3];
+      const Floats shade = key_share * key[i] + sky_share * sky[i];
       if (b.transparent)
-        pixel_rgba[3] += open * shown[i] * std::max(1 - light[i], 0.0f);
-      else
-        pixel_rgba += open * (background + shown[i] * (ground * light[i] - background));
+        pixel_rgba[3] += open * shown[i] * std::max(shade[1], 0.0f);
+      else if (!b.ground_seen)
+        pixel_rgba += open * upright;
+      else if (down[i] > 1e-6f) {
+        const Floats floor = far_ground + shown[i] * (ground - ground * shade - far_ground);
+        pixel_rgba += open * (floor + haze[i] * (bottom - floor));
+      } else
+        pixel_rgba += open * (bottom + std::min(rise[i] * sky_rise, 1.0f) * (top - bottom));
       std::memcpy(block + 4 * i, &pixel_rgba, sizeof pixel_rgba);
     }
   }

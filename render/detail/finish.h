@@ -12,14 +12,17 @@ namespace limber::render::detail {
 
 // What is seen behind meshes and lines. Colours are linear, as the tone map takes them.
 struct Backdrop {
+  // Where the ground is seen overhead and at the horizon; else at the top and the bottom of the picture.
   Vec3 background_top, background_bottom;
   bool ground_seen = false;
   GroundFrame ground;
   Vec3 ground_color;
   const ShadeMap *key_shade, *sky_shade;
-  double key_share = 1;                     // of the light on open ground
-  Vec3 fade_middle;                         // round it the ground fades out into the background,
-  double fade_begin_m = 0, fade_end_m = 1;  // between these
+  Vec3 far_ground_color = Vec3::Zero();
+  Vec3 key_share = Vec3::Ones();            // of the light on open ground, colour by colour
+  Vec3 fade_middle;                         // round it the ground becomes the far ground,
+  double fade_begin_m = 0, fade_end_m = 1;  // between these,
+  double haze_m = 1;                        // and the horizon: half so at this distance
   // Pixels hold what meshes and lines add, and the ground's shadows as alpha; see Look.
   bool transparent = false;
 };

@@ -9,7 +9,7 @@ namespace limber::render::detail {
 
 namespace {
 
-enum Attribute : GLuint { at_position, at_normal, at_tint, at_scalar };
+enum Attribute : GLuint { at_position, at_normal, at_tint, at_scalar, at_rest };
 
 GLuint new_attribute(GLuint array, Attribute attribute, GLint components, GLenum type) {
   GLuint buffer = 0;
@@ -66,6 +66,15 @@ void MeshOnCard::set_scalars(const Eigen::VectorXd& values) {
   for (const int vertex : drawn_.vertex_from_drawn) drawn.push_back(float(values[vertex]));
   if (scalar_buffer_ == 0) scalar_buffer_ = new_attribute(array_, at_scalar, 1, GL_FLOAT);
   upload(scalar_buffer_, drawn);
+}
+
+void MeshOnCard::set_rest(const Points& rest_positions) {
+  std::vector<float> drawn;
+  drawn.reserve(3 * drawn_.vertex_from_drawn.size());
+  for (const int vertex : drawn_.vertex_from_drawn)
+    for (int i = 0; i < 3; ++i) drawn.push_back(float(rest_positions(vertex, i)));
+  if (rest_buffer_ == 0) rest_buffer_ = new_attribute(array_, at_rest, 3, GL_FLOAT);
+  upload(rest_buffer_, drawn);
 }
 
 void MeshOnCard::draw(std::size_t first_corner, std::size_t corners) const {

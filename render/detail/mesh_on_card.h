@@ -18,6 +18,7 @@ class MeshOnCard {
   // Linear colour and the share of the sky that is open, per row of the positions, (V × 4).
   void set_tints(const Eigen::Matrix<float, Eigen::Dynamic, 4, Eigen::RowMajor>&);
   void set_scalars(const Eigen::VectorXd&);
+  void set_rest(const Points& rest_positions);  // for the grain
   void draw() const { draw(0, drawn_.corners.size()); }
   void draw(std::size_t first_corner, std::size_t corners) const;
   Points edge_ends();  // each edge once, row 2i to row 2i + 1
@@ -31,7 +32,8 @@ class MeshOnCard {
   DrawnMesh drawn_;
   Eigen::Index vertices_;  // rows the caller hands over
   Box box_;
-  unsigned array_ = 0, position_buffer_ = 0, normal_buffer_ = 0, tint_buffer_ = 0, scalar_buffer_ = 0;
+  unsigned array_ = 0, position_buffer_ = 0, normal_buffer_ = 0, tint_buffer_ = 0, scalar_buffer_ = 0,
+           rest_buffer_ = 0;
   std::vector<std::pair<int, int>> edges_;  // drawn vertices; found when first asked for
 };
 

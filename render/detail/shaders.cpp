@@ -33,6 +33,11 @@ out vec4 tint;
 layout(location = 3) in float scalar_in;
 out float scalar;
 #endif
+#ifdef GRAINED
+layout(location = 4) in vec3 rest_in;
+uniform float grains_a_metre;
+out vec3 rest;                   // in wavelengths of the grain's texture
+#endif
 uniform mat4 clip_from_world;
 uniform mat4 shadow_from_world;
 uniform vec3 toward_key;
@@ -54,6 +59,9 @@ void main() {
 #endif
 #ifdef PASSES
   scalar = scalar_in;
+#endif
+#ifdef GRAINED
+  rest = grains_a_metre * rest_in;
 #endif
 #if PLANES > 0
   for (int i = 0; i < PLANES; ++i) gl_ClipDistance[i] = dot(planes[i], vec4(position_in, 1.0));
@@ -84,7 +92,19 @@ uniform vec3 ground_x, ground_y;
 uniform vec2 ground_lower, ground_scale;
 uniform float ground_height;
 uniform float faced_m;           // how far before a wall lies the ground that lights it
-uniform float roughness, metallic, opacity;
+uniform float roughness, metallic, opacity, sheen;
+uniform int sheet;
+#ifdef GRAINED
+in vec3 rest;
+uniform sampler3D grain_map;     // slope of the relief along the three axes at rest, −1 … 1 as 0 … 1
+uniform float grain;
+#endif
+#ifdef TRANSLUCENT
+uniform float translucency;
+uniform vec3 scatter;            // depths of the map by which each colour falls to 1/e
+uniform float scatter_radius;    // the same depth across, in units of the map
+uniform sampler2D entry_depth;   // where the key light first meets anything
+#endif
 uniform mat3 shadow_from_normal;
 uniform float shadow_softness, least_shadow, most_shadow;  // radius of the half-shade, in units of the map: for each unit of depth; limits
 uniform sampler2DShadow shadow_map;
@@ -95,6 +115,12 @@ layout(early_fragment_tests) in;
 #else
 layout(location = 0) out vec4 color;
 #endif
+
+// A direction for each sample: Jimenez' interleaved gradient noise (2014), once round a diamond.
+vec2 around() {
+  float turn = 4.0 * fract(52.9829189 * fract(dot(gl_FragCoord.xy, vec2(0.06711056, 0.00583715))));
+  return normalize(vec2(abs(turn - 2.0) - 1.0, 1.0 - abs(abs(turn - 1.0) - 2.0)));
+}
 
 #ifdef VEILED
 // Four bilinear taps: 4 × 4 texels, of even weight but for a soft rim. A veil has many layers, and shadows on it are faint.
@@ -115,9 +141,7 @@ float key_visibility(vec3 n) {
   vec3 s = shadow_from_normal * n;
   vec2 slope = -s.xy / min(s.z, -0.15 * length(s));
   slope *= min(1.0, 6.0 / max(length(slope), 1e-6));
-  // Jimenez' interleaved gradient noise (2014), once round a diamond.
-  float turn = 4.0 * fract(52.9829189 * fract(dot(gl_FragCoord.xy, vec2(0.06711056, 0.00583715))));
-  vec2 along = normalize(vec2(abs(turn - 2.0) - 1.0, 1.0 - abs(abs(turn - 1.0) - 2.0)));
+  vec2 along = around();
   float search = clamp(shadow_softness * shadow_place.z, least_shadow, most_shadow);
   float above = 0.0, blockers = 0.0;
   for (int i = 0; i < searching; ++i) {
@@ -137,8 +161,26 @@ float key_visibility(vec3 n) {
 }
 #endif
 
+#ifdef GRAINED
+// Bump mapping unparametrized surfaces on the GPU (Mikkelsen 2010), its heights' derivatives by the chain rule.
+vec3 bent(vec3 n) {
+  vec3 slope = grain * (2.0 * texture(grain_map, rest).xyz - 256.0 / 255.0);
+  vec3 across = dFdx(position), upward = dFdy(position);
+  vec3 a = cross(upward, n), b = cross(n, across);
+  float area = dot(across, a);
+  // Heights are in wavelengths, as the places at rest are; a stretched body's slopes fall with its stretch.
+  vec3 gradient = dot(slope, dFdx(rest)) * a + dot(slope, dFdy(rest)) * b;
+  float scale = max(length(dFdx(rest)) / max(length(across), 1e-12), length(dFdy(rest)) / max(length(upward), 1e-12));
+  return normalize(abs(area) * n - (sign(area) / max(scale, 1e-12)) * gradient);
+}
+#endif
+
 void main() {
   vec3 n = normalize(normal) * (gl_FrontFacing ? 1.0 : -1.0);
+  vec3 smooth_n = n;
+#ifdef GRAINED
+  n = bent(n);
+#endif
   vec3 v = normalize(eye - position);
   vec3 h = normalize(toward_key + v);
   float n_key = max(dot(n, toward_key), 0.0);
@@ -155,7 +197,20 @@ void main() {
   float grazing = 1.0 - v_h;
   float grazing2 = grazing * grazing;
   vec3 fresnel = f0 + (1.0 - f0) * (grazing2 * grazing2 * grazing);
-  vec3 key = (diffuse + fresnel * (a2 / (d * d) * visibility)) * (n_key * key_visibility(n)) * key_light;
+  vec3 key = (diffuse + fresnel * (a2 / (d * d) * visibility)) * (n_key * key_visibility(smooth_n)) * key_light;
+#ifdef TRANSLUCENT
+  // Thickness by the first surface that the light meets (Green, GPU Gems 16); what comes out does so on all sides, most
+  // where the light grazes. A colour that the stuff holds back gets less far.
+  // Light spreads sideways as far as it gets, so the mean over a disc counts.
+  vec3 through = vec3(0.0);
+  vec2 aside = scatter_radius * around();
+  for (int i = 0; i < 4; ++i) {
+    float thickness = max(shadow_place.z - texture(entry_depth, shadow_place.xy + aside).r, 0.0);
+    through += 0.25 * exp2(-1.442695 * thickness / scatter);
+    aside = vec2(-aside.y, aside.x) * (i == 1 ? 0.5 : 1.0);
+  }
+  key += (0.5 * translucency * smoothstep(0.55, -0.35, dot(smooth_n, toward_key))) * diffuse * through * key_light;
+#endif
 
   float n_up = dot(n, up);
   // The ground that a surface faces lights it less where it is itself in the dark, as under a body; from higher up one sees
@@ -176,26 +231,31 @@ void main() {
   vec4 k4 = roughness * vec4(-1.0, -0.0275, -0.572, 0.022) + vec4(1.0, 0.0425, 1.04, -0.04);
   float a = min(k4.x * k4.x, exp2(-9.28 * n_v)) * k4.x + k4.y;
   vec2 ab = vec2(-1.04, 1.04) * a + k4.zw;
-  ambient += mirrored * (f0 * ab.x + ab.y);
+  vec3 glossy = mirrored * (f0 * ab.x + ab.y);
 
   float edge = 1.0 - n_v;
-  vec3 rim = sky_light * (0.55 * edge * edge * edge * (0.5 + 0.5 * n_up)) * (0.4 + 0.6 * albedo);
+  vec3 rim = sky_light * ((0.55 + 1.2 * sheen) * edge * edge * edge * (0.5 + 0.5 * n_up)) * (0.4 + 0.6 * albedo);
 #ifdef TINTED
   // What hides the sky sends some light itself, the more the lighter it is (Jimenez et al., Practical Realtime Strategies
   // for Accurate Indirect Occlusion, 2016, eq. 10).
   float sky = tint.a;
   vec3 open_sky = max(vec3(sky), ((sky * (2.0404 * albedo - 0.3324) + (0.6417 - 4.7951 * albedo)) * sky + (2.7552 * albedo + 0.6903)) * sky);
   ambient *= open_sky;
-  rim *= open_sky;
+  // Of a narrow lobe a crevice hides more, the more so towards grazing angles (Lagarde and de Rousiers, Moving Frostbite to PBR,
+  // 2014, listing 26).
+  float open_glossy = clamp(pow(n_v + sky, exp2(-16.0 * roughness - 1.0)) - 1.0 + sky, 0.0, 1.0);
+  glossy *= open_glossy;
+  rim *= sky * sky;
 #endif
-  vec3 light = key + ambient + rim;
+  vec3 light = key + ambient + glossy + rim;
 #ifdef FLAT_INSIDE
   if (!gl_FrontFacing) light = 0.5 * albedo * (sky_light + 0.5 * key_light);
 #endif
 #ifdef VEILED
-  put(vec4(light * opacity, opacity), gl_FragCoord.z);
+  float covered = sheet == 1 ? 1.0 - pow(1.0 - opacity, 1.0 / n_v) : opacity;  // Beer and Lambert
+  put(vec4(light * covered, covered), gl_FragCoord.z);
 #else
-  color = vec4(light * opacity, opacity);
+  color = vec4(light, 1.0);
 #endif
 #ifdef PASSES
   normal_scalar = vec4(n, scalar);

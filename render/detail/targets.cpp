@@ -6,6 +6,7 @@
 #include <span>
 
 #include "core/error.h"
+#include "render/detail/grain.h"
 
 namespace limber::render::detail {
 
@@ -65,8 +66,25 @@ unsigned new_framebuffer(std::initializer_list<Texture> colors, Texture depth) {
 
 void Texture::bind(int unit) const {
   glActiveTexture(GLenum(GL_TEXTURE0 + unit));
-  glBindTexture(multisampled ? GL_TEXTURE_2D_MULTISAMPLE : GL_TEXTURE_2D, id);
+  glBindTexture(multisampled ? GL_TEXTURE_2D_MULTISAMPLE : solid ? GL_TEXTURE_3D : GL_TEXTURE_2D, id);
 }
+
+namespace {
+
+// Reads depths as they are, fully lit beyond the border.
+GLuint depth_sampler(GLint filter) {
+  const float lit[] = {1, 1, 1, 1};
+  GLuint sampler = 0;
+  glGenSamplers(1, &sampler);
+  glSamplerParameteri(sampler, GL_TEXTURE_MIN_FILTER, filter);
+  glSamplerParameteri(sampler, GL_TEXTURE_MAG_FILTER, filter);
+  glSamplerParameteri(sampler, GL_TEXTURE_WRAP_S, GL_CLAMP_TO_BORDER);
+  glSamplerParameteri(sampler, GL_TEXTURE_WRAP_T, GL_CLAMP_TO_BORDER);
+  glSamplerParameterfv(sampler, GL_TEXTURE_BORDER_COLOR, lit);
+  return sampler;
+}
+
+}  // namespace
 
 Targets::Targets(int width, int height, SampleGrid grid) : width_(width), height_(height), grid_(grid) {
   shadow_map = new_texture(GL_LINEAR, GL_CLAMP_TO_BORDER);
@@ -77,12 +95,12 @@ Targets::Targets(int width, int height, SampleGrid grid) : width_(width), height
   glTexImage2D(GL_TEXTURE_2D, 0, GL_DEPTH_COMPONENT32F, shadow_size, shadow_size, 0, GL_DEPTH_COMPONENT,
                GL_FLOAT, nullptr);
   shadow_frame = new_framebuffer({}, shadow_map);
-  glGenSamplers(1, &not_compared);
-  glSamplerParameteri(not_compared, GL_TEXTURE_MIN_FILTER, GL_NEAREST);
-  glSamplerParameteri(not_compared, GL_TEXTURE_MAG_FILTER, GL_NEAREST);
-  glSamplerParameteri(not_compared, GL_TEXTURE_WRAP_S, GL_CLAMP_TO_BORDER);
-  glSamplerParameteri(not_compared, GL_TEXTURE_WRAP_T, GL_CLAMP_TO_BORDER);
-  glSamplerParameterfv(not_compared, GL_TEXTURE_BORDER_COLOR, lit);
+  not_compared = depth_sampler(GL_NEAREST);
+  blended = depth_sampler(GL_LINEAR);
+  entry_map = new_texture(GL_LINEAR, GL_CLAMP_TO_BORDER);
+  glTexImage2D(GL_TEXTURE_2D, 0, GL_DEPTH_COMPONENT32F, entry_size, entry_size, 0, GL_DEPTH_COMPONENT,
+               GL_FLOAT, nullptr);
+  entry_frame = new_framebuffer({}, entry_map);
 
   samples = new_target(GL_RGBA16F, grid);
   samples_depth = new_target(GL_DEPTH_COMPONENT32F, grid);
@@ -103,6 +121,23 @@ const Targets::Passes& Targets::passes() {
         new_framebuffer({passes_.pixel_normal_scalar, passes_.pixel_depth, passes_.pixel_object}, {});
   }
   return passes_;
+}
+
+const Texture& Targets::grain(bool woven) {
+  Texture& grain = grains_[woven];
+  if (grain.id != 0) return grain;
+  grain.solid = true;
+  glGenTextures(1, &grain.id);
+  grain.bind(0);
+  for (const auto& [name, value] :
+       {std::pair{GL_TEXTURE_MIN_FILTER, GL_LINEAR_MIPMAP_NEAREST},
+        std::pair{GL_TEXTURE_MAG_FILTER, GL_LINEAR}, std::pair{GL_TEXTURE_WRAP_S, GL_REPEAT},
+        std::pair{GL_TEXTURE_WRAP_T, GL_REPEAT}, std::pair{GL_TEXTURE_WRAP_R, GL_REPEAT}})
+    glTexParameteri(GL_TEXTURE_3D, GLenum(name), value);
+  glTexImage3D(GL_TEXTURE_3D, 0, GL_RGBA8, grain_cells, grain_cells, grain_cells, 0, GL_RGBA,
+               GL_UNSIGNED_BYTE, grain_slopes(woven).data());
+  glGenerateMipmap(GL_TEXTURE_3D);
+  return grain;
 }
 
 unsigned Targets::resolved_frame() {

@@ -6,7 +6,7 @@ namespace limber::render::detail {
 
 struct Texture {
   unsigned id = 0;
-  bool multisampled = false;
+  bool multisampled = false, solid = false;
   void bind(int unit) const;
 };
 
@@ -24,6 +24,14 @@ class Targets {
   Texture shadow_map;
   unsigned shadow_frame;
   unsigned not_compared;  // a sampler that reads the depths of the shadow map
+  // Where light first meets what casts, of coarse stand-ins too: for thickness. Blended between texels.
+  static constexpr int entry_size = 1024;
+  Texture entry_map;
+  unsigned entry_frame;
+  unsigned blended;  // a sampler
+
+  // The reliefs of grain.h, with smaller ones for what is far.
+  const Texture& grain(bool woven);
 
   // Colour (premultiplied, linear), and the depth of the opaque.
   Texture samples, samples_depth;
@@ -46,6 +54,7 @@ class Targets {
   int width_, height_;
   SampleGrid grid_;
   Passes passes_{};
+  Texture grains_[2];
   unsigned resolved_frame_ = 0;
 };
 

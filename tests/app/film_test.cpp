@@ -46,7 +46,9 @@ TEST_F(Filmed_slow, EveryKeyOfTheFilmChangesThePicture) {
         "film.caption=Hello",       "film.bounds_lines=false",    "film.background=#102030",
         "film.transparent=true",    "camera.turn_deg=90",         "camera.follow=robot",
         "camera.direction=[1,0,0]", "bodies.robot.color=#00ff00", "bodies.robot.opacity=0.5",
-        "bodies.robot.metallic=1",  "bodies.robot.roughness=0.1", "film.scale_bar=true"})
+        "bodies.robot.metallic=1",  "bodies.robot.roughness=0.1", "film.scale_bar=true",
+        "film.look=dark",           "film.look=clinical",         "film.look=paper",
+        "bodies.robot.look=tissue", "bodies.robot.look=fabric"})
     EXPECT_NE(frame_3({"--set", set}), plain) << set;
   EXPECT_EQ(frame_3({}), plain);
   EXPECT_NE(frame_3({"--set", "bodies.robot.deformation=phong"}),

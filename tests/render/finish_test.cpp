@@ -47,14 +47,17 @@ class FinishTest : public testing::Test {
                     .ground_color = {0.9, 0.7, 0.5},
                     .key_shade = &key,
                     .sky_shade = &sky,
-                    .key_share = 0.6,
+                    .far_ground_color = {0.4, 0.35, 0.5},
+                    .key_share = Vec3(0.6, 0.5, 0.7),
                     .fade_middle = Vec3(0.5, -0.2, 1),
                     .fade_begin_m = 3,
-                    .fade_end_m = 9};
+                    .fade_end_m = 9,
+                    .haze_m = 30};
+  Camera camera = above_the_ground();
   std::vector<float> row(const std::vector<std::uint16_t>& samples, int width, int height, int per_side,
                          int y) const {
     std::vector<float> rgba(4 * std::size_t(width));
-    Finish(backdrop, above_the_ground(), width, height).row(y, samples.data(), per_side, rgba.data());
+    Finish(backdrop, camera, width, height).row(y, samples.data(), per_side, rgba.data());
     return rgba;
   }
 };
@@ -101,42 +104,51 @@ TEST_F(FinishTest, TheGroundIsLitAndFadesByWhereARayMeetsIt) {
   backdrop.ground_seen = true;
   constexpr int width = 37, height = 20;
   const std::vector<std::uint16_t> nothing(4 * width * height, 0);
-  const Camera camera = above_the_ground();
-  const Eigen::Matrix3d to_world = camera_from_world(camera).topLeftCorner<3, 3>().transpose();
   const double half = 0.5 * height / std::tan(0.5 * camera.fov_deg * std::numbers::pi / 180);
-  int on_ground = 0, fading = 0, beyond = 0;
-  for (const bool transparent : {false, true}) {
+  int on_ground = 0, fading = 0, beyond = 0, above = 0;
+  for (const auto& [transparent, target_m] : {std::pair(false, 0.4), {true, 0.4}, {false, 2.5}}) {
+    camera.target.z() = target_m;
+    const Eigen::Matrix3d to_world = camera_from_world(camera).topLeftCorner<3, 3>().transpose();
     backdrop.transparent = transparent;
     for (int y = 0; y < height; ++y) {
       const std::vector<float> rgba = row(nothing, width, height, 1, y);
       for (int x = 0; x < width; ++x) {
         const Vec3 ray = to_world * Vec3(x + 0.5 - 0.5 * width, 0.5 * height - y - 0.5, -half);
-        double shown = 0, light = 0;
+        double shown = 0, key_hidden = 0, sky_hidden = 0, haze = 0;
         if (ray.z() < 0) {
           const Vec3 place = camera.eye - (camera.eye.z() - 0.1) / ray.z() * ray;
           const double away = (place - backdrop.fade_middle).head<2>().norm();
           const double t = std::clamp((away - 3) / (9 - 3), 0.0, 1.0);
           shown = 1 - t * t * (3 - 2 * t);
           const Eigen::Vector2d uv = backdrop.ground.plane_from_world * place;
-          light = 1 - 0.6 * (0.4 + 0.02 * uv.x() - 0.01 * uv.y()) -
-                  0.4 * 0.85 * (0.3 - 0.01 * uv.x() + 0.015 * uv.y());
+          // Far away both maps end.
+          const bool mapped = uv.cwiseAbs().maxCoeff() < 19.7;
+          key_hidden = mapped ? 0.4 + 0.02 * uv.x() - 0.01 * uv.y() : 0;
+          sky_hidden = mapped ? 0.85 * (0.3 - 0.01 * uv.x() + 0.015 * uv.y()) : 0;
+          haze = away * away / (away * away + 30 * 30);
           on_ground += t == 0, fading += t > 0 && t < 1, beyond += t == 1;
         }
         const float* pixel = &rgba[4 * std::size_t(x)];
-        const double upward = 1 - (y + 0.5) / height;
+        const auto shade = [&](int c) {
+          return backdrop.key_share[c] * key_hidden + (1 - backdrop.key_share[c]) * sky_hidden;
+        };
         for (int c = 0; c < 3; ++c) {
-          const double behind = backdrop.background_bottom[c] +
-                                upward * (backdrop.background_top[c] - backdrop.background_bottom[c]);
-          const double expected = behind + shown * (backdrop.ground_color[c] * light - behind);
+          const double horizon = backdrop.background_bottom[c], far = backdrop.far_ground_color[c];
+          const double floor = far + shown * (backdrop.ground_color[c] * (1 - shade(c)) - far);
+          const double rise = std::min(1.0, 4 * std::pow(ray.normalized().z(), 2));
+          const double expected = ray.z() < 0 ? floor + haze * (horizon - floor)
+                                              : horizon + rise * (backdrop.background_top[c] - horizon);
           ASSERT_NEAR(pixel[c], transparent ? 0 : expected, 2e-5) << x << " " << y;
         }
-        ASSERT_NEAR(pixel[3], transparent ? shown * (1 - light) : 0, 2e-5) << x << " " << y;
+        ASSERT_NEAR(pixel[3], transparent ? shown * shade(1) : 0, 2e-5) << x << " " << y;
+        above += ray.z() > 0;
       }
     }
   }
   EXPECT_GT(on_ground, 100);
   EXPECT_GT(fading, 100);
   EXPECT_GT(beyond, 20);
+  EXPECT_GT(above, 20);
 }
 
 }  // namespace

@@ -115,10 +115,89 @@ TEST(Renderer, WhereNothingIsTheBackgroundIsTheColourAskedFor) {
   }
   EXPECT_LE((color(shown, 3, look.height - 1) - Vec3(250, 240, 230)).cwiseAbs().maxCoeff(), 1);
   EXPECT_EQ(alpha(image, 3, 3), 0);
-  look.ground_height_m = -0.1;  // the ground fades out: far away is background
+  // With a ground the lower colour is that of the horizon, and of the far ground before it.
+  look.ground_height_m = -0.1;
   const Image8 with_ground =
-      tone_mapped(picture_of(box_mesh({-0.1, -0.1, -0.1}, {0.1, 0.1, 0.1}), look, camera_from({0, -5, 1})));
-  EXPECT_LE((color(with_ground, 3, 0) - color(shown, 3, 0)).cwiseAbs().maxCoeff(), 1);
+      tone_mapped(picture_of(box_mesh({-0.1, -0.1, -0.1}, {0.1, 0.1, 0.1}), look, camera_from({0, -5, 0})));
+  for (const int below : {0, 2})
+    EXPECT_LE((color(with_ground, 3, look.height / 2 + below) - Vec3(250, 240, 230)).cwiseAbs().maxCoeff(),
+              1.01);
+  EXPECT_LT(color(with_ground, 3, 0)[0], 248);
+}
+
+// Of a sheet a slanting ray passes 1 / cos of its thickness, and each part lets through as much as the one
+// before.
+TEST(Renderer, ASheetHidesTheMoreTheMoreItSlants) {
+  constexpr double opacity = 0.2;
+  for (const double slant_deg : {0.0, 40.0, 60.0, 75.0, 84.0}) {
+    const double slant = slant_deg * std::numbers::pi / 180;
+    const Vec3 along(std::sin(slant), -std::cos(slant), 0), up(0, 0, 3);
+    const Vec3 side = 3 * Vec3(std::cos(slant), std::sin(slant), 0);
+    const SurfaceMesh quad = quad_mesh(-side - up, side - up, side + up, up - side);
+    const MeshLook look{.name = "veil", .opacity = opacity, .sheet = true};
+    Camera camera = camera_from({0, -100, 0});
+    camera.fov_deg = 1;
+    const Image image = picture_of(quad, small_look(), camera, look);
+    EXPECT_NEAR(alpha(image, 160, 120), 1 - std::pow(1 - opacity, 1 / std::cos(slant)), 3e-3) << slant_deg;
+  }
+}
+
+// Turned and moved together with light and eye, a body shows the same relief: it goes by the place at rest.
+TEST(Renderer, TheGrainGoesWithTheMesh) {
+  const SurfaceMesh ball = sphere_mesh({0.1, 0.2, 0.3}, 0.5, 60);
+  MeshLook look{.name = "ball", .roughness = 0.3, .grain = 0.6, .grain_m = 0.1};
+  const Eigen::Isometry3d turn = Eigen::Translation3d(3, -2, 5) *
+                                 Eigen::AngleAxisd(1.1, Vec3(0.3, -0.5, 0.8).normalized()) *
+                                 Eigen::Isometry3d::Identity();
+  const auto picture = [&](const Eigen::Isometry3d& moved, bool moves_body) {
+    Look light = small_look();
+    light.up = moved.linear() * light.up, light.toward_key = moved.linear() * light.toward_key;
+    Camera camera = camera_from(moved * Vec3(0.5, -2, 0.8), moved * Vec3(0.1, 0.2, 0.3));
+    camera.up = moved.linear() * camera.up;
+    Renderer renderer(light);
+    const int mesh = renderer.add_mesh(ball.triangles, ball.positions, look);
+    Points positions = ball.positions;
+    if (moves_body)
+      positions = (positions * moved.linear().transpose()).rowwise() + moved.translation().transpose();
+    renderer.set_positions(mesh, positions);
+    return renderer.draw(camera);
+  };
+  const Image still = picture(Eigen::Isometry3d::Identity(), true), moved = picture(turn, true);
+  EXPECT_LT(difference(still, moved).mean, 0.05);
+  const Image woven = (look.woven = true, picture(turn, true)), plain = (look.grain = 0, picture(turn, true));
+  EXPECT_GT(difference(moved, plain).mean, 0.5);
+  EXPECT_GT(difference(woven, plain).mean, 0.5);
+  EXPECT_GT(difference(moved, woven).mean, 0.5);
+}
+
+// White stuff lit from behind: of the light, e to the thickness over the depth is left, by a stand-in, too.
+TEST(Renderer, ThinPartsLetLightThrough) {
+  constexpr double scatter_m = 0.1;
+  Look light = small_look();
+  light.toward_key = {0, 1, 0.1};
+  light.stage.include(Vec3(-1, -1, -1)), light.stage.include(Vec3(1, 1, 1));
+  const auto seen_through = [&](double thickness, bool stand_in) {
+    const SurfaceMesh slab = box_mesh({-0.8, 0, -0.8}, {0.8, thickness, 0.8});
+    double green[2];
+    for (const double translucency : {0.0, 0.5}) {
+      Renderer renderer(light);
+      renderer.add_mesh(slab.triangles, slab.positions,
+                        {.name = "slab",
+                         .color_srgb = {1, 1, 1},
+                         .translucency = translucency,
+                         .scatter_m = scatter_m,
+                         .casts_shadow = !stand_in});
+      if (stand_in) renderer.add_mesh(slab.triangles, slab.positions, {.name = "stand-in", .seen = false});
+      green[translucency > 0] =
+          double(renderer.draw(camera_from({0, -5, 0})).rgba[4 * (120 * 320 + 160) + 1]);
+    }
+    return green[1] - green[0];
+  };
+  for (const bool stand_in : {false, true}) {
+    const double thin = seen_through(0.1, stand_in), thick = seen_through(0.2, stand_in);
+    EXPECT_GT(thin, 0.03);
+    EXPECT_NEAR(std::log(thin / thick), 0.1 * std::sqrt(1.01) / scatter_m, 0.05) << stand_in;
+  }
 }
 
 // Where the shadow of a small plate falls: the middle of the pixels that the plate darkens, once on the

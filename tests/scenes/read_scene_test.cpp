@@ -857,8 +857,11 @@ std::string all_of(const Scene& s) {
   const FilmSpec& f = s.film;
   const Eigen::Vector2d range = f.color_range.value_or(Eigen::Vector2d(-1, -1));
   t += fmt::format("\n{} {} {} {} {} {} {}", f.width_px, f.height_px, f.frames_per_second,
-                   v(f.background_srgb), f.bounds_lines, f.sheet_columns, f.sheet_rows);
-  for (const BodySpec& body : s.scenery) t += fmt::format(" {}", body.triangles);
+                   v(f.background_srgb.value_or(Vec3(-1, -1, -1))), f.bounds_lines, f.sheet_columns,
+                   f.sheet_rows);
+  for (const BodySpec& body : s.bodies) t += fmt::format(" {}", int(body.look));
+  for (const BodySpec& body : s.scenery) t += fmt::format(" {} {}", body.triangles, int(body.look));
+  t += fmt::format(" {}", int(f.look));
   return t + fmt::format("\n{} {} {} {} {} {} {} {} {} {} {} {} {} {}", f.speed, f.transparent, f.caption,
                          f.clock, int(f.color_by), range[0], range[1], f.cages, f.forces, f.path, f.tree,
                          f.side_by_side, f.scale_bar, s.scenery.size());
