@@ -179,7 +179,7 @@ const std::vector<Row> rows{
     {"world.contact_offset_m", "world.contact_offset_m=0.01", world},
     {"world.part_overlaps", "world.part_overlaps=false", world},
     {"world.max_dt_s", "world.max_dt_s=0.0001", world},
-    {"bodies[].kind", "bodies.cart.kind=rigid", world},
+    {"bodies[].kind", "bodies.cart.kind=rigid", world | film},
     {"bodies[].contact", "bodies.cart.contact=cage", world},
     {"bodies[].deformation", "bodies.cart.deformation=phong", world | film},
     {"bodies[].self_contact", "bodies.cart.self_contact=true", world},
