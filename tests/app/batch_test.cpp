@@ -183,14 +183,14 @@ TEST_F(Batch_slow, ASignalEndsItWithinASecondAndWithAllItsProcesses) {
 }
 
 TEST_F(Batch_slow, WhatIsOverALimitFailsAloneAndIsTriedAgainWithAHigherOne) {
-  ball("small.obj", 0), ball("large.obj", 0, 150);
+  ball("small.obj", 0), ball("large.obj", 0, 200);
   const Ended slow = prepare(models(), "out", {"--only", "shells", "--time-limit", "1"});
   EXPECT_EQ(slow.code, exit_models_failed);
   EXPECT_EQ(rows("out").at("large.obj").at("reason"), "time");
   EXPECT_EQ(rows("out").at("small.obj").at("status"), "done");
   EXPECT_EQ(prepare(models(), "out", {"--only", "shells", "--time-limit", "1"}).json.at("failed_before"), 1);
 
-  EXPECT_EQ(prepare(models(), "out", {"--only", "shells", "--memory-limit", "150"}).code, exit_models_failed);
+  EXPECT_EQ(prepare(models(), "out", {"--only", "shells", "--memory-limit", "100"}).code, exit_models_failed);
   EXPECT_EQ(rows("out").at("large.obj").at("reason"), "memory");
   const Ended enough = prepare(models(), "out", {"--only", "shells"});
   EXPECT_EQ(enough.code, exit_done);
