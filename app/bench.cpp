@@ -13,6 +13,7 @@
 #include "app/frame_list.h"
 #include "app/plan_folder.h"
 #include "app/scene_world.h"
+#include "core/content_hash.h"
 #include "core/error.h"
 #include "core/hash.h"
 #include "core/json_shape.h"
@@ -36,15 +37,6 @@ struct Setup {
   std::unique_ptr<FemSystem> system;
 };
 
-// Two builds do not make one benchmark.
-std::string hash_of_program() {
-  try {
-    return hex(hash_of(std::string_view(read_file("/proc/self/exe"))));
-  } catch (const InputError&) {
-    return "unknown";
-  }
-}
-
 Setup set_up(const BenchOptions& options, const std::string& scene, const std::string& preset) {
   Setup setup;
   setup.options.scene = {scene, options.sets, options.data};
@@ -53,7 +45,7 @@ Setup set_up(const BenchOptions& options, const std::string& scene, const std::s
   setup.options.time_limit_s = options.time_limit_s;
   setup.options.in_flight = options.in_flight;
   setup.scene = read_scene(setup.options);
-  setup.bodies = prepare_bodies(setup.scene, options.data, options.out / setup.scene.name);
+  setup.bodies = prepare_bodies(setup.scene, options.data, options.out / setup.scene.name, options.store);
   setup.world = std::make_unique<fem::World>(build_world(setup.scene, setup.bodies));
   setup.system = std::make_unique<FemSystem>(*setup.world, goal_rules_of(setup.scene));
   return setup;
@@ -157,8 +149,8 @@ void run_all(const BenchOptions& options, const std::vector<std::string>& preset
 
   make_folder(options.out / "runs");
   remove_abandoned(options.out / "runs");
-  const std::string program = hash_of_program();
-  std::map<std::size_t, Setup> setups;  // by scene and preset
+  const std::string& program = program_hash();  // two builds do not make one benchmark
+  std::map<std::size_t, Setup> setups;          // by scene and preset
   std::map<std::string, std::string> scene_from_name;
   std::int64_t done = 0;
   Progress progress("bench", std::int64_t(runs.size()));
