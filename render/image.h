@@ -47,8 +47,8 @@ double tone_mapped(double linear);
 double tone_unmapped(double shown);  // inverse, for colours that must come out as they were asked for; < 1
 
 // Tone map, then sRGB, dithered: over a tile of dither_rows × dither_columns pixels of one colour the mean is
-// that colour's within a fiftieth of a level, and no pixel is off by a whole level. Slow gradients show no
-// bands. Rows keep long runs of one level, so that PNG files stay small: docs/rendering.md.
+// that colour's within a fiftieth of a level, and no pixel is off by more than some 1.02 levels. Slow
+// gradients show no bands. Rows keep long runs of one level, so that PNG files stay small: docs/rendering.md.
 constexpr int dither_rows = 8, dither_columns = 256;
 Image8 tone_mapped(const Image&);
 // Row y of that: four floats a pixel to three levels a pixel.
