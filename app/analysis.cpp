@@ -129,9 +129,10 @@ Json json_of(const GapFigures& gap, double size) {
 }  // namespace
 
 MotionFigures measure_motion(const fem::World& world, const std::vector<PreparedBody>& bodies,
-                             const plan::Trajectory& path) {
+                             const plan::Trajectory& path, const Surfaces* known) {
   MotionFigures figures = measure_motion(world, path);
-  std::vector<SeenFrame> seen = measure_seen(world, bodies, path.frames);
+  std::vector<SeenFrame> seen = known ? measure_seen(world, *known, path.frames)
+                                      : measure_seen(world, Surfaces(world, bodies), path.frames);
   for (std::size_t f = 0; f < seen.size(); ++f) {
     const SeenFrame& frame = seen[f];
     if (frame.overlap_m > figures.deepest_overlap_m) {

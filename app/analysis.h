@@ -60,7 +60,9 @@ struct MotionFigures {
 };
 // Without surfaces: all but what is seen.
 MotionFigures measure_motion(const fem::World&, const plan::Trajectory&);
-MotionFigures measure_motion(const fem::World&, const std::vector<PreparedBody>&, const plan::Trajectory&);
+// With those that a search has looked at, nullptr for none.
+MotionFigures measure_motion(const fem::World&, const std::vector<PreparedBody>&, const plan::Trajectory&,
+                             const Surfaces* = nullptr);
 Json json_of(const MotionFigures&);  // as plan, verify and bench print them
 
 // A row a frame, for each body its figures and then what is of all: docs/files.md.

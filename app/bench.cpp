@@ -55,7 +55,7 @@ Setup set_up(const BenchOptions& options, const std::string& scene, const std::s
   setup.scene = read_scene(setup.options);
   setup.bodies = prepare_bodies(setup.scene, options.data, options.out / setup.scene.name);
   setup.world = std::make_unique<fem::World>(build_world(setup.scene, setup.bodies));
-  setup.system = std::make_unique<FemSystem>(*setup.world, goal_rules_of(setup.scene));
+  setup.system = std::make_unique<FemSystem>(*setup.world, setup.bodies, goal_rules_of(setup.scene));
   return setup;
 }
 
@@ -105,7 +105,8 @@ Json robot_path(const Setup& setup, const plan::Trajectory& path) {
 }
 
 Json record_of(const Setup& setup, const plan::Plan& plan, const Json& identity) {
-  const MotionFigures figures = measure_motion(*setup.world, setup.bodies, plan.trajectory);
+  const MotionFigures figures =
+      measure_motion(*setup.world, setup.bodies, plan.trajectory, setup.system->surfaces());
   std::string explanation = plan::explain(plan);
   if (!plan.solved()) explanation += " " + diagnose(*setup.world, *setup.system, plan).text;
   char host[256] = "unknown";

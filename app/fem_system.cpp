@@ -6,6 +6,8 @@
 
 #include "app/workspace.h"
 #include "core/hash.h"
+#include "core/progress.h"
+#include "core/threads.h"
 #include "fem/batch.h"
 #include "fem/observe.h"
 
@@ -14,8 +16,9 @@ namespace limber::app {
 namespace {
 
 constexpr int preferred_lanes = 16;
-// Goes up where the laws of motion change: plans made before are of another world.
-constexpr int edition = 1;
+// Goes up where the laws of motion or of what a search refuses change: plans made before are of another
+// world.
+constexpr int edition = 2;
 constexpr int widths[] = {1, 4, 8, 16};
 
 // Nothing where nothing happens by itself.
@@ -231,6 +234,13 @@ FemSystem::FemSystem(const fem::World& world, const GoalRules& goal, std::option
   hash_ = hasher.digest();
 }
 
+FemSystem::FemSystem(const fem::World& world, const std::vector<PreparedBody>& bodies, const GoalRules& goal)
+    : FemSystem(world, goal) {
+  surfaces_ = std::make_shared<const Surfaces>(world, bodies);
+  surface_size_m_ = bounding_box(bodies[std::size_t(world.robot)].surface.positions).size().maxCoeff();
+  for (const auto& via : via_) via->surfaces_ = surfaces_, via->surface_size_m_ = surface_size_m_;
+}
+
 State FemSystem::start() const { return given_start_ ? *given_start_ : fem::start_state(world_); }
 Vec3 FemSystem::robot_center(const State& state) const {
   return fem::center_of_mass_m(world_, state, world_.robot);
@@ -253,6 +263,24 @@ bool FemSystem::acceptable(const State& state) const {
       if (double(state.positions[std::size_t(3 * n + 2)]) < *last.lost_below_m) return false;
   }
   return fem::is_sound(world_, state);
+}
+std::size_t FemSystem::first_refused(std::span<const State> frames) const {
+  if (!surfaces_ || !world_.touches_on_surfaces()) return frames.size();
+  const SeenLimits limits;
+  const std::size_t at_once = 8 * std::size_t(thread_count());
+  for (std::size_t from = 0; from < frames.size(); from += at_once) {
+    const std::size_t count = std::min(at_once, frames.size() - from);
+    std::vector<char> refused(count);
+    parallel_for(int(count), [&](int i) {
+      throw_if_stopped();
+      const SeenFrame seen = surfaces_->overlaps(frames[from + std::size_t(i)]);
+      refused[std::size_t(i)] = seen.overlap_m > limits.overlap * surface_size_m_ ||
+                                seen.self_overlap_m > limits.self_overlap * surface_size_m_;
+    });
+    const auto first = std::find(refused.begin(), refused.end(), char(true));
+    if (first != refused.end()) return from + std::size_t(first - refused.begin());
+  }
+  return frames.size();
 }
 const plan::System& FemSystem::on_leg(int leg) const {
   return leg < int(via_.size()) ? static_cast<const plan::System&>(*via_[std::size_t(leg)]) : *this;

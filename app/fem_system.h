@@ -6,6 +6,7 @@
 #include <optional>
 #include <vector>
 
+#include "app/seen.h"
 #include "fem/cost.h"
 #include "fem/world.h"
 #include "plan/system.h"
@@ -28,6 +29,9 @@ class FemSystem final : public plan::System {
   // The world must outlive it. Begins where the world does, or in a state of the caller's.
   explicit FemSystem(const fem::World& world, const GoalRules& = {},
                      std::optional<State> start = std::nullopt);
+  // For searches: ways are refused whose surfaces are deeper in one another, or in themselves, than
+  // SeenLimits lets them be seen, where contact is on the surfaces. The bodies must outlive it.
+  FemSystem(const fem::World&, const std::vector<PreparedBody>&, const GoalRules&);
 
   State start() const override;
   Vec3 robot_center(const State&) const override;
@@ -48,6 +52,8 @@ class FemSystem final : public plan::System {
   int lanes() const override;
   std::unique_ptr<plan::Propagator> make_propagator() const override;
   fem::Cost cost() const;  // of all propagators that have ended
+  std::size_t first_refused(std::span<const State> frames) const override;
+  const Surfaces* surfaces() const { return surfaces_.get(); }  // nullptr where it was given no bodies
 
  private:
   class Propagator;
@@ -59,6 +65,8 @@ class FemSystem final : public plan::System {
   const FemSystem* last_ = this;  // on the leg to the last goal: what is lost to it is lost
   Vec3 goal_body_start_m_;
   std::uint64_t hash_;
+  std::shared_ptr<const Surfaces> surfaces_;
+  double surface_size_m_ = 0;  // of the robot's
   mutable std::mutex mutex_;
   mutable fem::Cost cost_;
 };

@@ -170,7 +170,8 @@ std::string text_of(const Json& s, const std::string& extra, const fs::path& fil
   return fmt::format(
       "{}\n"
       "{}{}"
-      "  search       {} iterations, {} nodes, {} diverged, {} rejected; {:.2f} CPU s, {:.2f} s\n"
+      "  search       {} iterations, {} nodes, {} diverged, {} rejected, {} ways refused; {:.2f} CPU s, "
+      "{:.2f} s\n"
       "  memory       {:.1f} kB a node, {:.1f} where nothing is shared with the parent\n"
       "  dynamics     contact {:.2f} × the force step; a lane takes {:.1f} µs to load, {:.1f} µs to store\n"
       "{}"
@@ -180,10 +181,11 @@ std::string text_of(const Json& s, const std::string& extra, const fs::path& fil
       s.at("explanation").get<std::string>(), s.contains("parted") ? text_of_parting(s) : "",
       s.contains("legs") ? text_of_legs(s.at("legs")) : "", t.at("iterations").get<std::int64_t>(),
       s.at("nodes").get<int>(), t.at("diverged").get<std::int64_t>(), t.at("rejected").get<std::int64_t>(),
-      t.at("cpu_s").get<double>(), t.at("wall_s").get<double>(), 1e-3 * s.at("node_bytes").get<double>(),
-      1e-3 * s.at("node_bytes_unshared").get<double>(), d.at("contact_of_force_step").get<double>(),
-      d.at("load_us").get<double>(), d.at("store_us").get<double>(), text_of_motion(s), extra,
-      s.at("tree_hash").get<std::string>(), s.at("trajectory_hash").get<std::string>(), file.string());
+      t.at("refused").get<std::int64_t>(), t.at("cpu_s").get<double>(), t.at("wall_s").get<double>(),
+      1e-3 * s.at("node_bytes").get<double>(), 1e-3 * s.at("node_bytes_unshared").get<double>(),
+      d.at("contact_of_force_step").get<double>(), d.at("load_us").get<double>(),
+      d.at("store_us").get<double>(), text_of_motion(s), extra, s.at("tree_hash").get<std::string>(),
+      s.at("trajectory_hash").get<std::string>(), file.string());
 }
 
 // `earlier` is the summary of the plan that this one goes on from, null for none: a solved one has its rounds
@@ -328,7 +330,7 @@ Outcome plan(const PlanOptions& options, const scenes::Scene& scene) {
   remove_abandoned(options.out);
   const std::vector<PreparedBody> bodies = prepare_bodies(scene, options.scene.data, options.out);
   const fem::World world = build_world(scene, bodies);
-  const FemSystem system(world, goal_rules_of(scene));
+  const FemSystem system(world, bodies, goal_rules_of(scene));
   const plan::Settings settings = settings_of(scene, options);
   const fs::path file = options.out / "plan.npz";
   const bool several = options.portfolio > 1;
@@ -415,7 +417,7 @@ Outcome keep_plan(const fs::path& folder, const scenes::Scene& scene, const std:
   try {
     const NothingToKeep nothing_to_keep;
     throw_if_stopped();
-    figures = measure_motion(world, bodies, plan.trajectory);
+    figures = measure_motion(world, bodies, plan.trajectory, system.surfaces());
     plan.measured = true;
   } catch (const Interrupted&) {
     plan.measured = false;

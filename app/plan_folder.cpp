@@ -116,8 +116,9 @@ bool begins_elsewhere(const PlanFolder& planned) {
   return planned.plan.simulation && planned.summary.contains("from");
 }
 
-FemSystem system_of(const PlanFolder& planned, const fem::World& world) {
-  if (!planned.plan.simulation) return FemSystem(world, goal_rules_of(planned.scene));
+FemSystem system_of(const PlanFolder& planned, const fem::World& world,
+                    const std::vector<PreparedBody>& bodies) {
+  if (!planned.plan.simulation) return FemSystem(world, bodies, goal_rules_of(planned.scene));
   if (!begins_elsewhere(planned)) return FemSystem(world);
   return FemSystem(world, {}, State(planned.plan.tree.states[0]));
 }

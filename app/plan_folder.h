@@ -61,7 +61,7 @@ PlanFolder read_searched_folder(const fs::path& folder);
 bool begins_elsewhere(const PlanFolder&);
 
 // The system that the folder's motion is of: of a simulation without a goal, and from where it began.
-FemSystem system_of(const PlanFolder&, const fem::World&);
+FemSystem system_of(const PlanFolder&, const fem::World&, const std::vector<PreparedBody>&);
 
 // The first entry of plan.npz that limber would write otherwise, or not at all; "" where there is none.
 std::string odd_entry(const fs::path& folder, const PlanFolder&, const std::vector<PreparedBody>&);

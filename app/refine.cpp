@@ -71,7 +71,8 @@ Outcome refine(const RefineOptions& options) {
   const std::vector<PreparedBody> bodies = prepare_bodies(scene, options.data, options.out);
 
   const fem::World coarse_world = world_of(planned, coarse_bodies), world = build_world(scene, bodies);
-  const FemSystem coarse(coarse_world, goal_rules_of(planned.scene)), system(world, goal_rules_of(scene));
+  const FemSystem coarse(coarse_world, goal_rules_of(planned.scene)),
+      system(world, bodies, goal_rules_of(scene));
   plan::Reference reference = plan::reference_of(coarse, planned.plan.trajectory);
   const auto robot = std::size_t(scene.robot);
   for (Control& control : reference.controls)

@@ -405,7 +405,7 @@ Outcome report(const fs::path& folder, const std::optional<fs::path>& file) {
   const PlanFolder planned = read_plan_folder(folder);
   const std::vector<PreparedBody> bodies = read_bodies_of(planned, folder);
   const fem::World world = build_world(planned.scene, bodies);
-  const FemSystem system = system_of(planned, world);
+  const FemSystem system = system_of(planned, world, bodies);
   MotionFigures figures;
   const Outcome verified = verify_plan(folder, planned, bodies, world, figures);
   const Findings findings{

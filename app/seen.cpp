@@ -1,15 +1,12 @@
 #include "app/seen.h"
 
 #include <algorithm>
-#include <deque>
 #include <map>
-#include <optional>
 
 #include "app/motion_files.h"
 #include "core/progress.h"
 #include "core/threads.h"
 #include "fem/observe.h"
-#include "meshing/surface_overlap.h"
 
 namespace limber::app {
 
@@ -64,64 +61,79 @@ double gap_to_wall(const Box& bounds, const Side& side, const Box& surface) {
   return std::max(0.0, gap);
 }
 
-class Surfaces {
- public:
-  Surfaces(const fem::World& world, const std::vector<PreparedBody>& bodies)
-      : world_(world), bodies_(bodies) {
-    for (std::size_t b = 0; b < bodies.size(); ++b) {
-      const Points rest = surface_at_rest(world.bodies[b], bodies[b]);
-      at_rest_.emplace_back(shapes_.emplace_back(rest, bodies[b].surface.triangles), rest);
+}  // namespace
+
+Surfaces::Surfaces(const fem::World& world, const std::vector<PreparedBody>& bodies)
+    : world_(world), bodies_(bodies) {
+  for (std::size_t b = 0; b < bodies.size(); ++b) {
+    const Points rest = surface_at_rest(world.bodies[b], bodies[b]);
+    at_rest_.emplace_back(shapes_.emplace_back(rest, bodies[b].surface.triangles), rest);
+  }
+}
+
+Surfaces::Placed Surfaces::placed(const State& state, std::deque<meshing::PlacedSurface>& moved) const {
+  Placed now;
+  for (std::size_t b = 0; b < bodies_.size(); ++b)
+    now.push_back(world_.bodies[b].moving
+                      ? &moved.emplace_back(shapes_[b], surface_at(world_, bodies_[b], state, int(b)))
+                      : &at_rest_[b]);
+  return now;
+}
+
+SeenFrame Surfaces::overlaps(const State& state) const {
+  const std::uint64_t hash = hash_of(state);
+  {
+    const std::lock_guard lock(mutex_);
+    if (const auto known = known_.find(hash); known != known_.end()) return known->second;
+  }
+  std::deque<meshing::PlacedSurface> moved;
+  const SeenFrame frame = measure(placed(state, moved));
+  const std::lock_guard lock(mutex_);
+  return known_[hash] = frame;
+}
+
+SeenFrame Surfaces::measure(const Placed& now) const {
+  SeenFrame frame;
+  for (int a = 0; a < int(now.size()); ++a) {
+    const fem::Body& body = world_.bodies[std::size_t(a)];
+    const meshing::PlacedSurface& one = *now[std::size_t(a)];
+    for (int b = a + 1; b < int(now.size()); ++b) {
+      if (!body.pushed() && !world_.bodies[std::size_t(b)].pushed()) continue;
+      const double depth = meshing::overlap(one, *now[std::size_t(b)]).depth_m;
+      if (depth > frame.overlap_m) frame.overlap_m = depth, frame.overlap_body = a, frame.overlap_other = b;
+    }
+    if (!body.moving || body.kind != fem::BodyKind::deformable) continue;
+    const double depth = meshing::self_overlap(one, at_rest_[std::size_t(a)]).depth_m;
+    if (depth > frame.self_overlap_m) frame.self_overlap_m = depth, frame.self_overlap_body = a;
+  }
+  return frame;
+}
+
+namespace {
+
+std::vector<SeenFrame::Gap> gaps_of(const fem::World& world, const Surfaces::Placed& now,
+                                    const Pressing& pressing, double least_force_n) {
+  std::vector<SeenFrame::Gap> gaps;
+  for (const auto& [side, press] : pressing) {
+    if (!(press.force_n > least_force_n)) continue;
+    const meshing::PlacedSurface& one = *now[std::size_t(side.body)];
+    if (side.other < 0) {
+      const Vec3 near = one.closest_point(press.place_m);
+      gaps.push_back({side.body, -1, gap_to_wall(world.bounds_m, side, one.box()),
+                      gap_to_wall(world.bounds_m, side, {near, near})});
+    } else {
+      const meshing::PlacedSurface& other = *now[std::size_t(side.other)];
+      const double near = gap_near(one, other, press.place_m);
+      gaps.push_back({side.body, side.other, meshing::gap(one, other, near).distance_m, near});
     }
   }
-
-  SeenFrame measure(const State& state, const Pressing& pressing, double least_force_n) const {
-    std::deque<meshing::PlacedSurface> moved;
-    std::vector<const meshing::PlacedSurface*> now;
-    for (std::size_t b = 0; b < bodies_.size(); ++b)
-      now.push_back(world_.bodies[b].moving
-                        ? &moved.emplace_back(shapes_[b], surface_at(world_, bodies_[b], state, int(b)))
-                        : &at_rest_[b]);
-    SeenFrame frame;
-    for (int a = 0; a < int(now.size()); ++a) {
-      const fem::Body& body = world_.bodies[std::size_t(a)];
-      const meshing::PlacedSurface& one = *now[std::size_t(a)];
-      for (int b = a + 1; b < int(now.size()); ++b) {
-        if (!body.pushed() && !world_.bodies[std::size_t(b)].pushed()) continue;
-        const double depth = meshing::overlap(one, *now[std::size_t(b)]).depth_m;
-        if (depth > frame.overlap_m) frame.overlap_m = depth, frame.overlap_body = a, frame.overlap_other = b;
-      }
-      if (!body.moving || body.kind != fem::BodyKind::deformable) continue;
-      const double depth = meshing::self_overlap(one, at_rest_[std::size_t(a)]).depth_m;
-      if (depth > frame.self_overlap_m) frame.self_overlap_m = depth, frame.self_overlap_body = a;
-    }
-    for (const auto& [side, press] : pressing) {
-      if (!(press.force_n > least_force_n)) continue;
-      const meshing::PlacedSurface& one = *now[std::size_t(side.body)];
-      if (side.other < 0) {
-        const Vec3 near = one.closest_point(press.place_m);
-        frame.gaps.push_back({side.body, -1, gap_to_wall(world_.bounds_m, side, one.box()),
-                              gap_to_wall(world_.bounds_m, side, {near, near})});
-      } else {
-        const meshing::PlacedSurface& other = *now[std::size_t(side.other)];
-        const double near = gap_near(one, other, press.place_m);
-        frame.gaps.push_back({side.body, side.other, meshing::gap(one, other, near).distance_m, near});
-      }
-    }
-    return frame;
-  }
-
- private:
-  const fem::World& world_;
-  const std::vector<PreparedBody>& bodies_;
-  std::deque<meshing::SurfaceShape> shapes_;
-  std::deque<meshing::PlacedSurface> at_rest_;
-};
+  return gaps;
+}
 
 }  // namespace
 
-std::vector<SeenFrame> measure_seen(const fem::World& world, const std::vector<PreparedBody>& bodies,
+std::vector<SeenFrame> measure_seen(const fem::World& world, const Surfaces& surfaces,
                                     const std::vector<State>& frames) {
-  const Surfaces surfaces(world, bodies);
   std::vector<Pressing> pressing(frames.size());
   parallel_for(int(frames.size()), [&](int f) {
     if (nothing_to_keep()) throw_if_stopped();
@@ -134,7 +146,10 @@ std::vector<SeenFrame> measure_seen(const fem::World& world, const std::vector<P
   parallel_for(int(frames.size()), [&](int f) {
     if (nothing_to_keep()) throw_if_stopped();
     const std::size_t i = std::size_t(f);
-    seen[i] = surfaces.measure(frames[i], pressing[i], pressing_share * largest_n);
+    seen[i] = surfaces.overlaps(frames[i]);
+    if (pressing[i].empty()) return;
+    std::deque<meshing::PlacedSurface> moved;
+    seen[i].gaps = gaps_of(world, surfaces.placed(frames[i], moved), pressing[i], pressing_share * largest_n);
   });
   return seen;
 }

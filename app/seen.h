@@ -2,12 +2,16 @@
 // docs/seen.md.
 #pragma once
 
+#include <deque>
+#include <mutex>
 #include <string>
+#include <unordered_map>
 #include <vector>
 
 #include "app/body.h"
 #include "core/state.h"
 #include "fem/world.h"
+#include "meshing/surface_overlap.h"
 
 namespace limber::app {
 
@@ -37,8 +41,30 @@ struct SeenFrame {
 // of the largest such sum of the whole motion.
 constexpr double pressing_share = 1e-3;
 
+// The surfaces of all bodies, ready to be moved to where a state has them; world and bodies must outlive it.
+// May be used from several threads at once.
+class Surfaces {
+ public:
+  Surfaces(const fem::World&, const std::vector<PreparedBody>&);
+
+  using Placed = std::vector<const meshing::PlacedSurface*>;  // [body]
+  // Those that move are kept in `moved`.
+  Placed placed(const State&, std::deque<meshing::PlacedSurface>& moved) const;
+  // All but gaps; kept, so that to ask again costs nothing.
+  SeenFrame overlaps(const State&) const;
+
+ private:
+  SeenFrame measure(const Placed&) const;
+
+  const fem::World& world_;
+  const std::vector<PreparedBody>& bodies_;
+  std::deque<meshing::SurfaceShape> shapes_;
+  std::deque<meshing::PlacedSurface> at_rest_;
+  mutable std::mutex mutex_;
+  mutable std::unordered_map<std::uint64_t, SeenFrame> known_;  // by hash of the state
+};
+
 // One a frame.
-std::vector<SeenFrame> measure_seen(const fem::World&, const std::vector<PreparedBody>&,
-                                    const std::vector<State>& frames);
+std::vector<SeenFrame> measure_seen(const fem::World&, const Surfaces&, const std::vector<State>& frames);
 
 }  // namespace limber::app

@@ -211,7 +211,8 @@ plan::Plan searched_again(const FemSystem& system, plan::Settings settings, cons
   settings.time_limit_s = std::numeric_limits<double>::infinity();
   const plan::Plan found = plan::plan(system, settings, std::nullopt, [&](const plan::Moment& now) {
     if (now.nodes > then.tree.size() || now.statistics.diverged > then.statistics.diverged ||
-        now.statistics.rejected > then.statistics.rejected)
+        now.statistics.rejected > then.statistics.rejected ||
+        now.statistics.refused > then.statistics.refused)
       throw GoneAstray{};
   });
   throw_if_stopped();
@@ -237,8 +238,9 @@ void check_search(const PlanFolder& planned, const FemSystem& system, const plan
     }
     const plan::Statistics &now = found.statistics, &then = plan.statistics;
     const bool counted = now.iterations == then.iterations && now.diverged == then.diverged &&
-                         now.rejected == then.rejected && now.rollout_steps == then.rollout_steps &&
-                         then.rollouts >= then.iterations && then.rollouts_wrong <= then.rollouts &&
+                         now.rejected == then.rejected && now.refused == then.refused &&
+                         now.rollout_steps == then.rollout_steps && then.rollouts >= then.iterations &&
+                         then.rollouts_wrong <= then.rollouts &&
                          (settings.laws.lag == 0 || then.rollouts_wrong == 0);
     searched = found.tree.size();  // none where it went astray
     const bool later = planned.summary.contains("shortcut") || planned.summary.contains("improve");
@@ -252,8 +254,8 @@ void check_search(const PlanFolder& planned, const FemSystem& system, const plan
     table.row("searched again from the scene: the same tree", same,
               fmt::format("seed {}, {} nodes", settings.seed, searched));
     table.row("searched again from the scene: the same counts", counted,
-              fmt::format("{} iterations, {} diverged, {} rejected, {} steps", now.iterations, now.diverged,
-                          now.rejected, now.rollout_steps));
+              fmt::format("{} iterations, {} diverged, {} rejected, {} ways refused, {} steps",
+                          now.iterations, now.diverged, now.rejected, now.refused, now.rollout_steps));
   } else {
     table.row("the tree starts where the world does", same, "");
   }
@@ -529,7 +531,7 @@ void check_simulation(const fs::path& folder, const PlanFolder& planned,
                       MotionFigures& figures, Promises& table) {
   const plan::Plan& plan = planned.plan;
   const plan::Simulation& simulation = *plan.simulation;
-  const FemSystem system = system_of(planned, world);
+  const FemSystem system = system_of(planned, world, bodies);
   plan::Settings settings;
   settings.frames_per_second = planned.scene.film.frames_per_second / planned.scene.film.speed;
   table.row("its frames are as many a second as the scene says",
@@ -567,7 +569,7 @@ void check_plan(const fs::path& folder, const PlanFolder& planned, const std::ve
   table.row("plan.npz holds what limber writes, and no more", odd.empty(),
             odd.empty() ? "" : odd + " is not as limber writes it");
   if (plan.simulation) return check_simulation(folder, planned, bodies, world, figures, table);
-  const FemSystem system = system_of(planned, world);
+  const FemSystem system = system_of(planned, world, bodies);
   const plan::Settings settings = settings_for(planned.scene, plan.settings);
   const std::string other = first_difference(plan::json_of(settings), plan::json_of(plan.settings));
   table.row("the plan's settings are the scene's", other.empty(), other.empty() ? "" : other + " is not");
@@ -580,7 +582,8 @@ void check_plan(const fs::path& folder, const PlanFolder& planned, const std::ve
   check_path(plan, settings, replay, table);
   figures = measure_motion(world, bodies,
                            {plan.trajectory.controls, plan.trajectory.settle_steps,
-                            settings.frames_per_second, course.frames, course.end});
+                            settings.frames_per_second, course.frames, course.end},
+                           system.surfaces());
   check_goals(planned, world, replay, table);
   check_forces(plan, settings, figures, table);
   check_shapes(figures, world, table);

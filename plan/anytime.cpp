@@ -36,6 +36,9 @@ class Bounded final : public System {
     const double now = double(s.step - first_step_) * system_.dt_s();
     return now + least_to_go_s(s) < bound_s_ && system_.acceptable(s);
   }
+  std::size_t first_refused(std::span<const State> frames) const override {
+    return system_.first_refused(frames);
+  }
   bool goal_holds(const State& s) const override { return system_.goal_holds(s); }
   Vec3 goal_shift(const State& s) const override { return system_.goal_shift(s); }
   const System& on_leg(int leg) const override {

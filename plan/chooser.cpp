@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "core/error.h"
 #include "plan/steering.h"
@@ -39,16 +40,29 @@ void Chooser::add(const Tree& tree, int of_tree) {
   centers_.push_back(center);
   centers_from_goal_.push_back(center - shift.cast<float>());
   times_s_.push_back(double(state.step) * system_.dt_s());
-  children_.push_back(0);
+  children_.push_back(0), refused_.push_back(false);
   if (!guidance_) return;
   const int parent = tree.parents[std::size_t(of_tree)] - root_;  // < 0: of the root
   if (parent >= 0) {
-    ranking_.erase(std::lower_bound(ranking_.begin(), ranking_.end(), std::pair(promise(parent), parent)));
+    unrank(parent);
     ++children_[std::size_t(parent)];
     rank(parent);
   }
   rank(node);
   if (parent >= 0 && settings_.laws.learn_prices) learn(tree.controls[std::size_t(of_tree)], parent, node);
+}
+
+void Chooser::refuse(int of_tree) {
+  const int node = of_tree - root_;
+  LIMBER_CHECK(node > 0 && !refused_[std::size_t(node)], node);
+  refused_[std::size_t(node)] = true;
+  constexpr float nowhere = std::numeric_limits<float>::infinity();  // farther than any other
+  for (Centers* centers : {&centers_, &centers_from_goal_}) centers->x[std::size_t(node)] = nowhere;
+  if (guidance_) unrank(node);
+}
+
+void Chooser::unrank(int node) {
+  ranking_.erase(std::lower_bound(ranking_.begin(), ranking_.end(), std::pair(promise(node), node)));
 }
 
 void Chooser::rank(int node) {
@@ -58,7 +72,8 @@ void Chooser::rank(int node) {
 
 void Chooser::rank_all() {
   ranking_.clear();
-  for (int node = 0; node < centers_.size(); ++node) ranking_.emplace_back(promise(node), node);
+  for (int node = 0; node < centers_.size(); ++node)
+    if (!refused_[std::size_t(node)]) ranking_.emplace_back(promise(node), node);
   std::sort(ranking_.begin(), ranking_.end());
 }
 
@@ -95,6 +110,7 @@ void Chooser::learn(const Control& control, int parent, int node) {
 double Chooser::cost(const Draw& d, int of_tree) const { return cost_of(d, of_tree - root_); }
 
 double Chooser::cost_of(const Draw& d, int node) const {
+  if (refused_[std::size_t(node)]) return std::numeric_limits<double>::infinity();
   if (settings_.laws.metric == Metric::distance)
     return double(
         squared_distance(d.towards_goal ? centers_from_goal_[node] : centers_[node], d.point.cast<float>()));

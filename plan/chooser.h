@@ -23,7 +23,9 @@ class Chooser {
   Chooser(const System&, const Settings&, const Guidance*, int root);
 
   void add(const Tree&, int node);  // nodes in order, the root first
-  Aim choose(const Draw&) const;    // there is a node
+  void refuse(int node);            // not the root; no expansion starts there any more
+  bool refused(int node) const { return refused_[std::size_t(node - root_)]; }
+  Aim choose(const Draw&) const;  // there is a node
   Aim aim(const Draw&, int node) const;
   double cost(const Draw&, int node) const;
 
@@ -34,6 +36,7 @@ class Chooser {
   Control control(const Draw&, int node) const;
   double promise(int node) const;  // seconds to the goal; less is better
   void rank(int node);
+  void unrank(int node);
   void rank_all();
   void learn(const Control&, int parent, int node);
   double strongest() const;  // metres a second squared
@@ -46,7 +49,8 @@ class Chooser {
   std::vector<Departure> departures_;
   std::vector<double> times_s_;                  // of the nodes
   std::vector<int> children_;                    // of a node
-  std::vector<std::pair<double, int>> ranking_;  // (promise, node), ascending
+  std::vector<bool> refused_;                    // is a node
+  std::vector<std::pair<double, int>> ranking_;  // (promise, node) of those that are not, ascending
   int raised_ = 0;                               // prices since the cost-to-go was last renewed
 };
 

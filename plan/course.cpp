@@ -196,6 +196,13 @@ void run_batch(const System& system, const Settings& settings, std::span<Course>
 
 }  // namespace
 
+bool may_be_shown(const System& system, const Settings& settings, const Course& course) {
+  Course shown;
+  shown.from = course.from, shown.controls = course.controls;
+  run(system, settings, {&shown, 1}, {.keep_frames = true, .ask_acceptable = false, .stoppable = true});
+  return system.first_refused(shown.frames) == shown.frames.size();
+}
+
 double cost_in(const Costs& costs, CostKind kind) {
   switch (kind) {
     case CostKind::duration:

@@ -62,4 +62,8 @@ struct CourseOptions {
 // later: the cheapest of them, and the first of equals, is the same for any number of lanes and threads.
 void run(const System&, const Settings&, std::span<Course>, const CourseOptions&);
 
+// Whether System::first_refused lets all frames of a course that was run and rests in the goal pass. Runs it
+// again. Throws Interrupted.
+bool may_be_shown(const System&, const Settings&, const Course&);
+
 }  // namespace limber::plan

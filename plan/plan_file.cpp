@@ -316,7 +316,7 @@ Statistics statistics_from_json(const Reader& reader, const Json& json) {
   reader.require(
       s.iterations <= most_iterations,
       fmt::format("statistics.iterations is {}; it must be at most {}", s.iterations, most_iterations));
-  s.diverged = count("diverged"), s.rejected = count("rejected");
+  s.diverged = count("diverged"), s.rejected = count("rejected"), s.refused = count("refused");
   s.rollout_steps = count("rollout_steps"), s.rollouts = count("rollouts");
   s.rollouts_wrong = count("rollouts_wrong");
   s.cpu_s = seconds("cpu_s"), s.wall_s = seconds("wall_s");
@@ -326,10 +326,9 @@ Statistics statistics_from_json(const Reader& reader, const Json& json) {
 }  // namespace
 
 Json json_of(const Statistics& s) {
-  return {{"iterations", s.iterations}, {"diverged", s.diverged},
-          {"rejected", s.rejected},     {"rollout_steps", s.rollout_steps},
-          {"rollouts", s.rollouts},     {"rollouts_wrong", s.rollouts_wrong},
-          {"cpu_s", s.cpu_s},           {"wall_s", s.wall_s}};
+  return {{"iterations", s.iterations}, {"diverged", s.diverged}, {"rejected", s.rejected},
+          {"refused", s.refused},       {"rollouts", s.rollouts}, {"rollouts_wrong", s.rollouts_wrong},
+          {"cpu_s", s.cpu_s},           {"wall_s", s.wall_s},     {"rollout_steps", s.rollout_steps}};
 }
 
 namespace {

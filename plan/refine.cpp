@@ -226,7 +226,7 @@ Plan refine(const System& system, const Settings& settings, const Reference& ref
   replay.controls = in_steps_of(system.dt_s(), reference.controls, reference.dt_s);
   run(system, settings, {&replay, 1}, {});
   report.replay_cpu_s = spent();
-  if (replay.result == Course::rests_in_goal) {
+  if (replay.result == Course::rests_in_goal && may_be_shown(system, settings, replay)) {
     report.how = RefineReport::replayed;
     return solved_by(system, settings, replay);
   }
@@ -235,7 +235,7 @@ Plan refine(const System& system, const Settings& settings, const Reference& ref
   const Course followed = follower.follow(report);
   const Course arrived = follower.complete() ? arrive(system, settings, followed) : Course{};
   report.track_cpu_s = spent();
-  if (arrived.result == Course::rests_in_goal) {
+  if (arrived.result == Course::rests_in_goal && may_be_shown(system, settings, arrived)) {
     report.how = RefineReport::tracked;
     return solved_by(system, settings, arrived);
   }

@@ -1,5 +1,6 @@
 #include "plan/search.h"
 
+#include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <condition_variable>
@@ -242,16 +243,25 @@ class Search {
 
   // Goes through the earlier plan's commits again, so that each expansion that was on its way is drawn as it
   // was.
-  void restore() {
+  void restore() try {
     int node = plan_.legs.back().root;
     for (chooser_.add(plan_.tree, node++);; ++committed_) {
       if (laws_.lag > 0) draw_ahead();
       if (committed_ == plan_.statistics.iterations) break;
-      if (node < plan_.tree.size() && plan_.tree.iterations[std::size_t(node)] == committed_)
-        chooser_.add(plan_.tree, node++);
+      if (node == plan_.tree.size() || plan_.tree.iterations[std::size_t(node)] != committed_) continue;
+      chooser_.add(plan_.tree, node);
+      if (!plan_.solved()) {
+        const State state = plan_.tree.states[std::size_t(node)];
+        const Arrival arrival = arrival_of(state, place_of(state), plan_.tree.parents[std::size_t(node)],
+                                           plan_.tree.controls[std::size_t(node)]);
+        if (arrival.kind == Arrival::refused) refuse(arrival, node);
+      }
+      ++node;
     }
     next_iteration_ = std::max(next_iteration_, committed_);
     draw_ahead();
+  } catch (const Interrupted&) {
+    end(Ending::stopped);  // and the plan is as it was
   }
 
   void compute_again(Expansion& e) {
@@ -270,17 +280,31 @@ class Search {
   }
 
   void commit(const Expansion& e) {
+    const bool grows = e.outcome.kind == Outcome::node && !chooser_.refused(e.aimed.node);
+    const Vec3 place = e.outcome.center - e.outcome.goal_shift;
+    Arrival arrival;
+    try {
+      if (grows) arrival = arrival_of(e.outcome.state, place, e.aimed.node, e.control);
+    } catch (const Interrupted&) {
+      return end(Ending::stopped);  // who resumes computes it again
+    }
     Statistics& statistics = plan_.statistics;
     ++committed_;
     ++statistics.iterations;
     statistics.rollout_steps += e.control.steps;
     statistics.diverged += e.outcome.kind == Outcome::diverged;
-    statistics.rejected += e.outcome.kind == Outcome::rejected;
-    if (e.outcome.kind == Outcome::node) {
+    statistics.rejected += e.outcome.kind != Outcome::diverged && !grows;
+    if (grows) {
       const int node = plan_.tree.add(e.outcome.state, e.aimed.node, e.control, e.iteration,
                                       e.outcome.center.cast<float>());
       chooser_.add(plan_.tree, node);
-      consider_for_goal(node, e.outcome.center - e.outcome.goal_shift);
+      if (arrival.kind == Arrival::refused) {
+        ++statistics.refused;
+        refuse(arrival, node);
+        choose_again();
+      } else {
+        consider(node, distance_at(place), arrival.kind == Arrival::rests);
+      }
       if (laws_.lag == 0) aim_overtaken(node);
     }
     progress_.update(statistics.iterations, fmt::format("{} nodes, {:.3g} m from the goal, {:.0f} a second",
@@ -297,10 +321,73 @@ class Search {
     return now;
   }
 
-  void consider_for_goal(int node, const Vec3& center) {  // as seen from the goal's start
-    const double distance = (center - settings_.goal.center_of_mass_m).norm();
-    const bool solves = holds(settings_.goal, center) &&
-                        comes_to_rest(system_, settings_, plan_.tree.states[std::size_t(node)]);
+  // What a new node would be to the goal.
+  struct Arrival {
+    enum { elsewhere, rests, refused } kind = elsewhere;
+    int edges_before = 0;  // refused: from the root of the leg to the edge that leads into the refused frame
+  };
+
+  Vec3 place_of(const State& state) const {  // as seen from the goal's start
+    return system_.robot_center(state) - system_.goal_shift(state);
+  }
+  double distance_at(const Vec3& place) const { return (place - settings_.goal.center_of_mass_m).norm(); }
+
+  // Of the state to which `control` leads from `parent`, at `place`. Throws Interrupted.
+  Arrival arrival_of(const State& state, const Vec3& place, int parent, const Control& control) const {
+    if (!holds(settings_.goal, place)) return {};
+    Course settle, way;
+    settle.from = state;
+    plan::run(system_, settings_, {&settle, 1}, {.keep_frames = true, .stoppable = true});
+    if (settle.result != Course::rests_in_goal) return {};
+    const Tree& tree = plan_.tree;
+    const int root = plan_.legs.back().root;
+    way.from = tree.states[std::size_t(root)];
+    for (int node = parent; node != root; node = tree.parents[std::size_t(node)])
+      way.controls.push_back(tree.controls[std::size_t(node)]);
+    std::reverse(way.controls.begin(), way.controls.end());
+    way.controls.push_back(control);
+    plan::run(
+        system_, settings_, {&way, 1},
+        {.settle = CourseOptions::never, .keep_frames = true, .ask_acceptable = false, .stoppable = true});
+    LIMBER_CHECK(way.end == state, way.end.step, state.step);
+    std::vector<State> frames;  // after the root, whose own frame is of the leg before
+    for (Course* course : {&way, &settle})
+      for (State& frame : course->frames)
+        if (frame.step > (frames.empty() ? way.from.step : frames.back().step))
+          frames.push_back(std::move(frame));
+    const std::size_t first = system_.first_refused(frames);
+    if (first == frames.size()) return {Arrival::rests};
+    const auto there = std::find_if(way.states.begin(), way.states.end() - 1,
+                                    [&](const State& end) { return end.step >= frames[first].step; });
+    return {Arrival::refused, int(there - way.states.begin())};
+  }
+
+  // Nothing grows any more from the way to `node` after so many edges.
+  void refuse(const Arrival& arrival, int node) {
+    const std::vector<int> path = path_to(plan_.tree, node);
+    const auto root = std::find(path.begin(), path.end(), plan_.legs.back().root);
+    const int first = root[arrival.edges_before + 1];
+    for (int n = first; n <= node; ++n)
+      if (!chooser_.refused(n) && (n == first || chooser_.refused(plan_.tree.parents[std::size_t(n)])))
+        chooser_.refuse(n);
+  }
+
+  // What was aimed at, or the best, may have been refused.
+  void choose_again() {
+    if (chooser_.refused(plan_.best_node)) {
+      plan_.best_distance_m = std::numeric_limits<double>::infinity();
+      for (int n = plan_.legs.back().root; n < plan_.tree.size(); ++n)
+        if (!chooser_.refused(n))
+          consider(n, distance_at(place_of(plan_.tree.states[std::size_t(n)])), false);
+    }
+    for (Expansion& e : queue_) {
+      if (laws_.lag > 0 || !chooser_.refused(e.aimed.node)) continue;
+      e.aimed = chooser_.choose(e.draw);
+      aimed_anew(e);
+    }
+  }
+
+  void consider(int node, double distance, bool solves) {
     if (!solves && distance >= plan_.best_distance_m) return;
     plan_.best_distance_m = distance;
     plan_.best_node = node;
@@ -313,9 +400,13 @@ class Search {
     for (Expansion& e : queue_) {
       if (!(chooser_.cost(e.draw, node) < e.aimed.cost)) continue;  // the first of equals stays
       e.aimed = chooser_.aim(e.draw, node);
-      if (e.status == Expansion::running) e.overtaken = true;
-      if (e.status == Expansion::finished) compute_again(e);
+      aimed_anew(e);
     }
+  }
+
+  void aimed_anew(Expansion& e) {
+    if (e.status == Expansion::running) e.overtaken = true;
+    if (e.status == Expansion::finished) compute_again(e);
   }
 
   void look_at_limits() {
@@ -495,6 +586,9 @@ std::string explain(const Plan& plan) {
   if (statistics.diverged + statistics.rejected > 0)
     text += fmt::format(" {} rollouts diverged and {} ended in states that are not acceptable.",
                         statistics.diverged, statistics.rejected);
+  if (statistics.refused > 0)
+    text +=
+        fmt::format(" {} ways to {} were refused, for what would be seen of them.", statistics.refused, goal);
   return text;
 }
 

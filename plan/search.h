@@ -13,8 +13,10 @@ namespace limber::plan {
 struct Statistics {
   // Expansions of the sequential algorithm; the same for any thread count and any in_flight.
   std::int64_t iterations = 0;
-  std::int64_t diverged = 0;       // of those: no node, the dynamics diverged
-  std::int64_t rejected = 0;       // of those: no node, System::acceptable said no
+  std::int64_t diverged = 0;  // of those: no node, the dynamics diverged
+  // Of those: no node, System::acceptable said no, or what it grew from was refused meanwhile.
+  std::int64_t rejected = 0;
+  std::int64_t refused = 0;        // ways to a goal: System::first_refused found one of their frames
   std::int64_t rollout_steps = 0;  // asked for by those
   // The work really done; varies with threads and in_flight.
   std::int64_t rollouts = 0;        // computed; the surplus over iterations was in vain
@@ -68,7 +70,8 @@ struct Moment {
 using Watch = std::function<void(const Moment&)>;
 
 // Searches until a node lies in the goal and comes to rest there (one goal after the other where there are
-// several), or a limit ends it; SIGINT and SIGTERM
+// several) by a way no frame of which is refused, or a limit ends it. A refused way stays in the tree, but
+// nothing grows from its first refused edge any more. SIGINT and SIGTERM
 // (core/progress.h) end it too, and what was found is kept. Tree and trajectory depend on system and settings
 // alone; in_flight and threads are free. With `earlier` (the plan of a search that was cut short, of the same
 // system and settings save for limits) goes on from there, to the bytes that one uninterrupted search gives.

@@ -224,9 +224,14 @@ Course shortcut(const System& system, const Settings& settings, const ShortcutSe
       const double cost = cost_in(courses[i].costs, shortcuts.cost);
       if (courses[i].result == Course::rests_in_goal && cost < least) best = int(i), least = cost;
     }
-    if (best >= 0) {
-      path = joined(path, first[std::size_t(best)], std::move(courses[std::size_t(best)]));
-      ++report.accepted;
+    try {
+      // Where it may not, the next best is not asked: how many of the others a race lets end is chance.
+      if (best >= 0 && may_be_shown(system, settings, courses[std::size_t(best)])) {
+        path = joined(path, first[std::size_t(best)], std::move(courses[std::size_t(best)]));
+        ++report.accepted;
+      }
+    } catch (const Interrupted&) {
+      break;  // the round is not done
     }
     progress.update(round + 1, fmt::format("{:.3g} s", path.costs.duration_s));
   }

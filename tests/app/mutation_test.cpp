@@ -106,7 +106,7 @@ struct Mutant {
   // plan.npz with the world's hash, its summary, manifest.json and the pictures.
   void write_plan() {
     const fem::World world = build_world(planned.scene, bodies);
-    const FemSystem system(world, goal_rules_of(planned.scene));
+    const FemSystem system(world, bodies, goal_rules_of(planned.scene));
     planned.plan.system_hash = system.hash();
     const MotionFigures figures = measure_motion(world, bodies, planned.plan.trajectory);
     planned.summary.update(facts_of(planned.plan, world, system, figures));
@@ -266,6 +266,7 @@ List of_the_plan() {
   add("fewer iterations", counts, [](plan::Plan& p) { --p.statistics.iterations; });
   add("how many diverged", counts, [](plan::Plan& p) { ++p.statistics.diverged; });
   add("how many were rejected", counts, [](plan::Plan& p) { ++p.statistics.rejected; });
+  add("how many ways were refused", counts, [](plan::Plan& p) { ++p.statistics.refused; });
   add("steps of rollouts", counts, [](plan::Plan& p) { --p.statistics.rollout_steps; });
   add("fewer rollouts than iterations", counts, [](plan::Plan& p) { p.statistics.rollouts = 1; });
   add("rollouts in vain", counts, [](plan::Plan& p) { ++p.statistics.rollouts_wrong; });

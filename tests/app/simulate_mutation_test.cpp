@@ -59,7 +59,7 @@ struct Mutant {
 
   void write() {
     const fem::World world = build_world(planned.scene, bodies);
-    const FemSystem system = system_of(planned, world);
+    const FemSystem system = system_of(planned, world, bodies);
     planned.plan.system_hash = system.hash();
     const MotionFigures figures = measure_motion(world, bodies, planned.plan.trajectory);
     planned.summary.update(facts_of(planned.plan, world, system, figures));

@@ -292,7 +292,7 @@ void edit_once(plan::Plan& plan, Script& script) {
     }
     case 1: {
       plan::Statistics& s = plan.statistics;
-      std::array counts{&s.iterations,    &s.diverged, &s.rejected,
+      std::array counts{&s.iterations,    &s.diverged, &s.rejected,      &s.refused,
                         &s.rollout_steps, &s.rollouts, &s.rollouts_wrong};
       std::int64_t& count = *counts[std::size_t(script.below(int(counts.size())))];
       count = script.whole(count);

@@ -78,6 +78,88 @@ TEST(Laws, ALaggingTreeIsTheSequentialOneOfItsRule) {
   });
 }
 
+// Settings under which some ways to the goal go above what may be shown, and a point that they lead.
+constexpr float low = 1.2f;
+std::vector<Settings> refusing_settings() {
+  Settings paper = toy_settings(), fast = fast_settings();
+  paper.settle.max_duration_s = 10;
+  paper.max_iterations = fast.max_iterations = 500;
+  return {paper, fast};
+}
+
+// Of each node, in the order in which they came, found once more by what is simulated: where it ends a way to
+// the goal that goes too high, nothing grows from the edge that does so first; where it does not, it is the
+// solution.
+TEST(Laws, NothingGrowsFromARefusedEdge) {
+  Toy toy(1, true, false, 99);
+  toy.refused_above_z = low;
+  for (Settings s : refusing_settings()) {
+    SCOPED_TRACE(s.laws.lag);
+    std::int64_t refused = 0, solved = 0;
+    for (s.seed = 1; s.seed <= 12; ++s.seed) {
+      const Plan p = plan(toy, s);
+      std::vector<int> barren;
+      for (int n = 1; n < p.tree.size(); ++n) {
+        const std::vector<int> path = path_to(p.tree, n);
+        for (const int node : barren)
+          ASSERT_EQ(std::count(path.begin(), path.end(), node), 0) << "node " << n << ", seed " << s.seed;
+        const State state = p.tree.states[std::size_t(n)];
+        if (!holds(s.goal, toy.robot_center(state)) || !comes_to_rest(toy, s, state)) continue;
+        const Trajectory way = trajectory_to(toy, s, p.tree, n, true);
+        const std::size_t first = toy.first_refused(way.frames);
+        ASSERT_EQ(first == way.frames.size(), n == p.goal_node);
+        if (n == p.goal_node) break;
+        const auto edge = std::find_if(path.begin(), path.end() - 1, [&](int node) {
+          return p.tree.states[std::size_t(node)].step >= way.frames[first].step;
+        });
+        barren.push_back(*edge);
+      }
+      EXPECT_EQ(p.statistics.refused, std::int64_t(barren.size()));
+      for (int node : path_to(p.tree, p.best_node))
+        EXPECT_EQ(std::count(barren.begin(), barren.end(), node), 0) << "the best is of a refused way";
+      refused += p.statistics.refused, solved += p.solved();
+    }
+    EXPECT_GT(refused, 4);
+    EXPECT_TRUE(s.laws.lag > 0 || solved > 6) << solved;
+  }
+}
+
+TEST(Laws, RefusingGivesTheSameBytesForAnyThreadsAndLanesAndInParts) {
+  Toy toy(1, true, false, 99);
+  toy.refused_above_z = low;
+  for (Settings s : refusing_settings()) {
+    SCOPED_TRACE(s.laws.lag);
+    int refusing = 0;
+    for (s.seed = 1; s.seed <= 12 && refusing < 3; ++s.seed) {
+      const Plan whole = plan(toy, s);
+      if (whole.statistics.refused == 0) continue;
+      ++refusing;
+      const auto same = [&](const Plan& p) {
+        EXPECT_EQ(hash_of(p.tree), hash_of(whole.tree)) << s.seed;
+        EXPECT_EQ(hash_of(p.trajectory), hash_of(whole.trajectory));
+        EXPECT_EQ(p.statistics.refused, whole.statistics.refused);
+        EXPECT_EQ(p.statistics.rejected, whole.statistics.rejected);
+        EXPECT_EQ(p.best_node, whole.best_node);
+        EXPECT_EQ(p.best_distance_m, whole.best_distance_m);
+      };
+      for (const int threads : {1, 2})
+        for (const int lanes : {1, 16}) {
+          const Threads limited(threads);
+          toy.lanes_wanted = lanes;
+          same(plan(toy, s));
+        }
+      toy.lanes_wanted = 1;
+      for (std::int64_t cut = 0; cut < whole.statistics.iterations;
+           cut += 1 + whole.statistics.iterations / 5) {
+        Settings part = s;
+        part.max_iterations = cut;
+        same(plan(toy, s, plan(toy, part)));
+      }
+    }
+    EXPECT_EQ(refusing, 3);
+  }
+}
+
 TEST(Laws, SameBytesForAnyThreadsAndLanes) {
   for_each_toy([](Toy& toy) {
     const Settings s = fast_settings();

@@ -65,6 +65,25 @@ TEST(Shortcut, WhatIsNotClearIsNotAcceptable) {
   EXPECT_EQ(shortened(says_so), shortened(shows_it));
 }
 
+// Nor does one rise where it may not be shown, if the path that it shortens did not.
+TEST(Shortcut, GoesNoWayThatIsRefused) {
+  Toy free(1, true, false, 99), low(1, true, false, 99);
+  low.refused_above_z = 1.1f;
+  Settings s = toy_settings();
+  s.settle.max_duration_s = 10;
+  int bound = 0, accepted = 0;
+  for (s.seed = 1; s.seed <= 8; ++s.seed) {
+    Plan p = plan(low, s), higher = p;
+    if (!p.solved()) continue;
+    accepted += shorten(low, p, {.rounds = 4}).accepted;
+    shorten(free, higher, {.rounds = 4});
+    EXPECT_EQ(low.first_refused(p.trajectory.frames), p.trajectory.frames.size()) << s.seed;
+    bound += low.first_refused(higher.trajectory.frames) < higher.trajectory.frames.size();
+  }
+  EXPECT_GT(accepted, 3);
+  EXPECT_GT(bound, 0) << "no shortcut would have gone there";
+}
+
 TEST(Shortcut, NeverCostsMoreNorLastsLongerAndSolvesTheQuery) {
   for (const CostKind cost : all_costs) {
     int accepted = 0;

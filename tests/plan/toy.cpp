@@ -1,5 +1,6 @@
 #include "tests/plan/toy.h"
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <thread>
@@ -137,6 +138,11 @@ std::uint64_t Toy::hash() const {
 }
 
 bool Toy::acceptable(const State& s) const { return robot_center(s).z() <= double(unacceptable_above_z); }
+
+std::size_t Toy::first_refused(std::span<const State> frames) const {
+  const auto above = [&](const State& s) { return robot_center(s).z() > double(refused_above_z); };
+  return std::size_t(std::find_if(frames.begin(), frames.end(), above) - frames.begin());
+}
 
 Measures Toy::measures(const State& s) const {
   Measures m;

@@ -20,6 +20,7 @@ struct Toy final : System {
   bool lava = false;                // a rollout through y < 0.5 diverges
   float unacceptable_above_z = 99;  // no node may be there
   float not_clear_above_z = 99;     // nor there, as propagators tell of what they step
+  float refused_above_z = 99;       // no frame of a way to a goal may be there
   Vec3 goal_velocity_m_s = Vec3::Zero();
   std::optional<State> begins_at;  // else at rest at (1, 1.5, 1)
   int lanes_wanted = 1;
@@ -41,6 +42,7 @@ struct Toy final : System {
   double dt_s() const override { return 0.01; }
   std::uint64_t hash() const override;
   bool acceptable(const State&) const override;
+  std::size_t first_refused(std::span<const State>) const override;
   bool is_clear(const State& s) const { return robot_center(s).z() <= double(not_clear_above_z); }
   Vec3 goal_shift(const State& s) const override { return goal_velocity_m_s * (double(s.step) * dt_s()); }
   Measures measures(
