@@ -27,13 +27,32 @@ namespace limber::app {
 
 namespace {
 
-// A scene under a preset: all that its runs share.
+// A scene under a preset: all that its runs share. Stays where it is, for the system knows its bodies.
 struct Setup {
+  Setup(const BenchOptions& bench, const std::string& scene_given, const std::string& preset)
+      : options(options_of(bench, scene_given, preset)),
+        scene(read_scene(options)),
+        bodies(prepare_bodies(scene, bench.data, bench.out / scene.name)),
+        world(build_world(scene, bodies)),
+        system(world, bodies, goal_rules_of(scene)) {}
+  Setup(const Setup&) = delete;
+
+  static PlanOptions options_of(const BenchOptions& bench, const std::string& scene,
+                                const std::string& preset) {
+    PlanOptions options;
+    options.scene = {scene, bench.sets, bench.data};
+    options.preset = preset;
+    options.iterations = bench.iterations;
+    options.time_limit_s = bench.time_limit_s;
+    options.in_flight = bench.in_flight;
+    return options;
+  }
+
   PlanOptions options;
   scenes::Scene scene;
   std::vector<PreparedBody> bodies;
-  std::unique_ptr<fem::World> world;
-  std::unique_ptr<FemSystem> system;
+  fem::World world;
+  FemSystem system;
 };
 
 // Two builds do not make one benchmark.
@@ -43,20 +62,6 @@ std::string hash_of_program() {
   } catch (const InputError&) {
     return "unknown";
   }
-}
-
-Setup set_up(const BenchOptions& options, const std::string& scene, const std::string& preset) {
-  Setup setup;
-  setup.options.scene = {scene, options.sets, options.data};
-  setup.options.preset = preset;
-  setup.options.iterations = options.iterations;
-  setup.options.time_limit_s = options.time_limit_s;
-  setup.options.in_flight = options.in_flight;
-  setup.scene = read_scene(setup.options);
-  setup.bodies = prepare_bodies(setup.scene, options.data, options.out / setup.scene.name);
-  setup.world = std::make_unique<fem::World>(build_world(setup.scene, setup.bodies));
-  setup.system = std::make_unique<FemSystem>(*setup.world, setup.bodies, goal_rules_of(setup.scene));
-  return setup;
 }
 
 // All that a run's result depends on.
@@ -69,7 +74,7 @@ Json identity_of(const Setup& setup, const plan::Settings& settings, const std::
   return {{"version", version},
           {"program", program},
           {"scene_hash", hex(scene.digest())},
-          {"system_hash", hex(setup.system->hash())},
+          {"system_hash", hex(setup.system.hash())},
           {"settings", shaping}};
 }
 
@@ -97,7 +102,7 @@ Json robot_path(const Setup& setup, const plan::Trajectory& path) {
   Json places = Json::array();
   const double millimetre = 1000;
   for (double f = 0; f < double(path.frames.size()); f += std::max(1.0, path.frames_per_second / 10)) {
-    const Vec3 place = setup.system->robot_center(path.frames[std::size_t(f)]);
+    const Vec3 place = setup.system.robot_center(path.frames[std::size_t(f)]);
     Json& list = places.emplace_back(Json::array());
     for (const double x : place) list.push_back(std::round(millimetre * x) / millimetre);
   }
@@ -106,9 +111,9 @@ Json robot_path(const Setup& setup, const plan::Trajectory& path) {
 
 Json record_of(const Setup& setup, const plan::Plan& plan, const Json& identity) {
   const MotionFigures figures =
-      measure_motion(*setup.world, setup.bodies, plan.trajectory, setup.system->surfaces());
+      measure_motion(setup.world, setup.bodies, plan.trajectory, setup.system.surfaces());
   std::string explanation = plan::explain(plan);
-  if (!plan.solved()) explanation += " " + diagnose(*setup.world, *setup.system, plan).text;
+  if (!plan.solved()) explanation += " " + diagnose(setup.world, setup.system, plan).text;
   char host[256] = "unknown";
   ::gethostname(host, sizeof host - 1);
   Json record{{"scene", setup.scene.name},         {"preset", setup.scene.planner.preset},
@@ -117,9 +122,9 @@ Json record_of(const Setup& setup, const plan::Plan& plan, const Json& identity)
               {"distance_m", plan.best_distance_m}};
   record.update(plan::json_of(plan.statistics));
   record.update(
-      {{"motion_s", double(plan.trajectory.end.step) * setup.world->dt_s},
+      {{"motion_s", double(plan.trajectory.end.step) * setup.world.dt_s},
        {"robot_path_m", robot_path(setup, plan.trajectory)},
-       {"volume", volume_figures(*setup.world, figures)},
+       {"volume", volume_figures(setup.world, figures)},
        {"deepest_penetration_percent", 100 * figures.deepest_penetration_m / figures.robot_size_m}});
   record.update(json_of(figures));
   record.update({{"tree_hash", hex(plan::hash_of(plan.tree))},
@@ -167,8 +172,7 @@ void run_all(const BenchOptions& options, const std::vector<std::string>& preset
     // Seed after seed, so that any part of the runs has all scenes and presets in it.
     const std::size_t which = std::size_t(run) % a_seed;
     const std::string& given = options.scenes[which / presets.size()];
-    if (!setups.contains(which)) setups[which] = set_up(options, given, presets[which % presets.size()]);
-    Setup& setup = setups[which];
+    Setup& setup = setups.try_emplace(which, options, given, presets[which % presets.size()]).first->second;
     if (scene_from_name.try_emplace(setup.scene.name, given).first->second != given)
       throw InputError(fmt::format("{} and {}: are both scenes with the name \"{}\"; rename one",
                                    scene_from_name[setup.scene.name], given, setup.scene.name));
@@ -180,7 +184,7 @@ void run_all(const BenchOptions& options, const std::vector<std::string>& preset
     const Json identity = identity_of(setup, settings, program);
     if (!is_done(file, identity)) {
       try {
-        const plan::Plan plan = plan::plan(*setup.system, settings);
+        const plan::Plan plan = plan::plan(setup.system, settings);
         if (plan.ending == plan::Ending::stopped) throw_if_stopped();
         const Json record = record_of(setup, plan, identity);
         write_file(file, text_of(record) + "\n");

@@ -316,7 +316,8 @@ Statistics statistics_from_json(const Reader& reader, const Json& json) {
   reader.require(
       s.iterations <= most_iterations,
       fmt::format("statistics.iterations is {}; it must be at most {}", s.iterations, most_iterations));
-  s.diverged = count("diverged"), s.rejected = count("rejected"), s.refused = count("refused");
+  s.diverged = count("diverged"), s.rejected = count("rejected");
+  if (json.contains("refused")) s.refused = count("refused");  // since edition 2 of the world
   s.rollout_steps = count("rollout_steps"), s.rollouts = count("rollouts");
   s.rollouts_wrong = count("rollouts_wrong");
   s.cpu_s = seconds("cpu_s"), s.wall_s = seconds("wall_s");
