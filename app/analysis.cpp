@@ -131,8 +131,8 @@ Json json_of(const GapFigures& gap, double size) {
 MotionFigures measure_motion(const fem::World& world, const std::vector<PreparedBody>& bodies,
                              const plan::Trajectory& path, const Surfaces* known) {
   MotionFigures figures = measure_motion(world, path);
-  std::vector<SeenFrame> seen = known ? measure_seen(world, *known, path.frames)
-                                      : measure_seen(world, Surfaces(world, bodies), path.frames);
+  std::vector<SeenFrame> seen =
+      known ? measure_seen(*known, path.frames) : measure_seen(Surfaces(world, bodies), path.frames);
   for (std::size_t f = 0; f < seen.size(); ++f) {
     const SeenFrame& frame = seen[f];
     if (frame.overlap_m > figures.deepest_overlap_m) {

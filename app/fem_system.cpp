@@ -268,19 +268,28 @@ std::size_t FemSystem::first_refused(std::span<const State> frames) const {
   if (!surfaces_ || !world_.touches_on_surfaces()) return frames.size();
   const SeenLimits limits;
   const std::size_t at_once = 8 * std::size_t(thread_count());
+  std::vector<SeenFrame> seen(frames.size());
+  const auto overlaps = [&](const SeenFrame& frame) {
+    return frame.overlap_m > limits.overlap * surface_size_m_ ||
+           frame.self_overlap_m > limits.self_overlap * surface_size_m_;
+  };
   for (std::size_t from = 0; from < frames.size(); from += at_once) {
-    const std::size_t count = std::min(at_once, frames.size() - from);
-    std::vector<char> refused(count);
-    parallel_for(int(count), [&](int i) {
+    const std::size_t to = std::min(from + at_once, frames.size());
+    parallel_for(int(to - from), [&](int i) {
       throw_if_stopped();
-      const SeenFrame seen = surfaces_->overlaps(frames[from + std::size_t(i)]);
-      refused[std::size_t(i)] = seen.overlap_m > limits.overlap * surface_size_m_ ||
-                                seen.self_overlap_m > limits.self_overlap * surface_size_m_;
+      seen[from + std::size_t(i)] = surfaces_->at(frames[from + std::size_t(i)]);
     });
-    const auto first = std::find(refused.begin(), refused.end(), char(true));
-    if (first != refused.end()) return from + std::size_t(first - refused.begin());
+    for (std::size_t f = from; f < to; ++f)
+      if (overlaps(seen[f])) return f;
   }
-  return frames.size();
+  // Of one leg alone: what presses in a motion of several does so in its own leg, too.
+  keep_what_presses(seen);
+  const auto gapes = [&](const SeenFrame& frame) {
+    return std::any_of(frame.gaps.begin(), frame.gaps.end(), [&](const SeenFrame::Gap& gap) {
+      return gap.at_contact_m >= limits.worst_gap * surface_size_m_;
+    });
+  };
+  return std::size_t(std::find_if(seen.begin(), seen.end(), gapes) - seen.begin());
 }
 const plan::System& FemSystem::on_leg(int leg) const {
   return leg < int(via_.size()) ? static_cast<const plan::System&>(*via_[std::size_t(leg)]) : *this;

@@ -29,8 +29,9 @@ class FemSystem final : public plan::System {
   // The world must outlive it. Begins where the world does, or in a state of the caller's.
   explicit FemSystem(const fem::World& world, const GoalRules& = {},
                      std::optional<State> start = std::nullopt);
-  // For searches: ways are refused whose surfaces are deeper in one another, or in themselves, than
-  // SeenLimits lets them be seen, where contact is on the surfaces. The bodies must outlive it.
+  // For searches: ways are refused on which surfaces are deeper in one another, or in themselves, or press
+  // one another through a wider gap, than SeenLimits has it, where contact is on them. The bodies must
+  // outlive it.
   FemSystem(const fem::World&, const std::vector<PreparedBody>&, const GoalRules&);
 
   State start() const override;

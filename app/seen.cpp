@@ -61,6 +61,25 @@ double gap_to_wall(const Box& bounds, const Side& side, const Box& surface) {
   return std::max(0.0, gap);
 }
 
+std::vector<SeenFrame::Gap> gaps_of(const fem::World& world,
+                                    const std::vector<const meshing::PlacedSurface*>& now,
+                                    const Pressing& pressing) {
+  std::vector<SeenFrame::Gap> gaps;
+  for (const auto& [side, press] : pressing) {
+    const meshing::PlacedSurface& one = *now[std::size_t(side.body)];
+    if (side.other < 0) {
+      const Vec3 near = one.closest_point(press.place_m);
+      gaps.push_back({side.body, -1, gap_to_wall(world.bounds_m, side, one.box()),
+                      gap_to_wall(world.bounds_m, side, {near, near}), press.force_n});
+    } else {
+      const meshing::PlacedSurface& other = *now[std::size_t(side.other)];
+      const double near = gap_near(one, other, press.place_m);
+      gaps.push_back({side.body, side.other, meshing::gap(one, other, near).distance_m, near, press.force_n});
+    }
+  }
+  return gaps;
+}
+
 }  // namespace
 
 Surfaces::Surfaces(const fem::World& world, const std::vector<PreparedBody>& bodies)
@@ -71,28 +90,24 @@ Surfaces::Surfaces(const fem::World& world, const std::vector<PreparedBody>& bod
   }
 }
 
-Surfaces::Placed Surfaces::placed(const State& state, std::deque<meshing::PlacedSurface>& moved) const {
-  Placed now;
-  for (std::size_t b = 0; b < bodies_.size(); ++b)
-    now.push_back(world_.bodies[b].moving
-                      ? &moved.emplace_back(shapes_[b], surface_at(world_, bodies_[b], state, int(b)))
-                      : &at_rest_[b]);
-  return now;
-}
-
-SeenFrame Surfaces::overlaps(const State& state) const {
+SeenFrame Surfaces::at(const State& state) const {
   const std::uint64_t hash = hash_of(state);
   {
     const std::lock_guard lock(mutex_);
     if (const auto known = known_.find(hash); known != known_.end()) return known->second;
   }
-  std::deque<meshing::PlacedSurface> moved;
-  const SeenFrame frame = measure(placed(state, moved));
+  const SeenFrame frame = measure(state);
   const std::lock_guard lock(mutex_);
   return known_[hash] = frame;
 }
 
-SeenFrame Surfaces::measure(const Placed& now) const {
+SeenFrame Surfaces::measure(const State& state) const {
+  std::deque<meshing::PlacedSurface> moved;
+  std::vector<const meshing::PlacedSurface*> now;
+  for (std::size_t b = 0; b < bodies_.size(); ++b)
+    now.push_back(world_.bodies[b].moving
+                      ? &moved.emplace_back(shapes_[b], surface_at(world_, bodies_[b], state, int(b)))
+                      : &at_rest_[b]);
   SeenFrame frame;
   for (int a = 0; a < int(now.size()); ++a) {
     const fem::Body& body = world_.bodies[std::size_t(a)];
@@ -106,51 +121,26 @@ SeenFrame Surfaces::measure(const Placed& now) const {
     const double depth = meshing::self_overlap(one, at_rest_[std::size_t(a)]).depth_m;
     if (depth > frame.self_overlap_m) frame.self_overlap_m = depth, frame.self_overlap_body = a;
   }
+  frame.gaps = gaps_of(world_, now, pressing_in(world_, state));
   return frame;
 }
 
-namespace {
-
-std::vector<SeenFrame::Gap> gaps_of(const fem::World& world, const Surfaces::Placed& now,
-                                    const Pressing& pressing, double least_force_n) {
-  std::vector<SeenFrame::Gap> gaps;
-  for (const auto& [side, press] : pressing) {
-    if (!(press.force_n > least_force_n)) continue;
-    const meshing::PlacedSurface& one = *now[std::size_t(side.body)];
-    if (side.other < 0) {
-      const Vec3 near = one.closest_point(press.place_m);
-      gaps.push_back({side.body, -1, gap_to_wall(world.bounds_m, side, one.box()),
-                      gap_to_wall(world.bounds_m, side, {near, near})});
-    } else {
-      const meshing::PlacedSurface& other = *now[std::size_t(side.other)];
-      const double near = gap_near(one, other, press.place_m);
-      gaps.push_back({side.body, side.other, meshing::gap(one, other, near).distance_m, near});
-    }
-  }
-  return gaps;
+void keep_what_presses(std::vector<SeenFrame>& frames) {
+  double largest_n = 0;
+  for (const SeenFrame& frame : frames)
+    for (const SeenFrame::Gap& gap : frame.gaps) largest_n = std::max(largest_n, gap.force_n);
+  for (SeenFrame& frame : frames)
+    std::erase_if(frame.gaps,
+                  [&](const SeenFrame::Gap& gap) { return !(gap.force_n > pressing_share * largest_n); });
 }
 
-}  // namespace
-
-std::vector<SeenFrame> measure_seen(const fem::World& world, const Surfaces& surfaces,
-                                    const std::vector<State>& frames) {
-  std::vector<Pressing> pressing(frames.size());
-  parallel_for(int(frames.size()), [&](int f) {
-    if (nothing_to_keep()) throw_if_stopped();
-    pressing[std::size_t(f)] = pressing_in(world, frames[std::size_t(f)]);
-  });
-  double largest_n = 0;
-  for (const Pressing& of_frame : pressing)
-    for (const auto& [side, press] : of_frame) largest_n = std::max(largest_n, press.force_n);
+std::vector<SeenFrame> measure_seen(const Surfaces& surfaces, const std::vector<State>& frames) {
   std::vector<SeenFrame> seen(frames.size());
   parallel_for(int(frames.size()), [&](int f) {
     if (nothing_to_keep()) throw_if_stopped();
-    const std::size_t i = std::size_t(f);
-    seen[i] = surfaces.overlaps(frames[i]);
-    if (pressing[i].empty()) return;
-    std::deque<meshing::PlacedSurface> moved;
-    seen[i].gaps = gaps_of(world, surfaces.placed(frames[i], moved), pressing[i], pressing_share * largest_n);
+    seen[std::size_t(f)] = surfaces.at(frames[std::size_t(f)]);
   });
+  keep_what_presses(seen);
   return seen;
 }
 

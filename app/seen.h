@@ -31,6 +31,7 @@ struct SeenFrame {
     int body, other;
     double least_m;       // distance of their surfaces, 0 where they overlap
     double at_contact_m;  // where the strongest single force of contact acts
+    double force_n;       // the lengths of all forces, summed
   };
   std::vector<Gap> gaps;
   double self_overlap_m = 0;  // deepest of a deformable body's surface in itself, beyond that at rest
@@ -47,14 +48,11 @@ class Surfaces {
  public:
   Surfaces(const fem::World&, const std::vector<PreparedBody>&);
 
-  using Placed = std::vector<const meshing::PlacedSurface*>;  // [body]
-  // Those that move are kept in `moved`.
-  Placed placed(const State&, std::deque<meshing::PlacedSurface>& moved) const;
-  // All but gaps; kept, so that to ask again costs nothing.
-  SeenFrame overlaps(const State&) const;
+  // With the gaps of all that touch, however lightly. Kept, so that to ask again costs nothing.
+  SeenFrame at(const State&) const;
 
  private:
-  SeenFrame measure(const Placed&) const;
+  SeenFrame measure(const State&) const;
 
   const fem::World& world_;
   const std::vector<PreparedBody>& bodies_;
@@ -64,7 +62,9 @@ class Surfaces {
   mutable std::unordered_map<std::uint64_t, SeenFrame> known_;  // by hash of the state
 };
 
+// Leaves the gaps of those that press one another alone, over all frames of a motion.
+void keep_what_presses(std::vector<SeenFrame>&);
 // One a frame.
-std::vector<SeenFrame> measure_seen(const fem::World&, const Surfaces&, const std::vector<State>& frames);
+std::vector<SeenFrame> measure_seen(const Surfaces&, const std::vector<State>& frames);
 
 }  // namespace limber::app

@@ -2,6 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
+#include <limits>
+#include <utility>
 
 #include "core/progress.h"
 #include "meshing/detail/nearest_on_triangle.h"
@@ -59,62 +62,84 @@ class Filler {
               distance_[node] = distance, nearest_[node] = n;
           }
     }
-    fixed_.assign(distance_.size(), 0);
-    for (std::size_t n = 0; n < fixed_.size(); ++n) fixed_[n] = nearest_[n] >= 0;
+    fixed_.assign(distance_.size(), 0), unsaid_.assign(distance_.size(), 0);
+    for (std::size_t n = 0; n < fixed_.size(); ++n)
+      if (nearest_[n] >= 0) fixed_[n] = 1, unsaid_[n] = to_all;
   }
 
   // A node takes the nearest piece of a neighbour where that is nearer than its own, in sweeps that run each
   // of the eight ways (the fast sweeping of Zhao, Mathematics of Computation 74, 2005, with pieces for
-  // distances).
+  // distances). What a node has said to a neighbour it does not say again before it has another piece: the
+  // neighbour would not take it.
   void measure_far() {
     for (int way = 0; way < 8; ++way) {
-      const auto order = [&](int axis, int i) { return way >> axis & 1 ? nodes_[axis] - 1 - i : i; };
+      const std::array<bool, 3> down{(way & 1) != 0, (way & 2) != 0, (way & 4) != 0};
+      std::array<std::ptrdiff_t, 3> back;  // to the neighbour that the sweep has come by
+      std::array<std::uint8_t, 3> to_us;   // its bit for the way from there
+      for (int axis = 0; axis < 3; ++axis) {
+        back[axis] = down[axis] ? step_[axis] : -step_[axis];
+        to_us[axis] = std::uint8_t(1 << (2 * axis + down[axis]));
+      }
       for (int k = 0; k < nodes_[2]; ++k) {
         throw_if_stopped();
-        for (int j = 0; j < nodes_[1]; ++j)
-          for (int i = 0; i < nodes_[0]; ++i) {
-            const std::array<int, 3> at{order(0, i), order(1, j), order(2, k)};
-            const std::size_t node = std::size_t(at[2] * step_[2] + at[1] * step_[1] + at[0]);
-            if (fixed_[node]) continue;
-            const std::array<int, 3> done{i, j, k};
-            for (int axis = 0; axis < 3; ++axis) {
-              if (done[axis] == 0) continue;
-              const std::size_t other =
-                  std::size_t(std::ptrdiff_t(node) - (way >> axis & 1 ? -step_[axis] : step_[axis]));
-              const int piece = nearest_[other];
-              if (piece < 0 || piece == nearest_[node] || distance_[other] - cell_ >= distance_[node])
-                continue;
-              const double distance = distance_to(piece, position(at[0], at[1], at[2]));
-              if (distance < distance_[node]) distance_[node] = distance, nearest_[node] = piece;
-            }
+        const int z = down[2] ? nodes_[2] - 1 - k : k;
+        for (int j = 0; j < nodes_[1]; ++j) {
+          const int y = down[1] ? nodes_[1] - 1 - j : j;
+          std::ptrdiff_t node = z * step_[2] + y * step_[1] + (down[0] ? nodes_[0] - 1 : 0);
+          for (int i = 0; i < nodes_[0]; ++i, node -= back[0]) {
+            if (i > 0) hear(node, node + back[0], to_us[0]);
+            if (j > 0) hear(node, node + back[1], to_us[1]);
+            if (k > 0) hear(node, node + back[2], to_us[2]);
           }
+        }
       }
     }
   }
 
-  // One winding number for each region of nodes joined by edges that no surface crosses.
+  // One winding number for each region of nodes joined by edges that no surface crosses. Regions are joined
+  // from runs along x.
   std::vector<char> inside_by_regions(const WindingNumber& winding) const {
-    std::vector<char> inside(distance_.size(), 0), reached(distance_.size(), 0);
-    std::vector<std::size_t> region;
-    for (std::size_t start = 0; start < reached.size(); ++start) {
-      if (reached[start]) continue;
-      region.assign(1, start);
-      reached[start] = 1;
-      std::size_t clearest = start;
-      for (std::size_t head = 0; head < region.size(); ++head) {
-        const std::size_t node = region[head];
-        throw_if_stopped();
-        if (clear_[node] > clear_[clearest]) clearest = node;
-        for_uncrossed_edges(node, [&](std::size_t other) {
-          if (reached[other]) return;
-          reached[other] = 1;
-          region.push_back(other);
-        });
-      }
-      const auto [i, j, k] = indices(clearest);
-      if (winding.inside(position(i, j, k)))
-        for (std::size_t node : region) inside[node] = 1;
+    std::vector<std::int32_t> run(distance_.size()),
+        joined_to;  // [node]; [run], in the end of a region its first
+    for (std::size_t node = 0; node < run.size(); ++node) {
+      const bool goes_on = node % std::size_t(step_[1]) != 0 && uncrossed(node - 1, node);
+      if (!goes_on) joined_to.push_back(std::int32_t(joined_to.size()));
+      run[node] = std::int32_t(joined_to.size()) - 1;
     }
+    const auto first_of = [&](std::int32_t r) {
+      while (joined_to[std::size_t(r)] != r)
+        r = joined_to[std::size_t(r)] = joined_to[std::size_t(joined_to[std::size_t(r)])];
+      return r;
+    };
+    for (const int axis : {1, 2}) {
+      std::pair<std::int32_t, std::int32_t> last{-1, -1};
+      for (std::size_t node = std::size_t(step_[axis]); node < run.size(); ++node) {
+        const std::size_t other = node - std::size_t(step_[axis]);
+        const std::pair pair(run[other], run[node]);
+        if (pair == last || (axis == 1 && node % std::size_t(step_[2]) < std::size_t(step_[1])) ||
+            !uncrossed(other, node))
+          continue;
+        last = pair;
+        const std::int32_t one = first_of(pair.first), two = first_of(pair.second);
+        joined_to[std::size_t(std::max(one, two))] = std::min(one, two);
+      }
+      throw_if_stopped();
+    }
+    constexpr std::size_t none = std::numeric_limits<std::size_t>::max();
+    std::vector<std::size_t> clearest(joined_to.size(), none);  // of each region, the first of equals
+    for (std::size_t node = 0; node < run.size(); ++node) {
+      std::size_t& best = clearest[std::size_t(run[node] = first_of(run[node]))];
+      if (best == none || clear_[node] > clear_[best]) best = node;
+    }
+    std::vector<char> is_inside(joined_to.size());
+    for (std::size_t r = 0; r < clearest.size(); ++r) {
+      if (clearest[r] == none) continue;
+      throw_if_stopped();
+      const auto [i, j, k] = indices(clearest[r]);
+      is_inside[r] = winding.inside(position(i, j, k));
+    }
+    std::vector<char> inside(run.size());
+    for (std::size_t node = 0; node < run.size(); ++node) inside[node] = is_inside[std::size_t(run[node])];
     return inside;
   }
 
@@ -158,6 +183,7 @@ class Filler {
           if (0.5 * cell_ < distance_[end]) {
             distance_[end] = 0.5 * cell_;
             nearest_[end] = int(pieces_.size() + closing_.size()) - 1;
+            unsaid_[end] = to_all;
           }
       });
     if (!closing_.empty()) measure_far();
@@ -181,19 +207,25 @@ class Filler {
       places[i] = place_of(sequence.at(std::uint32_t(i)).position);
     }
     std::vector<float> weights(distance_.size());
+    std::vector<char> known(distance_.size());
+    std::vector<std::size_t> near;  // the nodes of all places
     for (const Place& p : places)
-      for (int c = 0; c < 8; ++c) weights[p.node + offset(c)] += p.weights[std::size_t(c)];
+      for (int c = 0; c < 8; ++c) {
+        const std::size_t n = p.node + offset(c);
+        weights[n] += p.weights[std::size_t(c)];
+        if (!std::exchange(known[n], 1)) near.push_back(n);
+      }
     std::vector<double> errors(distance_.size());
     for (int step = 0; step < fitting_steps; ++step) {
       throw_if_stopped();
-      std::fill(errors.begin(), errors.end(), 0);
+      for (const std::size_t n : near) errors[n] = 0;
       for (const Place& p : places) {
         double error = 0;
         for (int c = 0; c < 8; ++c) error += p.weights[std::size_t(c)] * distance_[p.node + offset(c)];
         for (int c = 0; c < 8; ++c) errors[p.node + offset(c)] += p.weights[std::size_t(c)] * error;
       }
       // A node that few spots are near is changed less.
-      for (std::size_t n = 0; n < distance_.size(); ++n) distance_[n] -= errors[n] / (weights[n] + 0.5);
+      for (const std::size_t n : near) distance_[n] -= errors[n] / (weights[n] + 0.5);
     }
   }
 
@@ -234,8 +266,12 @@ class Filler {
                 ((c & 4) ? share[2] : 1 - share[2]));
     return result;
   }
-  // Calls visit(node) for the neighbours of a node where no surface crosses the edge to it, since the balls
-  // about both ends within which there is none cover it.
+  // No surface crosses the edge between two neighbours, since the balls about both ends within which there is
+  // none cover it.
+  bool uncrossed(std::size_t node, std::size_t other) const {
+    return double(clear_[node]) + clear_[other] > cell_ * (1 + 1e-5);
+  }
+  // Calls visit(node) for the neighbours of a node that are joined to it by such an edge.
   template <class Visit>
   void for_uncrossed_edges(std::size_t node, Visit visit) const {
     const std::array<int, 3> at = indices(node);
@@ -243,8 +279,19 @@ class Filler {
       for (const int turn : {-1, 1}) {
         if (at[axis] + turn < 0 || at[axis] + turn >= nodes_[axis]) continue;
         const std::size_t other = std::size_t(std::ptrdiff_t(node) + turn * step_[axis]);
-        if (double(clear_[node]) + clear_[other] > cell_ * (1 + 1e-5)) visit(other);
+        if (uncrossed(node, other)) visit(other);
       }
+  }
+  // `node` takes the piece of `other` where that is nearer than its own; `to_us` is the bit of that way.
+  void hear(std::ptrdiff_t node, std::ptrdiff_t other, std::uint8_t to_us) {
+    const std::size_t n = std::size_t(node), o = std::size_t(other);
+    if (!(unsaid_[o] & to_us)) return;
+    unsaid_[o] &= std::uint8_t(~to_us);
+    const int piece = nearest_[o];
+    if (fixed_[n] || piece == nearest_[n] || distance_[o] - cell_ >= distance_[n]) return;
+    const auto [i, j, k] = indices(n);
+    const double distance = distance_to(piece, position(i, j, k));
+    if (distance < distance_[n]) distance_[n] = distance, nearest_[n] = piece, unsaid_[n] = to_all;
   }
   double distance_to(int piece, const Vec3& p) const {
     if (std::size_t(piece) >= pieces_.size())
@@ -268,6 +315,8 @@ class Filler {
   std::vector<Vec3> closing_;                 // points that close holes
   std::vector<float> clear_;                  // no piece, seen or not, is nearer; up to near_cells
   std::vector<char> fixed_;
+  static constexpr std::uint8_t to_all = 0x3f;
+  std::vector<std::uint8_t> unsaid_;  // has another piece since it was asked along +x, −x, +y, −y, +z, −z
 };
 
 }  // namespace
