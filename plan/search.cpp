@@ -116,6 +116,9 @@ class Search {
     plan_.statistics = statistics_now();
   }
 
+  // From the root of the leg to the node that ended this search in the goal, and its settle.
+  std::optional<Trajectory> way() && { return std::move(way_); }
+
  private:
   // What one thread has in its lanes.
   class Lanes final : public Supply {
@@ -304,6 +307,7 @@ class Search {
         choose_again();
       } else {
         consider(node, distance_at(place), arrival.kind == Arrival::rests);
+        if (arrival.kind == Arrival::rests) way_ = std::move(arrival.way);
       }
       if (laws_.lag == 0) aim_overtaken(node);
     }
@@ -325,6 +329,7 @@ class Search {
   struct Arrival {
     enum { elsewhere, rests, refused } kind = elsewhere;
     int edges_before = 0;  // refused: from the root of the leg to the edge that leads into the refused frame
+    Trajectory way = {};   // rests: from the root of the leg, and the settle
   };
 
   Vec3 place_of(const State& state) const {  // as seen from the goal's start
@@ -341,25 +346,33 @@ class Search {
     if (settle.result != Course::rests_in_goal) return {};
     const Tree& tree = plan_.tree;
     const int root = plan_.legs.back().root;
+    std::vector<int> path;  // from the root, which is not in it, to the parent
+    for (int node = parent; node != root; node = tree.parents[std::size_t(node)]) path.push_back(node);
+    std::reverse(path.begin(), path.end());
     way.from = tree.states[std::size_t(root)];
-    for (int node = parent; node != root; node = tree.parents[std::size_t(node)])
-      way.controls.push_back(tree.controls[std::size_t(node)]);
-    std::reverse(way.controls.begin(), way.controls.end());
+    for (const int node : path) way.controls.push_back(tree.controls[std::size_t(node)]);
     way.controls.push_back(control);
     plan::run(
         system_, settings_, {&way, 1},
         {.settle = CourseOptions::never, .keep_frames = true, .ask_acceptable = false, .stoppable = true});
-    LIMBER_CHECK(way.end == state, way.end.step, state.step);
-    std::vector<State> frames;  // after the root, whose own frame is of the leg before
-    for (Course* course : {&way, &settle})
-      for (State& frame : course->frames)
-        if (frame.step > (frames.empty() ? way.from.step : frames.back().step))
-          frames.push_back(std::move(frame));
+    LIMBER_CHECK(way.states.size() == path.size() + 1 && way.end == state, way.states.size(), path.size());
+    for (std::size_t i = 0; i < path.size(); ++i)
+      LIMBER_CHECK(way.states[i] == tree.states[std::size_t(path[i])], i, way.states[i].step);
+
+    Trajectory whole{std::move(way.controls), settle.settle_steps, settings_.frames_per_second,
+                     std::move(way.frames), std::move(settle.end)};
+    if (settle.settle_steps > 0) whole.controls.push_back(settle_control(settings_, settle.settle_steps));
+    for (State& frame : settle.frames)
+      if (frame.step > state.step) whole.frames.push_back(std::move(frame));
+    // The root's own frame is of the leg before.
+    const auto own = std::find_if(whole.frames.begin(), whole.frames.end(),
+                                  [&](const State& frame) { return frame.step > way.from.step; });
+    const std::span<const State> frames(own, whole.frames.end());
     const std::size_t first = system_.first_refused(frames);
-    if (first == frames.size()) return {Arrival::rests};
+    if (first == frames.size()) return {Arrival::rests, 0, std::move(whole)};
     const auto there = std::find_if(way.states.begin(), way.states.end() - 1,
                                     [&](const State& end) { return end.step >= frames[first].step; });
-    return {Arrival::refused, int(there - way.states.begin())};
+    return {Arrival::refused, int(there - way.states.begin()), {}};
   }
 
   // Nothing grows any more from the way to `node` after so many edges.
@@ -444,6 +457,7 @@ class Search {
       queue_;  // in order of iteration; a deque, so that pointers to the taken ones stay good
   std::int64_t next_iteration_, committed_;
   std::exception_ptr failure_;  // the first
+  std::optional<Trajectory> way_;
 };
 
 // At the root of a leg, with the system and settings of that leg.
@@ -504,13 +518,20 @@ Plan plan(const System& system, const Settings& settings, std::optional<Plan> ea
     const Settings of_leg = settings_of_leg(settings, leg);
     // A goal on the way may be reached already where its leg begins; then there is nothing to prepare a
     // search for.
-    if (!plan.solved() || leg == int(settings.via.size())) Search(on_leg, of_leg, plan, watch, started).run();
+    std::optional<Trajectory> way;
+    if (!plan.solved() || leg == int(settings.via.size())) {
+      Search search(on_leg, of_leg, plan, watch, started);
+      search.run();
+      way = std::move(search).way();
+    }
     if (plan.solved() && leg < int(settings.via.size())) {
       plan.legs.push_back({reached(on_leg, of_leg, plan), plan.statistics.iterations});
       begin_leg(system.on_leg(leg + 1), settings_of_leg(settings, leg + 1), plan);
       continue;
     }
-    plan.trajectory = trajectory_to(on_leg, of_leg, plan.tree, plan.best_node, plan.solved());
+    plan.trajectory = way && leg == 0
+                          ? std::move(*way)
+                          : trajectory_to(on_leg, of_leg, plan.tree, plan.best_node, plan.solved());
     return plan;
   }
 }

@@ -386,6 +386,7 @@ TEST(Trajectory, SettlesAtTheGoalWithinItsForce) {
     EXPECT_EQ(t.controls.back().steps, t.settle_steps);
     EXPECT_EQ(t.controls.size(), path_to(p.tree, p.goal_node).size());  // one less than nodes, and the settle
     EXPECT_LE(largest_force(t.controls.back()), 0.5 * s.max_force_n);
+    EXPECT_EQ(hash_of(t), hash_of(trajectory_to(toy, s, p.tree, p.goal_node, true)));
     EXPECT_LT(toy.mean_speed(t.end), 0.02);
     EXPECT_LT((toy.robot_center(t.end) - s.goal.center_of_mass_m).norm(), 0.05);
 
