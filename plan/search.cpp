@@ -608,8 +608,10 @@ std::string explain(const Plan& plan) {
     text += fmt::format(" {} rollouts diverged and {} ended in states that are not acceptable.",
                         statistics.diverged, statistics.rejected);
   if (statistics.refused > 0)
-    text +=
-        fmt::format(" {} ways to {} were refused, for what would be seen of them.", statistics.refused, goal);
+    text += fmt::format(
+        " {} ways to {} were refused: on them surfaces would be seen to overlap, or to press one another "
+        "through air, by more than limber promises.",
+        statistics.refused, goal);
   return text;
 }
 

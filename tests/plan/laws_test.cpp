@@ -115,6 +115,7 @@ TEST(Laws, NothingGrowsFromARefusedEdge) {
         barren.push_back(*edge);
       }
       EXPECT_EQ(p.statistics.refused, std::int64_t(barren.size()));
+      EXPECT_EQ(explain(p).find("were refused") != std::string::npos, !p.solved() && !barren.empty());
       for (int node : path_to(p.tree, p.best_node))
         EXPECT_EQ(std::count(barren.begin(), barren.end(), node), 0) << "the best is of a refused way";
       refused += p.statistics.refused, solved += p.solved();
@@ -130,7 +131,7 @@ TEST(Laws, RefusingGivesTheSameBytesForAnyThreadsAndLanesAndInParts) {
   for (Settings s : refusing_settings()) {
     SCOPED_TRACE(s.laws.lag);
     int refusing = 0;
-    for (s.seed = 1; s.seed <= 12 && refusing < 3; ++s.seed) {
+    for (s.seed = 1; s.seed <= 12 && refusing < 2; ++s.seed) {
       const Plan whole = plan(toy, s);
       if (whole.statistics.refused == 0) continue;
       ++refusing;
@@ -142,21 +143,20 @@ TEST(Laws, RefusingGivesTheSameBytesForAnyThreadsAndLanesAndInParts) {
         EXPECT_EQ(p.best_node, whole.best_node);
         EXPECT_EQ(p.best_distance_m, whole.best_distance_m);
       };
-      for (const int threads : {1, 2})
-        for (const int lanes : {1, 16}) {
-          const Threads limited(threads);
-          toy.lanes_wanted = lanes;
-          same(plan(toy, s));
-        }
+      for (const auto& [threads, lanes] : {std::pair(1, 16), std::pair(2, 3)}) {
+        const Threads limited(threads);
+        toy.lanes_wanted = lanes;
+        same(plan(toy, s));
+      }
       toy.lanes_wanted = 1;
       for (std::int64_t cut = 0; cut < whole.statistics.iterations;
-           cut += 1 + whole.statistics.iterations / 5) {
+           cut += 1 + whole.statistics.iterations / 3) {
         Settings part = s;
         part.max_iterations = cut;
         same(plan(toy, s, plan(toy, part)));
       }
     }
-    EXPECT_EQ(refusing, 3);
+    EXPECT_EQ(refusing, 2);
   }
 }
 
