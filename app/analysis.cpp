@@ -139,6 +139,10 @@ MotionFigures measure_motion(const fem::World& world, const std::vector<Prepared
       figures.deepest_overlap_m = frame.overlap_m;
       figures.overlap_between = between(world, frame.overlap_body, frame.overlap_other);
     }
+    if (frame.wall_overlap_m > figures.deepest_wall_overlap_m) {
+      figures.deepest_wall_overlap_m = frame.wall_overlap_m;
+      figures.wall_overlap_of = world.bodies[std::size_t(frame.wall_overlap_body)].name;
+    }
     if (frame.self_overlap_m > figures.deepest_self_overlap_m) {
       figures.deepest_self_overlap_m = frame.self_overlap_m;
       figures.self_overlap_of = world.bodies[std::size_t(frame.self_overlap_body)].name;

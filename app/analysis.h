@@ -54,8 +54,8 @@ struct MotionFigures {
 
   // Of what is seen.
   double robot_surface_size_m = 0;  // largest edge of the bounding box of its fine surface at rest
-  double deepest_overlap_m = 0, deepest_self_overlap_m = 0;
-  std::string overlap_between = "nothing overlaps", self_overlap_of = "no body";
+  double deepest_overlap_m = 0, deepest_self_overlap_m = 0, deepest_wall_overlap_m = 0;
+  std::string overlap_between = "nothing overlaps", self_overlap_of = "no body", wall_overlap_of = "no body";
   GapFigures gap, gap_at_contact, gap_to_wall;
 };
 // Without surfaces: all but what is seen.

@@ -55,6 +55,15 @@ double gap_near(const meshing::PlacedSurface& a, const meshing::PlacedSurface& b
   return std::min(from(a, b), from(b, a));
 }
 
+// How far a surface is beyond the walls, farther than it was.
+double beyond_walls(const Box& bounds, const Box& before, const Box& now) {
+  const auto more = [](const Vec3& then, const Vec3& later) {
+    return (later.cwiseMax(0) - then.cwiseMax(0)).maxCoeff();
+  };
+  return std::max({0.0, more(bounds.lower - before.lower, bounds.lower - now.lower),
+                   more(before.upper - bounds.upper, now.upper - bounds.upper)});
+}
+
 double gap_to_wall(const Box& bounds, const Side& side, const Box& surface) {
   const double gap = side.upper ? bounds.upper[side.axis] - surface.upper[side.axis]
                                 : surface.lower[side.axis] - bounds.lower[side.axis];
@@ -116,6 +125,10 @@ SeenFrame Surfaces::measure(const State& state) const {
       if (!body.pushed() && !world_.bodies[std::size_t(b)].pushed()) continue;
       const double depth = meshing::overlap(one, *now[std::size_t(b)]).depth_m;
       if (depth > frame.overlap_m) frame.overlap_m = depth, frame.overlap_body = a, frame.overlap_other = b;
+    }
+    if (world_.walls && body.pushed()) {
+      const double depth = beyond_walls(world_.bounds_m, at_rest_[std::size_t(a)].box(), one.box());
+      if (depth > frame.wall_overlap_m) frame.wall_overlap_m = depth, frame.wall_overlap_body = a;
     }
     if (!body.moving || body.kind != fem::BodyKind::deformable) continue;
     const double depth = meshing::self_overlap(one, at_rest_[std::size_t(a)]).depth_m;

@@ -26,6 +26,9 @@ struct SeenLimits {
 struct SeenFrame {
   double overlap_m = 0;  // deepest of two surfaces, at least one of which moves
   int overlap_body = -1, overlap_other = -1;
+  // Deepest of a surface beyond a wall of the bounds, beyond where it began.
+  double wall_overlap_m = 0;
+  int wall_overlap_body = -1;
   // Of each pair of bodies, or body and wall (other −1), that press one another.
   struct Gap {
     int body, other;

@@ -439,6 +439,9 @@ void check_seen(const MotionFigures& figures, bool promised, Promises& table) {
       figures.deepest_self_overlap_m <= limits.self_overlap * size,
       fmt::format("{:.4f} m, {} ({})", figures.deepest_self_overlap_m,
                   of_size(figures.deepest_self_overlap_m), figures.self_overlap_of));
+  table.measured("what is seen: deepest overlap of a surface and a wall, beyond that at the start",
+                 fmt::format("{:.4f} m, {} ({})", figures.deepest_wall_overlap_m,
+                             of_size(figures.deepest_wall_overlap_m), figures.wall_overlap_of));
   table.measured("least and largest stretch of a tet",
                  fmt::format("{:.3f} ({}), {:.3f} ({})", figures.least_stretch, figures.least_stretch_of,
                              figures.largest_stretch, figures.largest_stretch_of));

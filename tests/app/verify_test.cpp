@@ -1,5 +1,7 @@
 // What verify asks of a plan is what the scene says, whatever the plan says of itself.
 #include "app/goal_terms.h"
+#include "app/plan_folder.h"
+#include "app/seen.h"
 #include "fem/observe.h"
 #include "tests/app/program.h"
 #include "tests/fem/worlds.h"
@@ -111,6 +113,23 @@ TEST_F(Verify, APlanThatIsNotSolvedBreaksJustWhatItLacks) {
   EXPECT_EQ(broken(of_start(here + "shape = { angle_deg = 45, turn_tolerance_deg = 5 }\n",
                             "planner.settle_time_s=0")),
             (Names{"the goal: turned within 5 degrees of the shape asked for", unsolved}));
+}
+
+// The robot's surface ends at z = 1.6 and the room at 2; the block lies flush against the walls of y.
+TEST_F(Verify, ASurfaceBeyondAWallIsMeasured) {
+  ASSERT_EQ(limber_program({"plan", scene(), "-o", out(), "--iterations", "0"}).code, exit_no_plan);
+  const PlanFolder planned = read_plan_folder(out());
+  const std::vector<PreparedBody> bodies = read_bodies_of(planned, out());
+  const fem::World world = world_of(planned, bodies);
+  const Surfaces surfaces(world, bodies);
+  State state = planned.plan.trajectory.frames[0];
+  EXPECT_NEAR(surfaces.at(state).wall_overlap_m, 0, 1e-6);
+  const fem::Body& robot = world.bodies[0];
+  for (int n = robot.first_node; n < robot.first_node + robot.node_count(); ++n)
+    state.positions[std::size_t(3 * n + 2)] += 0.45f;
+  const SeenFrame seen = surfaces.at(state);
+  EXPECT_NEAR(seen.wall_overlap_m, 0.05, 1e-5);
+  EXPECT_EQ(seen.wall_overlap_body, 0);
 }
 
 // Without a settle nobody asks for rest, and no promise tells of it.
