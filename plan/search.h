@@ -71,7 +71,7 @@ using Watch = std::function<void(const Moment&)>;
 
 // Searches until a node lies in the goal and comes to rest there (one goal after the other where there are
 // several) by a way no frame of which is refused, or a limit ends it. A refused way stays in the tree, but
-// nothing grows from its first refused edge any more. SIGINT and SIGTERM
+// nothing grows from the edge that leads into the refused frame any more. SIGINT and SIGTERM
 // (core/progress.h) end it too, and what was found is kept. Tree and trajectory depend on system and settings
 // alone; in_flight and threads are free. With `earlier` (the plan of a search that was cut short, of the same
 // system and settings save for limits) goes on from there, to the bytes that one uninterrupted search gives.

@@ -95,7 +95,7 @@ class System {
   // False: no rollout passes through this state at a frame time, and no node is made of it; as where
   // Rollout::clear is false.
   virtual bool acceptable(const State&) const { return true; }
-  // The first of a path's frames that must not be shown, though the dynamics lead there; frames.size(): none.
+  // One of a path's frames that must not be shown, though the dynamics lead there; frames.size(): none.
   // Asked of whole ways to a goal alone, for it is dear. Throws Interrupted after a stop signal.
   virtual std::size_t first_refused(std::span<const State> frames) const { return frames.size(); }
   // What else than the place of the robot's centre of mass makes it reach the goal: its turn, its shape, …
