@@ -13,6 +13,7 @@
 #include "app/frame_list.h"
 #include "app/plan_folder.h"
 #include "app/scene_world.h"
+#include "core/content_hash.h"
 #include "core/error.h"
 #include "core/hash.h"
 #include "core/json_shape.h"
@@ -32,7 +33,7 @@ struct Setup {
   Setup(const BenchOptions& bench, const std::string& scene_given, const std::string& preset)
       : options(options_of(bench, scene_given, preset)),
         scene(read_scene(options)),
-        bodies(prepare_bodies(scene, bench.data, bench.out / scene.name)),
+        bodies(prepare_bodies(scene, bench.data, bench.out / scene.name, bench.store)),
         world(build_world(scene, bodies)),
         system(world, bodies, goal_rules_of(scene)) {}
   Setup(const Setup&) = delete;
@@ -54,15 +55,6 @@ struct Setup {
   fem::World world;
   FemSystem system;
 };
-
-// Two builds do not make one benchmark.
-std::string hash_of_program() {
-  try {
-    return hex(hash_of(std::string_view(read_file("/proc/self/exe"))));
-  } catch (const InputError&) {
-    return "unknown";
-  }
-}
 
 // All that a run's result depends on.
 Json identity_of(const Setup& setup, const plan::Settings& settings, const std::string& program) {
@@ -163,8 +155,8 @@ void run_all(const BenchOptions& options, const std::vector<std::string>& preset
 
   make_folder(options.out / "runs");
   remove_abandoned(options.out / "runs");
-  const std::string program = hash_of_program();
-  std::map<std::size_t, Setup> setups;  // by scene and preset
+  const std::string& program = program_hash();  // two builds do not make one benchmark
+  std::map<std::size_t, Setup> setups;          // by scene and preset
   std::map<std::string, std::string> scene_from_name;
   std::int64_t done = 0;
   Progress progress("bench", std::int64_t(runs.size()));

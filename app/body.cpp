@@ -1,5 +1,6 @@
 #include "app/body.h"
 
+#include "app/body_store.h"
 #include "app/export.h"
 #include "app/preview.h"
 #include "core/contact_shape_file.h"
@@ -23,9 +24,23 @@ namespace {
 
 constexpr const char* body_files[] = {"surface.ply", "shells.obj", "cage.msh", "binding.npz", "contact.npz"};
 
+bool has_shells(const PrepareSettings& s) { return s.only != "cage" || s.mode == "paper"; }
+bool has_cage(const PrepareSettings& s) { return s.only != "shells"; }
+bool is_whole(const PrepareSettings& s) { return s.only.empty(); }
+
+std::vector<std::string> files_of(const PrepareSettings& s) {
+  std::vector<std::string> files{"surface.ply"};
+  if (has_shells(s)) files.push_back("shells.obj");
+  if (has_cage(s)) files.push_back("cage.msh");
+  if (is_whole(s)) files.insert(files.end(), {"binding.npz", "contact.npz"});
+  return files;
+}
+
 Json json_of(const PrepareSettings& s) {
-  return {{"shells", s.shells}, {"concavity", s.concavity}, {"inflate", s.inflate},
-          {"exact", s.exact},   {"tets", s.tets},           {"mode", s.mode}};
+  Json json{{"shells", s.shells}, {"concavity", s.concavity}, {"inflate", s.inflate},
+            {"exact", s.exact},   {"tets", s.tets},           {"mode", s.mode}};
+  if (!is_whole(s)) json["only"] = s.only;
+  return json;
 }
 
 Json json_of(const meshing::Certificate& c) {
@@ -98,25 +113,18 @@ const Json& example_of_report() {
 
 void require_report(const Json& report, const fs::path& file) {
   constexpr const char* remedy = "limber did not write that";
-  require_like(report, example_of_report(), Keys::all, file.string(), remedy);
+  Json example = example_of_report();
+  try {
+    const PrepareSettings settings = settings_of_input(report.at("input"));
+    if (!has_shells(settings)) example.erase("shells");
+    if (!has_cage(settings)) example.erase("cage"), example.erase("certificate");
+    if (!is_whole(settings)) example.erase("contact");
+  } catch (const Json::exception&) {  // told below
+  }
+  require_like(report, example, Keys::all, file.string(), remedy);
   require_like(report, {{"shells", {{"vertices_uncovered", -1}}}}, Keys::those_there, file.string(), remedy);
   for (const auto& [stage, any] : report.at("cpu_seconds").items())
     require_like(report, {{"cpu_seconds", {{stage, 0.5}}}}, Keys::all, file.string(), remedy);
-}
-
-bool up_to_date(const fs::path& folder, const Json& input) {
-  try {
-    const Json report = read_json(folder / "report.json");
-    require_report(report, folder / "report.json");
-    if (report.at("version") != version || report.at("input") != input) return false;
-    for (const char* name : body_files)
-      if (report.at("files").at(name) != hash_of_file(folder / name)) return false;
-    return true;
-  } catch (const InputError&) {
-    return false;
-  } catch (const Json::exception&) {
-    return false;
-  }
 }
 
 // What each stage of a body cost.
@@ -166,7 +174,41 @@ Json input_of(const Json& identity, const PrepareSettings& settings) {
 PrepareSettings settings_of_input(const Json& input) {
   const Json& s = input.at("settings");
   return {s.at("shells").get<int>(), s.at("concavity").get<double>(), s.at("inflate").get<double>(),
-          s.at("exact").get<bool>(), s.at("tets").get<int>(),         s.at("mode").get<std::string>()};
+          s.at("exact").get<bool>(), s.at("tets").get<int>(),         s.at("mode").get<std::string>(),
+          s.value("only", "")};
+}
+
+bool body_is_up_to_date(const fs::path& folder, const Json& input) {
+  try {
+    const Json report = read_json(folder / "report.json");
+    require_report(report, folder / "report.json");
+    if (report.at("version") != version || report.at("input") != input) return false;
+    const std::vector<std::string> files = files_of(settings_of_input(input));
+    if (report.at("files").size() != files.size()) return false;
+    for (const std::string& name : files)
+      if (report.at("files").at(name) != hash_of_file(folder / name)) return false;
+    return true;
+  } catch (const InputError&) {
+    return false;
+  } catch (const Json::exception&) {
+    return false;
+  }
+}
+
+void clear_body(const fs::path& folder) {
+  std::error_code ignored;
+  fs::remove(folder / "report.json",
+             ignored);  // what is in the folder counts again when a new report says so
+  // These would be of the body before.
+  remove_exports(folder);
+  for (const char* name : preview_files) fs::remove(folder / name, ignored);
+  fs::remove(folder / picture_file, ignored);
+  for (const char* name : body_files) fs::remove(folder / name, ignored);
+}
+
+void take_costs_out(Json& report) {
+  report["cpu_seconds"] = report["peak_memory_mb_after"] = Json::object();
+  report["peak_memory_mb"] = 0;
 }
 
 SurfaceMesh surface_that_bends(const SurfaceMesh& surface, const PrepareSettings& settings) {
@@ -212,17 +254,32 @@ Json facts_of_making(const MadeBody& made, const PrepareSettings& settings) {
   return facts;
 }
 
-Json prepare_body(const BodySource& source, const PrepareSettings& settings, const fs::path& folder) {
+Json prepare_body(const BodySource& source, const PrepareSettings& settings, const fs::path& folder,
+                  const BodyStore* store) {
   const Json input = input_of(source.identity, settings);
-  if (up_to_date(folder, input)) {
+  const std::string key = store ? BodyStore::key_of(source, input) : "";
+  const auto tell = [&](bool up_to_date) {
+    events::tell({{"event", "body"}, {"folder", folder.string()}, {"up_to_date", up_to_date}});
+  };
+  if (body_is_up_to_date(folder, input)) {
     log::info("{}: up to date", folder.string());
-    events::tell({{"event", "body"}, {"folder", folder.string()}, {"up_to_date", true}});
+    tell(true);
+    if (store) store->keep(key, folder);
     return read_json(folder / "report.json");
   }
-  log::info("{}: preparing {}", folder.string(), source.model);
-  events::tell({{"event", "body"}, {"folder", folder.string()}, {"up_to_date", false}});
   std::optional<FolderLock> lock;
-  if (fs::is_directory(folder)) lock.emplace(folder, FolderLock::alone);
+  if (store && store->has(key)) {
+    make_folder(folder);
+    lock.emplace(folder, FolderLock::alone);
+    if (const std::optional<Json> report = store->fetch(key, input, source.model, folder)) {
+      log::info("{}: from the store", folder.string());
+      tell(true);
+      return *report;
+    }
+  }
+  log::info("{}: preparing {}", folder.string(), source.model);
+  tell(false);
+  if (!lock && fs::is_directory(folder)) lock.emplace(folder, FolderLock::alone);
   Costs costs;
   Progress progress("prepare", 7);
   progress.update(0, "import");
@@ -235,50 +292,55 @@ Json prepare_body(const BodySource& source, const PrepareSettings& settings, con
         fmt::format("cut long edges at {} places, so that its {} triangles bend as the cage does", more,
                     model.surface.triangles.rows()));
   costs.end_stage("import");
-  progress.update(1, "decompose");
   throw_if_stopped();
 
   MadeBody made;
-  made.decomposition = make_shells(model.surface, settings);
-  costs.end_stage("decompose");
-  progress.update(2, "cage");
-  throw_if_stopped();
+  if (has_shells(settings)) {
+    progress.update(1, "decompose");
+    made.decomposition = make_shells(model.surface, settings);
+    costs.end_stage("decompose");
+    throw_if_stopped();
+  }
 
-  made.cage = make_cage(model.surface, made.decomposition.shells, settings, source.made_cage());
-  const meshing::Cage& cage = made.cage;
-  validate(cage.mesh, source.model + ": cage");
-  costs.end_stage("cage");
-  progress.update(3, "certify");
-  throw_if_stopped();
+  meshing::Certificate certificate;
+  if (has_cage(settings)) {
+    progress.update(2, "cage");
+    made.cage = make_cage(model.surface, made.decomposition.shells, settings, source.made_cage());
+    validate(made.cage.mesh, source.model + ": cage");
+    costs.end_stage("cage");
+    progress.update(3, "certify");
+    throw_if_stopped();
 
-  const meshing::Certificate certificate = meshing::certify(model.surface, cage.mesh);
-  costs.end_stage("certify");
-  progress.update(4, "bind");
-  throw_if_stopped();
+    certificate = meshing::certify(model.surface, made.cage.mesh);
+    costs.end_stage("certify");
+    throw_if_stopped();
+  }
 
-  const ffd::Binding binding = ffd::bind(model.surface, cage.mesh);
-  costs.end_stage("bind");
-  throw_if_stopped();
+  ffd::Binding binding;
+  if (is_whole(settings)) {
+    progress.update(4, "bind");
+    binding = ffd::bind(model.surface, made.cage.mesh);
+    costs.end_stage("bind");
+    throw_if_stopped();
 
-  progress.update(5, "contact");
-  made.contact = meshing::make_contact_shape(model.surface, cage.mesh, {}, &made.contact_report);
-  costs.end_stage("contact");
+    progress.update(5, "contact");
+    made.contact = meshing::make_contact_shape(model.surface, made.cage.mesh, {}, &made.contact_report);
+    costs.end_stage("contact");
+  }
   progress.update(6, "write");
+  const meshing::Cage& cage = made.cage;
 
   make_folder(folder);  // not before: a model that is refused leaves all as it was
   if (!lock) lock.emplace(folder, FolderLock::alone);
   remove_abandoned(folder);
-  std::error_code ignored;
-  fs::remove(folder / "report.json",
-             ignored);  // what is in the folder counts again when a new report says so
-  // These would be of the body before.
-  remove_exports(folder);
-  for (const char* name : preview_files) fs::remove(folder / name, ignored);
+  clear_body(folder);
   write_ply(folder / "surface.ply", model.surface);
-  write_obj(folder / "shells.obj", made.decomposition.shells);
-  write_msh(folder / "cage.msh", cage.mesh, cage.shell_from_tet);
-  ffd::write_binding(folder / "binding.npz", binding, model.surface, cage.mesh);
-  write_contact_shape(folder / "contact.npz", made.contact, model.surface, cage.mesh);
+  if (has_shells(settings)) write_obj(folder / "shells.obj", made.decomposition.shells);
+  if (has_cage(settings)) write_msh(folder / "cage.msh", cage.mesh, cage.shell_from_tet);
+  if (is_whole(settings)) {
+    ffd::write_binding(folder / "binding.npz", binding, model.surface, cage.mesh);
+    write_contact_shape(folder / "contact.npz", made.contact, model.surface, cage.mesh);
+  }
   costs.end_stage("write");
 
   std::vector<std::string> warnings = model.warnings;
@@ -297,11 +359,17 @@ Json prepare_body(const BodySource& source, const PrepareSettings& settings, con
       facts_of_body(model.surface, made.decomposition.shells, cage.mesh, binding, made.contact, certificate));
   const Json making = facts_of_making(made, settings);
   for (const auto& [table, figures] : making.items()) report[table].update(figures);
+  if (!has_shells(settings)) report.erase("shells");
+  if (!has_cage(settings)) report.erase("cage"), report.erase("certificate");
+  if (!is_whole(settings)) report.erase("binding"), report.erase("contact");
   report["cpu_seconds"] = costs.cpu_s;
   report["peak_memory_mb_after"] = costs.peak_mb;
   report["peak_memory_mb"] = std::round(peak_memory_mb());
-  for (const char* name : body_files) report["files"][name] = hash_of_file(folder / name);
-  write_json(folder / "report.json", report);
+  for (const std::string& name : files_of(settings)) report["files"][name] = hash_of_file(folder / name);
+  Json written = report;
+  if (store) take_costs_out(written);
+  write_json(folder / "report.json", written);
+  if (store) store->keep(key, folder);
   for (const std::string& warning : warnings) log::warn("{}: {}", source.model, warning);
   return report;
 }
@@ -310,8 +378,10 @@ Json facts_of_body(const SurfaceMesh& surface, const std::vector<ConvexShell>& s
                    const ffd::Binding& binding, const ContactShape& contact,
                    const meshing::Certificate& certificate) {
   const Box box = bounding_box(surface.positions);
-  const meshing::TetQuality quality = meshing::measure_quality(cage);
-  const meshing::FieldErrors errors = meshing::field_errors(contact);
+  const meshing::TetQuality quality =
+      cage.tets.rows() > 0 ? meshing::measure_quality(cage) : meshing::TetQuality{};
+  const meshing::FieldErrors errors =
+      contact.samples.area_m2.size() > 0 ? meshing::field_errors(contact) : meshing::FieldErrors{};
   Json facts;
   facts["surface"] = {{"vertices", surface.positions.rows()},
                       {"triangles", surface.triangles.rows()},
@@ -345,6 +415,8 @@ PreparedBody read_body(const fs::path& folder) {
   try {
     body.report = read_json(folder / "report.json");
     require_report(body.report, folder / "report.json");
+    if (const std::string only = settings_of_input(body.report.at("input")).only; !only.empty())
+      throw InputError(fmt::format("{}: is a part of a body, made with --only {}", folder.string(), only));
     for (const char* name : body_files)
       if (body.report.at("files").at(name) != hash_of_file(folder / name))
         throw InputError(
@@ -379,40 +451,51 @@ void deform(const PreparedBody& body, const ffd::Binding& part, const Points& ca
 }
 
 std::string summary_of_report(const Json& report) {
-  const Json &surface = report.at("surface"), &shells = report.at("shells"), &cage = report.at("cage"),
-             &certificate = report.at("certificate"), &contact = report.at("contact");
-  std::string text = fmt::format(
-      "{}\n"
-      "  surface      {} vertices, {} triangles\n"
-      "  shells       {} (stopped by {}), overshoot mean {:.3f} %, largest {:.3f} % of the diagonal; {} of "
-      "{} triangles not covered\n"
-      "  cage         {} tets, {} nodes, dihedrals {:.1f} … {:.1f} degrees\n"
-      "  certificate  {}: {} vertices outside, {} triangles cross, {} edges and {} vertices not manifold\n",
-      report.at("model").get<std::string>(), surface.at("vertices").get<int>(),
-      surface.at("triangles").get<int>(), shells.at("count").get<int>(),
-      shells.at("stopped_by").get<std::string>(), 100 * shells.at("mean_overshoot").get<double>(),
-      100 * shells.at("max_overshoot").get<double>(), shells.at("triangles_uncovered").get<int>(),
-      surface.at("triangles").get<int>(), cage.at("tets").get<int>(), cage.at("nodes").get<int>(),
-      cage.at("min_dihedral_deg").get<double>(), cage.at("max_dihedral_deg").get<double>(),
-      certificate.at("holds").get<bool>() ? "holds" : "does NOT hold",
-      certificate.at("vertices_outside").get<int>(), certificate.at("triangles_crossing").get<int>(),
-      certificate.at("nonmanifold_edges").get<int>(), certificate.at("nonmanifold_vertices").get<int>());
-  text += contact.at("usable").get<bool>()
-              ? fmt::format(
-                    "  contact      {} samples; field of {} cells along the longest edge ({:.1f} MB), off by "
-                    "{:.2g} m on 99 % of the surface, {:.2g} m at worst\n",
-                    contact.at("samples").get<int>(), contact.at("cells").get<int>(),
-                    contact.at("memory_mb").get<double>(), contact.at("error_p99_m").get<double>(),
-                    contact.at("error_max_m").get<double>())
-              : "  contact      by the cage\n";
+  const Json& surface = report.at("surface");
+  std::string text =
+      fmt::format("{}\n  surface      {} vertices, {} triangles\n", report.at("model").get<std::string>(),
+                  surface.at("vertices").get<int>(), surface.at("triangles").get<int>());
+  if (report.contains("shells")) {
+    const Json& shells = report.at("shells");
+    text += fmt::format(
+        "  shells       {} (stopped by {}), overshoot mean {:.3f} %, largest {:.3f} % of the diagonal; {} of "
+        "{} triangles not covered\n",
+        shells.at("count").get<int>(), shells.at("stopped_by").get<std::string>(),
+        100 * shells.at("mean_overshoot").get<double>(), 100 * shells.at("max_overshoot").get<double>(),
+        shells.at("triangles_uncovered").get<int>(), surface.at("triangles").get<int>());
+  }
+  if (report.contains("cage")) {
+    const Json &cage = report.at("cage"), &certificate = report.at("certificate");
+    text += fmt::format(
+        "  cage         {} tets, {} nodes, dihedrals {:.1f} … {:.1f} degrees\n"
+        "  certificate  {}: {} vertices outside, {} triangles cross, {} edges and {} vertices not manifold\n",
+        cage.at("tets").get<int>(), cage.at("nodes").get<int>(), cage.at("min_dihedral_deg").get<double>(),
+        cage.at("max_dihedral_deg").get<double>(),
+        certificate.at("holds").get<bool>() ? "holds" : "does NOT hold",
+        certificate.at("vertices_outside").get<int>(), certificate.at("triangles_crossing").get<int>(),
+        certificate.at("nonmanifold_edges").get<int>(), certificate.at("nonmanifold_vertices").get<int>());
+  }
+  if (report.contains("contact")) {
+    const Json& contact = report.at("contact");
+    text +=
+        contact.at("usable").get<bool>()
+            ? fmt::format(
+                  "  contact      {} samples; field of {} cells along the longest edge ({:.1f} MB), off by "
+                  "{:.2g} m on 99 % of the surface, {:.2g} m at worst\n",
+                  contact.at("samples").get<int>(), contact.at("cells").get<int>(),
+                  contact.at("memory_mb").get<double>(), contact.at("error_p99_m").get<double>(),
+                  contact.at("error_max_m").get<double>())
+            : "  contact      by the cage\n";
+  }
   for (const Json& sentence : report.at("mended"))
     text += fmt::format("  mended       {}\n", sentence.get<std::string>());
   for (const Json& sentence : report.at("warnings"))
     text += fmt::format("  warning      {}\n", sentence.get<std::string>());
   double seconds = 0;
   for (const Json& s : report.at("cpu_seconds")) seconds += s.get<double>();
-  text += fmt::format("  cost         {:.2f} CPU s, {:.0f} MB\n", seconds,
-                      report.at("peak_memory_mb").get<double>());
+  if (!report.at("cpu_seconds").empty())
+    text += fmt::format("  cost         {:.2f} CPU s, {:.0f} MB\n", seconds,
+                        report.at("peak_memory_mb").get<double>());
   return text;
 }
 

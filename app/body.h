@@ -27,6 +27,9 @@ struct PrepareSettings {
   bool exact = false;
   int tets = 1000;
   std::string mode = "lattice";  // "lattice", "fast", "paper", "conform"
+  // "shells": no cage, binding and contact; "cage": no shells (but in mode paper, which makes it of them),
+  // binding and contact. Such a folder is no body to plan with.
+  std::string only;
 };
 
 // Where a body comes from. `identity` holds all that load() and made_cage() depend on: when it and the
@@ -35,6 +38,8 @@ struct BodySource {
   std::string model;    // a file's name, or a word for a made model
   std::string warning;  // for whoever prepares it, not for whoever looks at it again; else empty
   Json identity;
+  std::string content,
+      ending = {};  // of a model's file: 32 digits (app/model_content.h); ".obj" in lower case
   std::function<meshing::ImportedModel()> load;
   std::function<std::optional<TetMesh>()> made_cage = [] {
     return std::nullopt;
@@ -64,8 +69,19 @@ meshing::Cage make_cage(const SurfaceMesh&, const std::vector<ConvexShell>&, con
 // What a report tells of their making: tables within "shells", "cage" and "contact".
 Json facts_of_making(const MadeBody&, const PrepareSettings&);
 
-// Writes the six files and returns the report; leaves a folder that is up to date as it is.
-Json prepare_body(const BodySource&, const PrepareSettings&, const fs::path& folder);
+// Whether the folder holds what `input` makes, whole.
+bool body_is_up_to_date(const fs::path& folder, const Json& input);
+// Removes all that limber writes of a body, first its report.
+void clear_body(const fs::path& folder);
+// A report that tells nothing of this run.
+void take_costs_out(Json& report);
+
+class BodyStore;
+// Writes the files and returns the report; leaves a folder that is up to date as it is. What is in the store
+// is taken from there, what is not is kept there; reports of such folders tell no costs, the one that is
+// returned does.
+Json prepare_body(const BodySource&, const PrepareSettings&, const fs::path& folder,
+                  const BodyStore* store = nullptr);
 
 struct PreparedBody {
   SurfaceMesh surface;

@@ -6,6 +6,7 @@
 
 #include "app/commands.h"
 #include "app/export.h"
+#include "app/model_list.h"
 #include "app/shot.h"
 #include "core/error.h"
 #include "core/events.h"
@@ -85,12 +86,24 @@ void add_edits(CLI::App& command, std::vector<std::string>& sets, std::vector<fs
       ->allow_extra_args(false);
 }
 
+void add_store(CLI::App& command, fs::path& store, const char* otherwise) {
+  command
+      .add_option(
+          "--store", store,
+          fmt::format("folder in which prepared bodies are kept and found, shared by models, scenes and "
+                      "machines; default: LIMBER_STORE of the environment, else {}",
+                      otherwise))
+      ->type_name("DIR")
+      ->envname("LIMBER_STORE");
+}
+
 void add_scene(CLI::App& command, SceneOptions& options) {
   command
       .add_option("SCENE", options.scene,
                   "a scene file, or the name of a scene that comes with limber (see limber scenes)")
       ->required();
   add_edits(command, options.sets, options.data);
+  add_store(command, options.store, "none");
 }
 
 // Of one search: PlanOptions or BenchOptions.
@@ -226,6 +239,7 @@ void add_bench(CLI::App& command, BenchOptions& options) {
       ->delimiter(',')
       ->allow_extra_args(false);
   add_edits(command, options.sets, options.data);
+  add_store(command, options.store, "none");
   add_limits(command, options);
   command.add_option("--chunk", options.chunk, "do the i-th of n parts of the runs, 1 ≤ i ≤ n")
       ->type_name("I/N");
@@ -298,9 +312,11 @@ int run_command_line(int argc, const char* const* argv) {
   program.footer(
       "Exit codes: 0 done; 1 a defect of limber; 2 bad input or usage; 3 no plan reached the goal (the best "
       "is kept);\n"
-      "4 frames failed; 5 the disk failed; 130 and 143 stopped by a signal, with all finished work kept.");
+      "4 frames failed; 5 the disk failed; 6 some of many models failed; 130 and 143 stopped by a signal, "
+      "with all finished work kept.");
   GlobalOptions global;
-  PrepareOptions prepare_options;
+  BatchOptions batch_options;
+  PrepareOptions& prepare_options = batch_options.each;
   PlanOptions plan_options;
   SimulateOptions simulate_options;
   RenderOptions render_options;
@@ -312,11 +328,15 @@ int run_command_line(int argc, const char* const* argv) {
   CLI::App& prepare_command =
       *program.add_subcommand("prepare", "model → convex shells, enclosing cage, binding, report");
   prepare_command
-      .add_option("MODEL", prepare_options.model, "a surface model in any format that assimp reads")
+      .add_option("MODEL", batch_options.models,
+                  "a surface model in any format that assimp reads, or - for one on stdin; or many: files, "
+                  "folders of models, @LIST (a file with a path a line, @- on stdin)")
       ->required();
   prepare_command
-      .add_option("-o,--out", prepare_options.out,
-                  "folder for surface.ply, shells.obj, cage.msh, binding.npz, contact.npz, report.json")
+      .add_option(
+          "-o,--out", prepare_options.out,
+          "folder for surface.ply, shells.obj, cage.msh, binding.npz, contact.npz, report.json; of many "
+          "models for bodies, failed, manifest.jsonl, manifest.csv, index.html")
       ->required()
       ->type_name("DIR");
   prepare_command.add_option("--shells", prepare_options.shells, "convex shells, at most; 1 … 1000")
@@ -371,8 +391,71 @@ int run_command_line(int argc, const char* const* argv) {
       .add_option("--density", prepare_options.density_kg_m3, "kg/m³, of the masses of --export; 1e-6 … 1e6")
       ->check(within(1e-6, 1e6))
       ->capture_default_str();
-  add_global(prepare_command, global), add_threads(prepare_command, global);
-  prepare_command.callback([&] { chosen = [&] { return prepare(prepare_options); }; });
+  prepare_command.add_flag("--picture", prepare_options.picture,
+                           "a small one: picture.png; many models have it always");
+  prepare_command
+      .add_option("--only", prepare_options.only,
+                  "make shells alone, or the cage alone with its certificate, and nothing else")
+      ->check(CLI::IsMember({"shells", "cage"}));
+  prepare_command
+      .add_option("--format", prepare_options.format,
+                  "of a model on stdin: the ending that its file would have, as glb; OBJ, OFF, PLY and STL "
+                  "mostly need none")
+      ->check(CLI::Validator(
+          [](const std::string& ending) {
+            const bool plain =
+                !ending.empty() && ending.size() <= 10 &&
+                std::all_of(ending.begin(), ending.end(), [](unsigned char c) { return std::isalnum(c); });
+            return plain ? "" : "is no ending of a file; write for example stl";
+          },
+          "ENDING"));
+  add_store(prepare_command, prepare_options.store, "none, or of many models store in -o");
+  std::vector<CLI::Option*> of_many{
+      prepare_command
+          .add_option("--jobs", batch_options.jobs,
+                      "of many models: so many at once, 0 … 256; 0: as many as --threads. Results do not "
+                      "depend on it")
+          ->check(CLI::Range(0, 256))
+          ->capture_default_str(),
+      prepare_command
+          .add_option(
+              "--time-limit", batch_options.time_limit_s,
+              "of many models: CPU time that each may take, 1 s … 30 days: 30, 30s, 5min or 1h; by the "
+              "clock five times that")
+          ->transform(CLI::AsNumberWithUnit(std::map<std::string, double>{{"s", 1}, {"min", 60}, {"h", 3600}},
+                                            CLI::AsNumberWithUnit::DEFAULT, "s|min|h"))
+          ->check(within(1, 30 * 86400.0))
+          ->capture_default_str(),
+      prepare_command
+          .add_option(
+              "--memory-limit", batch_options.memory_mb,
+              "of many models: memory that each may take, 100 MB … 1 PB: 4000, 4000MB or 4GB; default: "
+              "three quarters of the machine's, shared by the jobs")
+          ->transform(CLI::AsNumberWithUnit(std::map<std::string, double>{{"MB", 1}, {"GB", 1000}},
+                                            CLI::AsNumberWithUnit::DEFAULT, "MB|GB"))
+          ->check(within(100, 1e9)),
+      prepare_command.add_flag("--retry-failed", batch_options.retry_failed,
+                               "of many models: try those again, too, that failed before and are the same")};
+  add_global(prepare_command, global), add_threads(prepare_command, global),
+      add_progress(prepare_command, global);
+  prepare_command.callback([&] {
+    chosen = [&] {
+      const std::vector<std::string>& models = batch_options.models;
+      if (models.size() > 1 || is_of_many(models.front())) {
+        if (!prepare_options.format.empty())
+          throw InputError("--format is of a model on stdin; leave it out, files are named by their endings");
+        return prepare_many(batch_options);
+      }
+      for (const CLI::Option* option : of_many)
+        if (option->count() > 0)
+          throw InputError(
+              fmt::format("{} is of many models, and {} is one; leave it out, or name a folder, a "
+                          "list or more models",
+                          option->get_name(), models.front()));
+      prepare_options.model = models.front();
+      return prepare(prepare_options);
+    };
+  });
 
   CLI::App& plan_command = *program.add_subcommand("plan", "scene → bodies, tree, path");
   add_scene(plan_command, plan_options.scene), add_plan(plan_command, plan_options);
@@ -543,6 +626,7 @@ int run_command_line(int argc, const char* const* argv) {
       ->check(within(0.1, 1000.0))
       ->capture_default_str();
   add_edits(refine_command, refine_options.sets, refine_options.data);
+  add_store(refine_command, refine_options.store, "none");
   add_limits(refine_command, refine_options);
   add_global(refine_command, global), add_threads(refine_command, global);
   refine_command.callback([&] { chosen = [&] { return refine(refine_options); }; });
@@ -671,9 +755,7 @@ int run_command_line(int argc, const char* const* argv) {
     return report_failure(exit_disk, fmt::format("{}: {}", error.path1().string(), error.code().message()),
                           global.json);
   } catch (const std::bad_alloc&) {
-    return report_failure(
-        exit_bad_input,
-        "the machine's memory is not enough for this; ask for fewer tets, shells or iterations", global.json);
+    return report_failure(exit_bad_input, not_enough_memory, global.json);
   } catch (const std::exception& error) {
     return report_failure(exit_defect, fmt::format("this is a defect of limber: {}", error.what()),
                           global.json);

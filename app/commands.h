@@ -20,8 +20,13 @@ enum ExitCode : int {
   exit_no_plan = 3,    // the best one found is kept, and can be rendered
   exit_frames_failed = 4,
   exit_disk = 5,
-  exit_signal = 128,  // plus the signal's number
+  exit_models_failed = 6,  // some of many; the others are prepared
+  exit_signal = 128,       // plus the signal's number
 };
+
+// Of exit code 2.
+inline constexpr const char* not_enough_memory =
+    "the machine's memory is not enough for this; ask for fewer tets, shells or iterations";
 
 struct Outcome {
   int exit_code = exit_done;
@@ -40,15 +45,31 @@ struct PrepareOptions {
   double scale = 1;  // metres a file unit
   bool y_up = false;
   bool preview = false;              // pictures beside the files
+  bool picture = false;              // a small one
   std::vector<std::string> exports;  // of export_formats (app/export.h)
   double density_kg_m3 = 1000;       // of their masses
+  std::string only;                  // as of PrepareSettings (app/body.h)
+  fs::path store;                    // of bodies; empty: none, or, of many models, store in `out`
+  std::string format;                // of a model on stdin: an ending, without its dot
 };
 Outcome prepare(const PrepareOptions&);
+
+// Many models, each in a process of its own. docs/batch.md.
+struct BatchOptions {
+  std::vector<std::string> models;  // files, folders, @lists
+  PrepareOptions each;              // its `model` and `format` are not read
+  int jobs = 0;                     // at once; 0: as many as there are threads
+  double time_limit_s = 600;        // of a model, CPU time; five times that by the clock
+  double memory_mb = 0;             // of a model; 0: three quarters of the machine's, shared by the jobs
+  bool retry_failed = false;        // those, too, that would only fail again
+};
+Outcome prepare_many(const BatchOptions&);
 
 struct SceneOptions {
   std::string scene;              // a file, or the name of a scene that comes with limber
   std::vector<std::string> sets;  // --set a.b=value
   std::vector<fs::path> data;     // more folders to look for model files in
+  fs::path store = {};            // of bodies (app/body_store.h); empty: none
 };
 
 struct PlanOptions {
@@ -132,6 +153,7 @@ struct BenchOptions {
   std::vector<std::string> scenes;  // files, or names of scenes that come with limber
   std::vector<std::string> sets;
   std::vector<fs::path> data;
+  fs::path store;  // as of SceneOptions
   std::string seeds = "1-30";
   std::vector<std::string> presets;  // empty: each scene's own
   std::optional<std::int64_t> iterations;
@@ -171,6 +193,7 @@ struct RefineOptions {
   double tets_factor = 4;
   std::vector<std::string> sets;  // after those of the plan and of the factor
   std::vector<fs::path> data;
+  fs::path store;  // as of SceneOptions
   std::optional<std::int64_t> iterations;
   double time_limit_s = std::numeric_limits<double>::infinity();
   int in_flight = 0;

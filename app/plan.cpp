@@ -328,7 +328,8 @@ Outcome plan(const PlanOptions& options) {
 Outcome plan(const PlanOptions& options, const scenes::Scene& scene) {
   make_folder(options.out);
   remove_abandoned(options.out);
-  const std::vector<PreparedBody> bodies = prepare_bodies(scene, options.scene.data, options.out);
+  const std::vector<PreparedBody> bodies =
+      prepare_bodies(scene, options.scene.data, options.out, options.scene.store);
   const fem::World world = build_world(scene, bodies);
   const FemSystem system(world, bodies, goal_rules_of(scene));
   const plan::Settings settings = settings_of(scene, options);
@@ -452,7 +453,8 @@ Outcome keep_measured_plan(const fs::path& folder, const scenes::Scene& scene,
 bool plan_is_up_to_date(const PlanOptions& options, const scenes::Scene& scene) {
   if (!fs::exists(options.out / "plan.npz")) return false;
   try {
-    const std::vector<PreparedBody> bodies = prepare_bodies(scene, options.scene.data, options.out);
+    const std::vector<PreparedBody> bodies =
+        prepare_bodies(scene, options.scene.data, options.out, options.scene.store);
     const PlanFolder folder = read_searched_folder(options.out);
     const fem::World world = build_world(scene, bodies, State(folder.plan.tree.states[0]).positions);
     plan::Settings settings = settings_of(scene, options);

@@ -1,40 +1,121 @@
-#include <fmt/format.h>
+#include "app/prepare.h"
 
-#include "app/body.h"
-#include "app/commands.h"
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+#include <iterator>
+
 #include "app/export.h"
+#include "app/model_content.h"
 #include "app/preview.h"
-#include "core/hash.h"
+#include "core/error.h"
 #include "core/mesh_files.h"
+#include "core/progress.h"
 
 namespace limber::app {
 
-Outcome prepare(const PrepareOptions& options) {
+namespace {
+
+// What comes on stdin, as a file for as long as this lives.
+class ModelOnStdin {
+ public:
+  explicit ModelOnStdin(const std::string& format)
+      : file_((fs::temp_directory_path() / "limber-XXXXXX/stdin").string()) {
+    std::string folder = file_.parent_path().string();
+    if (!::mkdtemp(folder.data()))
+      throw DiskError(fmt::format("{}: a folder in it cannot be made: {}", fs::temp_directory_path().string(),
+                                  std::strerror(errno)));
+    file_ = fs::path(folder) / (format.empty() ? "stdin" : "stdin." + format);
+    FileWriter writer(file_);
+    char buffer[1 << 16];
+    for (ssize_t got; (got = ::read(STDIN_FILENO, buffer, sizeof buffer)) != 0;) {
+      throw_if_stopped();
+      if (got < 0 && errno == EINTR) continue;
+      if (got < 0) throw InputError(fmt::format("stdin: reading failed: {}", std::strerror(errno)));
+      writer.append({buffer, std::size_t(got)});
+    }
+    if (writer.size() == 0) throw InputError("stdin: holds nothing; give a model's bytes, or name a file");
+    writer.commit();
+  }
+  ~ModelOnStdin() {
+    std::error_code ignored;
+    fs::remove_all(file_.parent_path(), ignored);
+  }
+  ModelOnStdin(const ModelOnStdin&) = delete;
+  ModelOnStdin& operator=(const ModelOnStdin&) = delete;
+  const fs::path& file() const { return file_; }
+
+ private:
+  fs::path file_;
+};
+
+}  // namespace
+
+void require_agreeing(const PrepareOptions& options) {
+  if (!options.only.empty() && (!options.exports.empty() || options.preview))
+    throw InputError(
+        "--only makes a part of a body, and --preview and --export show a whole one; leave one out");
+  if (options.only == "shells" && options.mode != "lattice")
+    throw InputError("--only shells makes no cage; leave --mode out");
+  if (options.only == "cage" && options.exact)
+    throw InputError("--only cage makes no shells; leave --exact out");
+}
+
+PrepareSettings settings_of(const PrepareOptions& options) {
+  return {.shells = options.shells,
+          .concavity = options.concavity,
+          .inflate = options.inflate,
+          .exact = options.exact,
+          .tets = options.tets,
+          .mode = options.mode,
+          .only = options.only};
+}
+
+BodySource source_of(const PrepareOptions& options, const fs::path& file) {
   BodySource source;
   source.model = options.model.string();
-  source.identity = {{"file_hash", hex(hash_of(std::string_view(read_file(options.model))))},
-                     {"scale", options.scale},
-                     {"y_up", options.y_up}};
-  source.load = [&] {
-    return meshing::import_model(options.model, {.scale = options.scale, .y_up = options.y_up});
+  const ModelContent content = content_of_model(file);
+  source.content = content.content, source.ending = content.ending;
+  source.identity = {{"file_hash", content.file_hash}, {"scale", options.scale}, {"y_up", options.y_up}};
+  source.load = [file, scale = options.scale, y_up = options.y_up] {
+    return meshing::import_model(file, {.scale = scale, .y_up = y_up});
   };
-  Json report = prepare_body(source,
-                             {.shells = options.shells,
-                              .concavity = options.concavity,
-                              .inflate = options.inflate,
-                              .exact = options.exact,
-                              .tets = options.tets,
-                              .mode = options.mode},
-                             options.out);
-  std::string text = summary_of_report(report);
-  if (options.exports.empty() && !options.preview) return {exit_done, report, text};
+  return source;
+}
 
-  const PreparedBody body = read_body(options.out);
-  std::vector<std::string> written = export_body(body, options.exports, options.density_kg_m3, options.out);
-  if (options.preview) {
-    write_previews(body, read_obj_shells(options.out / "shells.obj"), options.out);
-    written.insert(written.end(), std::begin(preview_files), std::end(preview_files));
+Outcome prepare(const PrepareOptions& options) {
+  require_agreeing(options);
+  std::optional<ModelOnStdin> on_stdin;
+  if (options.model == "-")
+    on_stdin.emplace(options.format);
+  else if (!options.format.empty())
+    throw InputError("--format is of a model on stdin; name the model - or leave it out");
+  std::optional<BodyStore> store;
+  if (!options.store.empty()) store.emplace(options.store);
+
+  const BodySource source = source_of(options, on_stdin ? on_stdin->file() : options.model);
+  const PrepareSettings settings = settings_of(options);
+  Json report = prepare_body(source, settings, options.out, store ? &*store : nullptr);
+  std::string text = summary_of_report(report);
+  std::vector<std::string> written;
+  if (options.picture) {
+    if (!has_picture(options.out)) write_picture(options.out);
+    if (store) store->keep(BodyStore::key_of(source, report.at("input")), options.out);
+    written.push_back(picture_file);
   }
+  if (!options.exports.empty() || options.preview) {
+    const PreparedBody body = read_body(options.out);
+    const std::vector<std::string> exported =
+        export_body(body, options.exports, options.density_kg_m3, options.out);
+    written.insert(written.end(), exported.begin(), exported.end());
+    if (options.preview) {
+      write_previews(body, read_obj_shells(options.out / "shells.obj"), options.out);
+      written.insert(written.end(), std::begin(preview_files), std::end(preview_files));
+    }
+  }
+  if (written.empty()) return {exit_done, report, text};
   report["also_written"] = written;
   text += fmt::format("  also         {}\n", fmt::join(written, ", "));
   return {exit_done, report, text};

@@ -7,6 +7,7 @@
 #include <set>
 
 #include "core/error.h"
+#include "core/mesh_files.h"
 #include "core/progress.h"
 #include "meshing/quality.h"
 #include "render/annotate.h"
@@ -17,21 +18,27 @@ namespace limber::app {
 
 namespace {
 
-constexpr int width_px = 1600, height_px = 1000;
+struct Size {
+  int width_px, height_px;
+};
+constexpr Size large{1600, 1000}, small{320, 240};
 const Vec3 toward_eye(0.55, -1, 0.42);
 const Vec3 model_srgb(0.80, 0.72, 0.62), line_srgb(0.10, 0.25, 0.45);
 
-render::Look look_for(const Box& box, bool ground) {
+render::Look look_for(const Box& box, bool ground, const Size& size) {
   render::Look look;
-  look.width = width_px, look.height = height_px;
+  look.width = size.width_px, look.height = size.height_px;
   look.stage = box;
   look.toward_key = {-0.25, -0.9, 1.25};
-  if (ground) look.ground_height_m = box.lower.z();
+  if (size.width_px == small.width_px)  // many on one page: what is plain is few bytes
+    look.background_top_srgb = look.background_bottom_srgb = {0.95, 0.96, 0.97};
+  else if (ground)
+    look.ground_height_m = box.lower.z();
   return look;
 }
 
-render::Camera camera_for(const Box& box) {
-  return render::frame_automatically(box, toward_eye, double(width_px) / height_px, 26, 1);
+render::Camera camera_for(const Box& box, const Size& size) {
+  return render::frame_automatically(box, toward_eye, double(size.width_px) / size.height_px, 26, 1);
 }
 
 // By the smallest dihedral of a tet.
@@ -98,8 +105,8 @@ std::string fit_caption(const PreparedBody& body) {
                      c.at("vertices_outside").get<int>(), c.at("triangles_crossing").get<int>());
 }
 
-render::Image8 picture_of_shells(const PreparedBody& body, const std::vector<ConvexShell>& shells) {
-  const Vec3 middle = bounding_box(body.surface.positions).center();
+// Apart, away from `middle`.
+render::Image8 draw_shells(const std::vector<ConvexShell>& shells, const Vec3& middle, const Size& size) {
   constexpr double apart = 0.45;  // of a shell's distance from the middle
   std::vector<Points> moved;
   Box box;
@@ -108,14 +115,18 @@ render::Image8 picture_of_shells(const PreparedBody& body, const std::vector<Con
     moved.push_back(shell.vertices.rowwise() + away.transpose());
     box.include(bounding_box(moved.back()));
   }
-  render::Renderer renderer(look_for(box, true));
+  render::Renderer renderer(look_for(box, true, size));
   for (std::size_t s = 0; s < shells.size(); ++s)
     renderer.add_mesh(
         shells[s].triangles, moved[s],
         {.name = "shell", .color_srgb = shell_color(s), .roughness = 0.6, .crease_angle_deg = 8});
+  return renderer.draw_shown(camera_for(box, size));
+}
+
+render::Image8 picture_of_shells(const PreparedBody& body, const std::vector<ConvexShell>& shells) {
   const Json& figures = body.report.at("shells");
   return render::with_caption(
-      renderer.draw_shown(camera_for(box)),
+      draw_shells(shells, bounding_box(body.surface.positions).center(), large),
       {fmt::format("{}: {} convex shells, drawn apart", name_of(body), shells.size()),
        fmt::format(
            "overshoot mean {:.3f} %, largest {:.3f} % of the diagonal; {} of {} triangles not covered",
@@ -123,17 +134,17 @@ render::Image8 picture_of_shells(const PreparedBody& body, const std::vector<Con
            figures.at("triangles_uncovered").get<int>(), body.surface.triangles.rows())});
 }
 
-render::Image8 picture_of_cage(const PreparedBody& body) {
-  const Box box = bounding_box(body.cage.positions);
-  const render::Camera camera = camera_for(box);
-  render::Renderer renderer(look_for(box, true));
-  renderer.add_mesh(body.surface.triangles, body.surface.positions,
-                    {.name = "surface", .color_srgb = model_srgb});
-  const Triangles faces = boundary_triangles(body.cage.tets);
+// The cage's edges over the surface; those of faces turned away are faint.
+render::Image8 draw_cage(const SurfaceMesh& surface, const TetMesh& cage, const Size& size) {
+  const Box box = bounding_box(cage.positions);
+  const render::Camera camera = camera_for(box, size);
+  render::Renderer renderer(look_for(box, true, size));
+  renderer.add_mesh(surface.triangles, surface.positions, {.name = "surface", .color_srgb = model_srgb});
+  const Triangles faces = boundary_triangles(cage.tets);
   std::set<std::pair<int, int>> front, all;
   for (const auto face : faces.rowwise()) {
-    const Vec3 a = body.cage.positions.row(face[0]), b = body.cage.positions.row(face[1]),
-               c = body.cage.positions.row(face[2]);
+    const Vec3 a = cage.positions.row(face[0]), b = cage.positions.row(face[1]),
+               c = cage.positions.row(face[2]);
     const bool seen = (b - a).cross(c - a).dot(camera.eye - a) > 0;
     for (int k = 0; k < 3; ++k) {
       const std::pair<int, int> edge = std::minmax({int(face[k]), int(face[(k + 1) % 3])});
@@ -142,11 +153,17 @@ render::Image8 picture_of_cage(const PreparedBody& body) {
     }
   }
   for (const auto& edge : front) all.erase(edge);
-  renderer.add_lines(lines_between(all, body.cage.positions, camera.eye),
-                     {.color_srgb = line_srgb, .width_px = 1, .opacity = 0.22});
-  renderer.add_lines(lines_between(front, body.cage.positions, camera.eye),
-                     {.color_srgb = line_srgb, .width_px = 1.8, .opacity = 0.9});
-  return render::with_caption(renderer.draw_shown(camera),
+  renderer.add_lines(
+      lines_between(all, cage.positions, camera.eye),
+      {.color_srgb = line_srgb, .width_px = std::max(0.6, size.width_px / 1600.0), .opacity = 0.22});
+  renderer.add_lines(
+      lines_between(front, cage.positions, camera.eye),
+      {.color_srgb = line_srgb, .width_px = std::max(0.8, 1.8 * size.width_px / 1600), .opacity = 0.9});
+  return renderer.draw_shown(camera);
+}
+
+render::Image8 picture_of_cage(const PreparedBody& body) {
+  return render::with_caption(draw_cage(body.surface, body.cage, large),
                               {fmt::format("{}: the cage over the surface of {} triangles", name_of(body),
                                            body.surface.triangles.rows()),
                                tets_caption(body), fit_caption(body)});
@@ -156,7 +173,7 @@ render::Image8 picture_of_cage(const PreparedBody& body) {
 render::Image8 picture_of_cut(const PreparedBody& body) {
   const TetMesh& cage = body.cage;
   const Box box = bounding_box(cage.positions);
-  const render::Camera camera = camera_for(box);
+  const render::Camera camera = camera_for(box, large);
   std::map<std::array<int, 3>, std::pair<std::array<int, 3>, int>>
       open;  // by sorted corners: the face, its grade
   std::vector<double> middles;
@@ -185,7 +202,7 @@ render::Image8 picture_of_cut(const PreparedBody& body) {
     faces[std::size_t(shown.second)].push_back(shown.first);
     for (int k = 0; k < 3; ++k) edges.insert(std::minmax(key[std::size_t(k)], key[std::size_t((k + 1) % 3)]));
   }
-  render::Renderer renderer(look_for(box, true));
+  render::Renderer renderer(look_for(box, true, large));
   for (std::size_t g = 0; g < faces.size(); ++g) {
     if (faces[g].empty()) continue;
     const Triangles triangles =
@@ -214,8 +231,8 @@ render::Image8 picture_of_dihedrals(const PreparedBody& body) {
                              .low = 0,
                              .high = 180,
                              .bar_srgb = {},
-                             .width_px = width_px,
-                             .height_px = height_px - 100};
+                             .width_px = large.width_px,
+                             .height_px = large.height_px - 100};
   for (int b = 0; b < bars; ++b)
     look.bar_srgb.push_back(
         grades[std::size_t(grade_of(std::min(b * bar_deg, 180 - (b + 1) * bar_deg)))].color_srgb);
@@ -241,6 +258,23 @@ Vec3 shell_color(std::size_t i) {
     color[c] = value * (1 - saturation * std::clamp(apart - 1, 0.0, 1.0));
   }
   return color;
+}
+
+bool has_picture(const fs::path& folder) { return render::inspect_png(folder / picture_file).has_value(); }
+
+void write_picture(const fs::path& folder) {
+  SurfaceMesh surface = read_ply(folder / "surface.ply");
+  const Eigen::RowVector3d middle = bounding_box(surface.positions).center().transpose();
+  surface.positions.rowwise() -= middle;
+  if (fs::exists(folder / "cage.msh")) {
+    TetMesh cage = read_msh(folder / "cage.msh");
+    cage.positions.rowwise() -= middle;
+    render::write_png(folder / picture_file, draw_cage(surface, cage, small));
+  } else {
+    std::vector<ConvexShell> shells = read_obj_shells(folder / "shells.obj");
+    for (ConvexShell& shell : shells) shell.vertices.rowwise() -= middle;
+    render::write_png(folder / picture_file, draw_shells(shells, Vec3::Zero(), small));
+  }
 }
 
 void write_previews(PreparedBody body, std::vector<ConvexShell> shells, const fs::path& folder) {

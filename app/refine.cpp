@@ -68,7 +68,7 @@ Outcome refine(const RefineOptions& options) {
       planned.scene.script);
   make_folder(options.out);
   const FolderLock lock(options.out, FolderLock::alone);
-  const std::vector<PreparedBody> bodies = prepare_bodies(scene, options.data, options.out);
+  const std::vector<PreparedBody> bodies = prepare_bodies(scene, options.data, options.out, options.store);
 
   const fem::World coarse_world = world_of(planned, coarse_bodies), world = build_world(scene, bodies);
   const FemSystem coarse(coarse_world, goal_rules_of(planned.scene)),

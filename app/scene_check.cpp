@@ -274,7 +274,7 @@ class Check {
       if (options_.work) {
         make_folder(*options_.work);
         const FolderLock lock(*options_.work, FolderLock::alone);
-        prepare_bodies(scene_, options_.scene.data, *options_.work);
+        prepare_bodies(scene_, options_.scene.data, *options_.work, options_.scene.store);
         start = prepared_start(scene_, *options_.work);
       } else {
         std::vector<LoadedModel> models;

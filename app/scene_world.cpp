@@ -3,6 +3,8 @@
 #include <numbers>
 #include <set>
 
+#include "app/body_store.h"
+#include "app/model_content.h"
 #include "app/seen.h"
 #include "app/write_robot.h"
 #include "core/error.h"
@@ -61,7 +63,9 @@ BodySource source_of(const scenes::Scene& scene, const scenes::BodySpec& body,
   }
   if (path) {
     source.model = path->filename().string();
-    source.identity = identity_of(body, hex(hash_of(std::string_view(read_file(*path)))));
+    const ModelContent content = content_of_model(*path);
+    source.identity = identity_of(body, content.file_hash);
+    source.content = content.content, source.ending = content.ending;
     source.load = [&body, file = *path] {
       meshing::ImportedModel model =
           meshing::import_model(file, {.count_self_intersections = body.role != scenes::Role::scenery});
@@ -161,7 +165,7 @@ fs::path body_folder(const fs::path& work_folder, const scenes::BodySpec& body) 
 namespace {
 
 PrepareSettings settings_of(const scenes::BodySpec& body) {
-  return {.shells = body.cage.shells, .tets = body.cage.tets, .mode = body.cage.mode};
+  return {.shells = body.cage.shells, .tets = body.cage.tets, .mode = body.cage.mode, .only = {}};
 }
 
 fs::path goal_cage_file(const scenes::Scene& scene, const fs::path& work_folder) {
@@ -192,12 +196,14 @@ std::optional<fs::path> find_goal_cage(const scenes::Scene& scene, std::vector<f
 }
 
 std::vector<PreparedBody> prepare_bodies(const scenes::Scene& scene, const std::vector<fs::path>& data,
-                                         const fs::path& work_folder) {
+                                         const fs::path& work_folder, const fs::path& store_folder) {
+  std::optional<BodyStore> store;
+  if (!store_folder.empty()) store.emplace(store_folder);
   for (const scenes::BodySpec& body : scene.bodies) {
     throw_if_stopped();
     const BodySource source = source_of(scene, body, data);
     if (!source.warning.empty()) log::warn("{}", source.warning);
-    prepare_body(source, settings_of(body), body_folder(work_folder, body));
+    prepare_body(source, settings_of(body), body_folder(work_folder, body), store ? &*store : nullptr);
   }
   keep_goal_cage(scene, data, work_folder);
   for (const scenes::BodySpec& body : scene.scenery) {

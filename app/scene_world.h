@@ -13,9 +13,10 @@ namespace limber::app {
 fs::path body_folder(const fs::path& work_folder, const scenes::BodySpec&);
 
 // Prepares what is not up to date; meshes are in world coordinates, where the scene puts them. `data` are
-// folders in which model files are looked for first.
+// folders in which model files are looked for first; bodies are shared with those of `store`, where one is
+// named.
 std::vector<PreparedBody> prepare_bodies(const scenes::Scene&, const std::vector<fs::path>& data,
-                                         const fs::path& work_folder);
+                                         const fs::path& work_folder, const fs::path& store = {});
 
 // What prepare begins with. Throw InputError when the model is not found, or is none; scenery that is not
 // found is empty, with a warning.

@@ -117,7 +117,8 @@ Outcome simulate(const SimulateOptions& options) {
   make_folder(options.out);
   const FolderLock lock(options.out, FolderLock::alone);
   remove_abandoned(options.out);
-  const std::vector<PreparedBody> bodies = prepare_bodies(scene, options.scene.data, options.out);
+  const std::vector<PreparedBody> bodies =
+      prepare_bodies(scene, options.scene.data, options.out, options.scene.store);
   const fem::World world = build_world(scene, bodies);
   const Beginning beginning = beginning_of(options, scene, world);
   const FemSystem system(world, {}, beginning.start);

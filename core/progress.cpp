@@ -48,7 +48,7 @@ Progress::~Progress() {
   events::tell({{"event", "stage_end"}, {"stage", label_}, {"seconds", seconds_now() - started_}});
 }
 
-void Progress::update(std::int64_t done, const std::string& note) {
+void Progress::update(std::int64_t done, const std::string& note, double share) {
   if (!on_terminal() && !events::wanted()) return;
   const double now = seconds_now();
   if (drawn_at_ >= 0 && now - drawn_at_ < 0.1 && done < total_) return;
@@ -61,7 +61,8 @@ void Progress::update(std::int64_t done, const std::string& note) {
   constexpr int width = 24;
   std::string line = fmt::format("\r\x1b[K{} ", label_);
   if (total_ > 0) {
-    const double share = std::clamp(double(done) / double(total_), 0.0, 1.0);
+    if (share < 0) share = double(done) / double(total_);
+    share = std::clamp(share, 0.0, 1.0);
     const int filled = int(share * width);
     line += fmt::format("[{}{}] {}/{}", std::string(std::size_t(filled), '='),
                         std::string(std::size_t(width - filled), ' '), done, total_);

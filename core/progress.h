@@ -12,7 +12,9 @@ class Progress {
   ~Progress();                                      // clears the line
   Progress(const Progress&) = delete;
   Progress& operator=(const Progress&) = delete;
-  void update(std::int64_t done, const std::string& note = {});  // cheap: redraws at most ten times a second
+  // Cheap: redraws at most ten times a second. `share` of the work that is done, for the estimate, where it
+  // is not that of the number.
+  void update(std::int64_t done, const std::string& note = {}, double share = -1);
 
  private:
   std::string label_;

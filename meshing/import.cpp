@@ -327,6 +327,17 @@ ImportedModel import_model(const fs::path& path, const ImportOptions& options) {
   return finish(read_soup(path), options, path.filename().string());
 }
 
+const std::vector<std::string>& model_endings() {
+  static const std::vector<std::string> endings = [] {
+    std::vector<std::string> all = detail::endings_of_assimp();
+    all.insert(all.end(), {".obj", ".off", ".ply", ".stl"});
+    std::sort(all.begin(), all.end());
+    all.erase(std::unique(all.begin(), all.end()), all.end());
+    return all;
+  }();
+  return endings;
+}
+
 ImportedModel clean(const SurfaceMesh& raw, const ImportOptions& options, const std::string& what) {
   PolygonSoup soup;
   for (Eigen::Index v = 0; v < raw.positions.rows(); ++v) soup.add_position(raw.positions.row(v));

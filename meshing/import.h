@@ -28,6 +28,9 @@ struct ImportedModel {
 // corners.
 ImportedModel import_model(const fs::path&, const ImportOptions& = {});
 
+// Endings, lower case with their dot and ordered, of the files that may be models: ".3ds", …, ".obj", ….
+const std::vector<std::string>& model_endings();
+
 // The same for a mesh made in memory; `what` is its name in messages.
 ImportedModel clean(const SurfaceMesh& raw, const ImportOptions& = {}, const std::string& what = "mesh");
 

@@ -37,5 +37,6 @@ PolygonSoup read_stl_binary(std::string_view bytes, const std::string& file);
 
 // Everything else, by assimp, in a process of its own: a crash or a hang there is an InputError here.
 PolygonSoup read_by_assimp(const fs::path&);
+std::vector<std::string> endings_of_assimp();  // ".3ds", …
 
 }  // namespace limber::meshing::detail

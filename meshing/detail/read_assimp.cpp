@@ -5,6 +5,7 @@
 #include <assimp/Importer.hpp>
 #include <cmath>
 #include <cstring>
+#include <sstream>
 
 #include "core/error.h"
 #include "meshing/detail/own_process.h"
@@ -144,6 +145,15 @@ PolygonSoup read_by_assimp(const fs::path& path) {
     throw InputError(fmt::format("{}: the model cannot be read (assimp: {}); is it complete, and a 3D model?",
                                  path.filename().string(), result.bytes));
   return soup_from(result.bytes);
+}
+
+std::vector<std::string> endings_of_assimp() {
+  std::string list;  // "*.3d;*.3ds;…"
+  Assimp::Importer().GetExtensionList(list);
+  std::vector<std::string> endings;
+  std::istringstream words(list);
+  for (std::string word; std::getline(words, word, ';');) endings.push_back(word.substr(1));
+  return endings;
 }
 
 }  // namespace limber::meshing::detail

@@ -1,0 +1,26 @@
+// The models of a batch: files, folders, @lists, and the names that their results get.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "core/file.h"
+
+namespace limber::app {
+
+struct ListedModel {
+  fs::path file;
+  std::string name;  // of a folder: without / and what other systems do not take; no two alike but for case
+};
+
+// Whether it stands for models that are to be found: a folder, or @LIST (a file, or @- for stdin).
+bool is_of_many(const std::string& word);
+
+// In the order given, those of a folder by their paths; each file once. Folders are searched to their ends
+// for files with endings of models, but for hidden ones, links to folders, and those in `but_not`. A list has
+// a path a line, or between NULs, seen from the folder that limber runs in; what it names may be missing.
+// Throws InputError for a word that names nothing, a folder without models, an empty list.
+std::vector<ListedModel> list_models(const std::vector<std::string>& words,
+                                     const std::vector<fs::path>& but_not);
+
+}  // namespace limber::app
