@@ -16,6 +16,7 @@
 #include "core/version.h"
 #include "ffd/binding_file.h"
 #include "meshing/quality.h"
+#include "meshing/shell_check.h"
 #include "meshing/split_edges.h"
 
 namespace limber::app {
@@ -40,6 +41,8 @@ Json json_of(const PrepareSettings& s) {
   Json json{{"shells", s.shells}, {"concavity", s.concavity}, {"inflate", s.inflate},
             {"exact", s.exact},   {"tets", s.tets},           {"mode", s.mode}};
   if (!is_whole(s)) json["only"] = s.only;
+  if (s.corners != PrepareSettings{}.corners) json["corners"] = s.corners;
+  if (s.threshold > 0) json["threshold"] = s.threshold;
   return json;
 }
 
@@ -77,6 +80,7 @@ const Json& example_of_report() {
                             {"surface", {{"vertices", -1}, {"triangles", -1}}},
                             {"shells",
                              {{"count", -1},
+                              {"in_float32", -1},
                               {"stopped_by", ""},
                               {"mean_overshoot", 0.5},
                               {"max_overshoot", 0.5},
@@ -152,6 +156,7 @@ Json input_of(const Json& identity, const PrepareSettings& settings) {
   const meshing::SplitSettings split;
   return {{"model", identity},
           {"settings", json_of(settings)},
+          {"shells", "in float32"},
           {"cage",
            {{"min_dihedral_deg", cage.min_dihedral_deg},
             {"max_dihedral_deg", cage.max_dihedral_deg},
@@ -173,9 +178,16 @@ Json input_of(const Json& identity, const PrepareSettings& settings) {
 
 PrepareSettings settings_of_input(const Json& input) {
   const Json& s = input.at("settings");
-  return {s.at("shells").get<int>(), s.at("concavity").get<double>(), s.at("inflate").get<double>(),
-          s.at("exact").get<bool>(), s.at("tets").get<int>(),         s.at("mode").get<std::string>(),
-          s.value("only", "")};
+  const PrepareSettings usual;
+  return {.shells = s.at("shells").get<int>(),
+          .concavity = s.at("concavity").get<double>(),
+          .threshold = s.value("threshold", usual.threshold),
+          .inflate = s.at("inflate").get<double>(),
+          .exact = s.at("exact").get<bool>(),
+          .tets = s.at("tets").get<int>(),
+          .mode = s.at("mode").get<std::string>(),
+          .corners = s.value("corners", usual.corners),
+          .only = s.value("only", "")};
 }
 
 bool body_is_up_to_date(const fs::path& folder, const Json& input) {
@@ -216,9 +228,16 @@ SurfaceMesh surface_that_bends(const SurfaceMesh& surface, const PrepareSettings
   return meshing::split_long_edges(surface, meshing::longest_edge(surface, settings.tets));
 }
 
+double concavity_of(const SurfaceMesh& surface, const PrepareSettings& settings) {
+  if (settings.threshold == 0) return settings.concavity;
+  const Box box = bounding_box(surface.positions);
+  return 0.5 * settings.threshold * (box.upper - box.lower).maxCoeff() / box.diagonal();
+}
+
 meshing::Decomposition make_shells(const SurfaceMesh& surface, const PrepareSettings& settings) {
   return meshing::decompose(surface, {.max_shells = settings.shells,
-                                      .max_concavity = settings.concavity,
+                                      .max_concavity = concavity_of(surface, settings),
+                                      .max_vertices = settings.corners,
                                       .inflation = settings.inflate,
                                       .exact = settings.exact});
 }
@@ -389,7 +408,8 @@ Json facts_of_body(const SurfaceMesh& surface, const std::vector<ConvexShell>& s
                       {"volume_m3", volume(surface)},
                       {"lower_m", {box.lower.x(), box.lower.y(), box.lower.z()}},
                       {"upper_m", {box.upper.x(), box.upper.y(), box.upper.z()}}};
-  facts["shells"] = {{"count", shells.size()}};
+  facts["shells"] = {{"count", shells.size()},
+                     {"in_float32", std::count_if(shells.begin(), shells.end(), meshing::holds_in_float32)}};
   facts["cage"] = {{"tets", cage.tets.rows()},
                    {"nodes", cage.positions.rows()},
                    {"volume_m3", volume(cage)},

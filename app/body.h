@@ -23,10 +23,12 @@ namespace limber::app {
 struct PrepareSettings {
   int shells = 32;
   double concavity = 0;
+  double threshold = 0;  // as PrepareOptions::threshold
   double inflate = 0;
   bool exact = false;
   int tets = 1000;
   std::string mode = "lattice";  // "lattice", "fast", "paper", "conform"
+  int corners = 64;              // of a shell, at most
   // "shells": no cage, binding and contact; "cage": no shells (but in mode paper, which makes it of them),
   // binding and contact. Such a folder is no body to plan with.
   std::string only;
@@ -63,6 +65,8 @@ struct MadeBody {
   ContactShape contact;
   meshing::ContactShapeReport contact_report;
 };
+// The bound on their overshoot, share of the diagonal; 0: none.
+double concavity_of(const SurfaceMesh&, const PrepareSettings&);
 meshing::Decomposition make_shells(const SurfaceMesh&, const PrepareSettings&);
 meshing::Cage make_cage(const SurfaceMesh&, const std::vector<ConvexShell>&, const PrepareSettings&,
                         std::optional<TetMesh> made_cage);

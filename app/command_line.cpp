@@ -4,6 +4,7 @@
 #include <cstdio>
 #include <new>
 
+#include "app/command_words.h"
 #include "app/commands.h"
 #include "app/export.h"
 #include "app/model_list.h"
@@ -292,6 +293,32 @@ std::string misspelt(const CLI::App& program, int argc, const char* const* argv)
   return "";
 }
 
+Outcome manual(const CLI::App& program, const std::vector<std::string>& words) {
+  const std::string wanted = words.empty() ? "limber" : fmt::format("limber {}", fmt::join(words, " "));
+  std::vector<std::string> known;
+  for (const CLI::App* command : all_commands(program)) {
+    if (full_name(*command) == wanted) {
+      const std::string page = manual_of(program, *command);
+      return {exit_done, {{"page", page}}, page};
+    }
+    known.push_back(full_name(*command));
+  }
+  const std::string meant = nearest(wanted, known);
+  throw InputError(fmt::format("{} is no command; {}", wanted,
+                               meant.empty() ? "see limber --help" : "did you mean " + meant + "?"));
+}
+
+Outcome write_manual(const CLI::App& program, const fs::path& folder) {
+  make_folder(folder);
+  Json files = Json::array();
+  for (const CLI::App* command : all_commands(program)) {
+    const fs::path file = folder / manual_file(*command);
+    write_file(file, manual_of(program, *command));
+    files.push_back(file.string());
+  }
+  return {exit_done, {{"pages", files}}, fmt::format("{}: {} pages\n", folder.string(), files.size())};
+}
+
 int report_failure(int code, const std::string& what, bool json) {
   log::warn("limber: {}", what);
   events::tell({{"event", "end"}, {"exit_code", code}, {"error", what}});
@@ -339,7 +366,9 @@ int run_command_line(int argc, const char* const* argv) {
           "models for bodies, failed, manifest.jsonl, manifest.csv, index.html")
       ->required()
       ->type_name("DIR");
-  prepare_command.add_option("--shells", prepare_options.shells, "convex shells, at most; 1 … 1000")
+  prepare_command
+      .add_option("--shells,--max-convex-hull,--max-hulls", prepare_options.shells,
+                  "convex shells, at most; 1 … 1000")
       ->check(CLI::Range(1, 1000))
       ->capture_default_str();
   prepare_command
@@ -347,6 +376,15 @@ int run_command_line(int argc, const char* const* argv) {
           "--concavity", prepare_options.concavity,
           "cut no further below this overshoot, share of the model's diagonal, 0 … 1; 0: only --shells rules")
       ->check(within(0.0, 1.0))
+      ->capture_default_str();
+  prepare_command
+      .add_option("--threshold", prepare_options.threshold,
+                  "--concavity in CoACD's unit, half of the longest edge of the model's box, 0 … 1")
+      ->check(within(0.0, 1.0));
+  prepare_command
+      .add_option("--shell-corners,--max-hull-vertices,--max-ch-vertex", prepare_options.corners,
+                  "corners of a shell, at most; 8 … 10000")
+      ->check(CLI::Range(8, 10000))
       ->capture_default_str();
   prepare_command
       .add_option("--inflate", prepare_options.inflate,
@@ -382,7 +420,9 @@ int run_command_line(int argc, const char* const* argv) {
           "files for other programs, also of a body that is up to date; any of vtu (ParaView: cage.vtu, "
           "surface.vtu), node (TetGen: cage.node, cage.ele), interp (Vega FEM: cage.veg, surface.interp, "
           "surface.obj), vtk (Drake, Bullet: cage.vtk), inp (Abaqus: cage.inp), urdf, sdf, mjcf (one OBJ a "
-          "shell in hulls, mass.json, and body.urdf, body.sdf, or MuJoCo's body.xml and flex.xml)")
+          "shell in hulls, mass.json, and body.urdf, body.sdf, or MuJoCo's body.xml and flex.xml), usd "
+          "(body.usda: the cage as a soft TetMesh), usd-omni (the same by the names of Omni Physics), sofa "
+          "(body.scn)")
       ->type_name("FORMAT[,FORMAT…]")
       ->delimiter(',')
       ->check(CLI::IsMember(export_formats))
@@ -717,6 +757,30 @@ int run_command_line(int argc, const char* const* argv) {
   CLI::App& scenes_command = *program.add_subcommand("scenes", "the scenes that come with limber");
   add_global(scenes_command, global);
   scenes_command.callback([&] { chosen = [] { return list_scenes(); }; });
+
+  CLI::App& completion_command =
+      *program.add_subcommand("completion", "a script by which a shell completes limber's words");
+  std::string shell;
+  completion_command.add_option("SHELL", shell, "bash, zsh or fish")
+      ->required()
+      ->check(CLI::IsMember(shells_completed));
+  add_global(completion_command, global);
+  completion_command.callback([&] {
+    chosen = [&] {
+      const std::string script = completion_of(program, shell);
+      return Outcome{exit_done, {{"script", script}}, script};
+    };
+  });
+
+  CLI::App& man_command = *program.add_subcommand("man", "a page of the manual, for man -l -");
+  std::vector<std::string> command_words;
+  fs::path pages;
+  man_command.add_option("COMMAND", command_words, "as plan, or scene new; none: of limber itself");
+  man_command.add_option("-o,--out", pages, "write all pages into this folder")->type_name("DIR");
+  add_global(man_command, global);
+  man_command.callback([&] {
+    chosen = [&] { return pages.empty() ? manual(program, command_words) : write_manual(program, pages); };
+  });
 
   try {
     program.parse(argc, argv);

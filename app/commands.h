@@ -39,6 +39,8 @@ struct PrepareOptions {
   int shells = 32;       // at most so many convex shells
   double concavity = 0;  // stop cutting below this overshoot, share of the diagonal; 0: only the count rules
   double inflate = 0;    // shells take in all that is this share of the diagonal away
+  double threshold = 0;  // the same as CoACD measures: share of half the longest edge of the model's box
+  int corners = 64;      // of a shell, at most
   bool exact = false;    // exact convex parts of a small closed model
   int tets = 1000;       // budget of the cage
   std::string mode = "lattice";

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <regex>
 
-#include "app/write_robot.h"
+#include "app/write_soft_body.h"
 #include "core/error.h"
 #include "core/export_files.h"
 #include "core/mesh_files.h"
@@ -45,9 +45,12 @@ std::vector<std::string> export_body(const PreparedBody& body, const std::vector
   };
   BodyMass whole;
   std::vector<ConvexShell> shells;
+  const auto weigh = [&] {
+    if (whole.of.volume_m3 == 0) whole = mass_of(body);
+  };
   const auto write_rigid = [&](const char* file, auto write) {
+    weigh();
     if (shells.empty()) {
-      whole = mass_of(body);
       shells = read_obj_shells(folder / "shells.obj");
       for (const std::string& hull : write_hulls(body, whole, shells, density_kg_m3, folder)) name(hull);
       write_obj(name("surface.obj"), body.surface);
@@ -74,6 +77,16 @@ std::vector<std::string> export_body(const PreparedBody& body, const std::vector
       write_rigid("body.urdf", write_urdf);
     } else if (format == "sdf") {
       write_rigid("body.sdf", write_sdf);
+    } else if (format == "usd" || format == "usd-omni") {
+      weigh();
+      const bool omni = format == "usd-omni";
+      write_usd_body(name(omni ? "body-omni.usda" : "body.usda"), body, whole, density_kg_m3,
+                     omni ? UsdNames::omniphysics : UsdNames::physics);
+    } else if (format == "sofa") {
+      weigh();
+      write_legacy_vtk(name("cage.vtk"), body.cage);
+      write_obj(name("surface.obj"), body.surface);
+      write_sofa_scene(name("body.scn"), whole, density_kg_m3);
     } else {
       LIMBER_CHECK(format == "mjcf", format);
       write_rigid("body.xml", write_mjcf);
@@ -85,9 +98,9 @@ std::vector<std::string> export_body(const PreparedBody& body, const std::vector
 
 void remove_exports(const fs::path& folder) {
   std::error_code ignored;
-  for (const char* file :
-       {"cage.vtu", "surface.vtu", "cage.node", "cage.ele", "cage.veg", "surface.interp", "surface.obj",
-        "cage.vtk", "cage.inp", "mass.json", "body.urdf", "body.sdf", "body.xml", "flex.xml"})
+  for (const char* file : {"cage.vtu", "surface.vtu", "cage.node", "cage.ele", "cage.veg", "surface.interp",
+                           "surface.obj", "cage.vtk", "cage.inp", "mass.json", "body.urdf", "body.sdf",
+                           "body.xml", "flex.xml", "body.usda", "body-omni.usda", "body.scn"})
     fs::remove(folder / file, ignored);
   static const std::regex hull(R"(hull_[0-9]{3,}\.obj)");
   std::vector<fs::path> hulls;

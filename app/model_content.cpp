@@ -13,6 +13,7 @@ namespace {
 
 constexpr std::size_t longest_path = 300, longest_ending = 8;
 constexpr std::uintmax_t most_named_bytes = std::uintmax_t(2) << 30;
+constexpr std::size_t most_names = 100'000;  // no model names so many
 
 bool is_letter(char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z'); }
 bool is_digit(char c) { return c >= '0' && c <= '9'; }
@@ -36,7 +37,8 @@ std::string without_percents(const std::string& text) {
 // Words like "name.ending", with all that may be a path before them.
 std::set<std::string> paths_in(std::string_view bytes) {
   std::set<std::string> paths;
-  for (std::size_t dot = bytes.find('.'); dot != bytes.npos; dot = bytes.find('.', dot + 1)) {
+  for (std::size_t dot = bytes.find('.'); dot != bytes.npos && paths.size() < most_names;
+       dot = bytes.find('.', dot + 1)) {
     std::size_t end = dot + 1, begin = dot;
     if (end == bytes.size() || !is_letter(bytes[end])) continue;  // a number
     while (end < bytes.size() && end - dot <= longest_ending &&
@@ -58,7 +60,7 @@ std::vector<fs::path> files_named_in(std::string_view bytes, const fs::path& mod
     for (std::size_t begin = 0; begin < path.size();
          begin = std::min(path.find_first_of(" /:=,", begin), path.size() - 1) + 1) {
       const std::string name = path.substr(begin);
-      if (name.empty() || !tried.insert(name).second) continue;
+      if (name.empty() || tried.size() >= most_names || !tried.insert(name).second) continue;
       const fs::path file = model.parent_path() / name;
       if (fs::is_regular_file(file, none) && !fs::equivalent(file, model, none)) files.push_back(file);
     }

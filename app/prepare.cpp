@@ -54,6 +54,8 @@ class ModelOnStdin {
 }  // namespace
 
 void require_agreeing(const PrepareOptions& options) {
+  if (options.concavity > 0 && options.threshold > 0)
+    throw InputError("--concavity and --threshold are one bound in two units; leave one out");
   if (!options.only.empty() && (!options.exports.empty() || options.preview))
     throw InputError(
         "--only makes a part of a body, and --preview and --export show a whole one; leave one out");
@@ -66,10 +68,12 @@ void require_agreeing(const PrepareOptions& options) {
 PrepareSettings settings_of(const PrepareOptions& options) {
   return {.shells = options.shells,
           .concavity = options.concavity,
+          .threshold = options.threshold,
           .inflate = options.inflate,
           .exact = options.exact,
           .tets = options.tets,
           .mode = options.mode,
+          .corners = options.corners,
           .only = options.only};
 }
 

@@ -238,7 +238,9 @@ class Batch {
     };
     add({"--shells", std::to_string(o.shells), "--concavity", text_of_number(o.concavity), "--inflate",
          text_of_number(o.inflate), "--tets", std::to_string(o.tets), "--mode", o.mode, "--scale",
-         text_of_number(o.scale), "--density", text_of_number(o.density_kg_m3)});
+         text_of_number(o.scale), "--density", text_of_number(o.density_kg_m3), "--shell-corners",
+         std::to_string(o.corners)});
+    if (o.threshold > 0) add({"--threshold", text_of_number(o.threshold)});
     if (o.exact) add({"--exact"});
     if (o.y_up) add({"--y-up"});
     if (!o.only.empty()) add({"--only", o.only});

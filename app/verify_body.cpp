@@ -206,7 +206,8 @@ bool tells_of_bare_parts(const Json& shells) {
 // What a report tells of shells that are not made again: what follows from them and the settings, and what
 // only their making tells, as it is told. Throws InputError or Json::exception where it could not be so.
 meshing::Decomposition decomposition_by_report(const std::vector<ConvexShell>& shells,
-                                               const PrepareSettings& settings, const Json& said) {
+                                               const PrepareSettings& settings, double concavity,
+                                               const Json& said) {
   meshing::Decomposition d;
   d.shells = shells;
   for (const ConvexShell& shell : shells)
@@ -217,9 +218,9 @@ meshing::Decomposition decomposition_by_report(const std::vector<ConvexShell>& s
   const int count = int(shells.size());
   if (settings.exact)
     d.stopped_by = "exact";
-  else if (settings.concavity > 0 && d.max_overshoot <= settings.concavity)
+  else if (concavity > 0 && d.max_overshoot <= concavity)
     d.stopped_by = "concavity";
-  else if (settings.concavity > 0 && count == settings.shells && said.at("stopped_by") == "gain")
+  else if (concavity > 0 && count == settings.shells && said.at("stopped_by") == "gain")
     d.stopped_by = "gain";  // the first cuts, made before the bound was looked at
   else
     d.stopped_by = count < settings.shells ? "gain" : "count";
@@ -274,7 +275,8 @@ Json check_making(const std::string& name, const PreparedBody& body, const Prepa
     table.row(name + ": shells made again from the surface: the same",
               same_shells(shells, made.decomposition.shells, size), "");
   } else {
-    made.decomposition = decomposition_by_report(shells, settings, said);
+    made.decomposition =
+        decomposition_by_report(shells, settings, concavity_of(body.surface, settings), said);
     table.measured(name + ": shells", "checked, but not made again; --remake does that");
   }
 
@@ -309,7 +311,8 @@ std::optional<PrepareSettings> settings_of(const PreparedBody& body) {
     const PrepareSettings s = settings_of_input(body.report.at("input"));
     const auto share = [](double x) { return x >= 0 && x <= 1; };
     const std::set<std::string> modes{"lattice", "fast", "paper", "conform"};
-    const bool good = s.shells >= 1 && s.shells <= 1000 && share(s.concavity) && share(s.inflate) &&
+    const bool good = s.shells >= 1 && s.shells <= 1000 && share(s.concavity) && share(s.threshold) &&
+                      share(s.inflate) && s.corners >= 8 && s.corners <= 10'000 &&
                       (s.tets == 0 || (s.tets >= 24 && s.tets <= 200'000)) && modes.contains(s.mode);
     return good ? std::optional(s) : std::nullopt;
   } catch (const Json::exception&) {

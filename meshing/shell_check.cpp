@@ -135,4 +135,8 @@ ShellCheck check_shells(const std::vector<ConvexShell>& shells, const SurfaceMes
   return result;
 }
 
+bool holds_in_float32(const ConvexShell& shell) {
+  return (shell.vertices.cast<float>().cast<double>().array() == shell.vertices.array()).all();
+}
+
 }  // namespace limber::meshing

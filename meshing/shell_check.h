@@ -19,4 +19,7 @@ struct ShellCheck {
 // The surface must pass validate(), and so must the shells.
 ShellCheck check_shells(const std::vector<ConvexShell>&, const SurfaceMesh&);
 
+// Whether it is the same, and so convex, in a file of float32 numbers.
+bool holds_in_float32(const ConvexShell&);
+
 }  // namespace limber::meshing

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
+#include <optional>
 #include <queue>
 
 #include "core/error.h"
@@ -15,6 +17,9 @@
 namespace limber::meshing::detail {
 
 namespace {
+
+constexpr double least_growth = 2e-6;
+constexpr double float32_share = 1e-3;  // by which a shell may grow for the sake of float32
 
 Points rows_of(std::span<const Vec3> points) {
   Points rows(Eigen::Index(points.size()), 3);
@@ -195,20 +200,54 @@ bool encloses(const ConvexShell& shell, const Vec3& point) {
   return true;
 }
 
+namespace {
+
+// The next number that a float32 holds, away from the middle.
+double outwards_in_float32(double value, double middle) {
+  const auto nearest = float(value);
+  const bool inwards = value > middle ? double(nearest) < value : double(nearest) > value;
+  return inwards ? std::nextafter(nearest, value > middle ? INFINITY : -INFINITY) : nearest;
+}
+
+// Nothing where steps between float32 numbers are too wide for a shell of that size.
+std::vector<Vec3> outwards_in_float32(const std::vector<Vec3>& corners, const Vec3& center) {
+  double largest = 0, reach = 0;
+  for (const Vec3& p : corners) {
+    largest = std::max(largest, p.cwiseAbs().maxCoeff());
+    reach = std::max(reach, (p - center).norm());
+  }
+  if (!(largest * std::numeric_limits<float>::epsilon() < float32_share * reach) || largest > 1e30) return {};
+  std::vector<Vec3> rounded = corners;
+  for (Vec3& p : rounded)
+    for (int k = 0; k < 3; ++k) p[k] = outwards_in_float32(p[k], center[k]);
+  return rounded;
+}
+
+std::optional<ConvexShell> shell_round(const std::vector<Vec3>& corners, std::span<const Vec3> points,
+                                       double margin) {
+  ConvexShell shell = convex_hull(rows_of(corners));
+  const auto planes = planes_of(shell);
+  for (const Vec3& p : points)
+    if ((planes.leftCols<3>() * p + planes.col(3)).maxCoeff() > -margin || !encloses(shell, p))
+      return std::nullopt;
+  return shell;
+}
+
+}  // namespace
+
 ConvexShell enclosing_shell(std::span<const Vec3> corners, std::span<const Vec3> points, double margin) {
   const Vec3 center = mean_of(corners);
-  for (double growth = 2e-6; growth < 1; growth *= 2) {
-    std::vector<Vec3> grown;
-    for (const Vec3& p : corners) grown.push_back(center + (1 + growth) * (p - center));
-    ConvexShell shell = convex_hull(rows_of(grown));
-    const auto planes = planes_of(shell);
-    bool holds = true;
-    for (const Vec3& p : points) {
-      holds = (planes.leftCols<3>() * p + planes.col(3)).maxCoeff() <= -margin && encloses(shell, p);
-      if (!holds) break;
-    }
-    if (holds) return shell;
-  }
+  const auto grown = [&](double growth) {
+    std::vector<Vec3> result;
+    for (const Vec3& p : corners) result.push_back(center + (1 + growth) * (p - center));
+    return result;
+  };
+  for (double growth = least_growth; growth < float32_share; growth *= 2)
+    if (const std::vector<Vec3> rounded = outwards_in_float32(grown(growth), center); !rounded.empty())
+      if (std::optional<ConvexShell> shell = shell_round(rounded, points, margin)) return *std::move(shell);
+  for (double growth = least_growth; growth < 1; growth *= 2)
+    if (std::optional<ConvexShell> shell = shell_round(grown(growth), points, margin))
+      return *std::move(shell);
   throw InternalError("a shell does not hold its points even at twice its size");
 }
 

@@ -22,8 +22,9 @@ std::vector<Vec3> bevelled(const std::vector<Vec3>& corners, double distance);
 std::vector<Vec3> thickened(const std::vector<Vec3>& points, double distance);
 
 // The exact hull of `corners`, grown about its middle by 2e-6 of its size or as little more as it takes until
-// it holds every point exactly, and at least `margin` inside each face. Throws InternalError when it never
-// does.
+// it holds every point exactly, and at least `margin` inside each face. Its corners are numbers of float32
+// where a thousandth of its size is enough for that, so that it is convex in files of floats, too. Throws
+// InternalError when it never holds them.
 ConvexShell enclosing_shell(std::span<const Vec3> corners, std::span<const Vec3> points, double margin);
 
 // No face has the point on its outer side: exact.

@@ -4,11 +4,13 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <numbers>
 #include <numeric>
 
 #include "core/error.h"
 #include "core/random.h"
 #include "meshing/convex_hull.h"
+#include "meshing/shell_check.h"
 #include "tests/meshing/made_meshes.h"
 #include "tests/meshing/shell_laws.h"
 
@@ -45,8 +47,13 @@ void expect_lawful(const SurfaceMesh& mesh, const DecomposeOptions& options, con
   EXPECT_LE(int(result.shells.size()), options.max_shells);
   EXPECT_GE(result.shells.size(), 1u);
   double sum = 0;
+  const Box box = bounding_box(mesh.positions);
+  const double farthest = mesh.positions.cwiseAbs().maxCoeff();
   for (const ConvexShell& shell : result.shells) {
     expect_convex(shell);
+    if (farthest < 1e3 * box.diagonal()) {  // convex in files of floats, too
+      EXPECT_TRUE(holds_in_float32(shell));
+    }
     EXPECT_LE(shell.vertices.rows(), options.max_vertices);
     EXPECT_GT(volume_of(shell), 0);
     sum += volume_of(shell);
@@ -156,6 +163,35 @@ TEST(Decompose, OrderOfTrianglesAndPlaceInSpaceChangeLittle) {
   const Decomposition result = decompose(moved, {.max_shells = 12});
   expect_lawful(moved, {.max_shells = 12}, result);
   EXPECT_NEAR(result.sum_of_hull_volumes, expected, 3e-2 * expected);
+}
+
+TEST(Decompose, TurnedBy17DegreesItIsAsGood) {
+  const Eigen::Matrix3d turn =
+      Eigen::AngleAxisd(17 * std::numbers::pi / 180, Vec3(3, 1, -2).normalized()).toRotationMatrix();
+  const auto turned = [&](SurfaceMesh mesh) {
+    mesh.positions = (mesh.positions * turn.transpose()).eval();
+    return mesh;
+  };
+  const SurfaceMesh prism = turned(made_l_prism());
+  EXPECT_NEAR(decompose(prism, {.max_shells = 2}).sum_of_hull_volumes, volume(prism), 2e-5 * volume(prism));
+  const SurfaceMesh torus = made_torus(0.3, 40, 16);
+  for (int shells : {8, 16}) {
+    const Decomposition straight = decompose(torus, {.max_shells = shells});
+    const Decomposition slanted = decompose(turned(torus), {.max_shells = shells});
+    EXPECT_LT(slanted.sum_of_hull_volumes, 1.03 * straight.sum_of_hull_volumes);
+    EXPECT_LT(slanted.mean_overshoot, 1.1 * straight.mean_overshoot);
+  }
+}
+
+// The middle of a chord across a sixteenth of the ring is at 0.98 of its inner radius, 0.7.
+TEST(Decompose, AHoleIsKept) {
+  const Decomposition result = decompose(made_torus(0.3, 40, 16), {.max_shells = 16});
+  for (int i = 0; i < 36; ++i)
+    for (double radius : {0.0, 0.3, 0.6}) {
+      const double angle = i * std::numbers::pi / 18;
+      const Long3 p(radius * std::cos(angle), radius * std::sin(angle), 0);
+      for (const ConvexShell& shell : result.shells) EXPECT_FALSE(holds(shell, p)) << radius << " " << angle;
+    }
 }
 
 TEST(Decompose, AScaleByAPowerOfTwoChangesNothing) {
