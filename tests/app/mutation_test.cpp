@@ -1151,6 +1151,7 @@ TEST(BodyMutations_slow, OfShellsThatStandOffTooFar) {
   report["shells"].update(
       {{"mean_overshoot", c.mean_overshoot},
        {"max_overshoot", c.max_overshoot},
+       {"in_float32", std::count_if(shells.begin(), shells.end(), meshing::holds_in_float32)},
        {"sum_of_volumes_m3", volume(SurfaceMesh{shells[0].vertices, shells[0].triangles})}});
   report["files"]["shells.obj"] = hex(hash_of(std::string_view(read_file(folder / "ball" / "shells.obj"))));
   write_json(folder / "ball" / "report.json", report);
