@@ -53,6 +53,10 @@ struct PrepareOptions {
   std::string only;                  // as of PrepareSettings (app/body.h)
   fs::path store;                    // of bodies; empty: none, or, of many models, store in `out`
   std::string format;                // of a model on stdin: an ending, without its dot
+  std::string label;                 // of a label map: a number or a name
+  double label_gap = 0.2;            // as imaging::SurfaceNetOptions
+  int label_rounds = 10;
+  double least_island = 8;
 };
 Outcome prepare(const PrepareOptions&);
 

@@ -7,6 +7,7 @@
 #include "core/json_text.h"
 #include "core/mesh_files.h"
 #include "core/npz.h"
+#include "imaging/label_map.h"
 #include "meshing/quality.h"
 #include "render/png_file.h"
 #include "scenes/library.h"
@@ -56,6 +57,29 @@ Json info_of_model(const fs::path& path) {
   Json json = info_of_surface(model.surface);
   json.update(meshing::to_json(model));
   return json;
+}
+
+Outcome info_of_label_map(const fs::path& path) {
+  const imaging::LabelMap map = imaging::read_label_map(path);
+  std::vector<std::int64_t> voxels(map.labels.size(), 0);
+  for (const std::uint16_t row : map.material) ++voxels[row];
+  Json json{{"size", map.size}, {"notes", map.notes}, {"labels", Json::array()}};
+  for (int d = 0; d < 3; ++d) json["voxel_m"].push_back(map.axes_m.col(d).norm());
+  std::string text = fmt::format("{} x {} x {} voxels of {:.4g} x {:.4g} x {:.4g} mm\n", map.size[0],
+                                 map.size[1], map.size[2], 1e3 * map.axes_m.col(0).norm(),
+                                 1e3 * map.axes_m.col(1).norm(), 1e3 * map.axes_m.col(2).norm());
+  for (const std::string& note : map.notes) text += note + "\n";
+  text += fmt::format("{:>10}  {:24} {:>12} {:>12}\n", "label", "name", "voxels", "volume, ml");
+  for (std::size_t row = 1; row < map.labels.size(); ++row) {
+    const double volume_m3 = double(voxels[row]) * map.voxel_volume_m3();
+    json["labels"].push_back({{"label", map.labels[row]},
+                              {"name", map.names[row]},
+                              {"voxels", voxels[row]},
+                              {"volume_m3", volume_m3}});
+    text += fmt::format("{:10}  {:24} {:12} {:12.2f}\n", map.labels[row], map.names[row], voxels[row],
+                        1e6 * volume_m3);
+  }
+  return {exit_done, json, text};
 }
 
 // What a person needs to choose a part by its shell: where it is, how large, which colour in the pictures.
@@ -123,6 +147,7 @@ Outcome info(const fs::path& path) {
     if (!png) throw InputError(fmt::format("{}: is missing, no PNG, or cut short", path.string()));
     return outcome_of({{"width", png->width}, {"height", png->height}, {"texts", png->texts}});
   }
+  if (imaging::is_label_map(path)) return info_of_label_map(path);
   return outcome_of(info_of_model(path));
 }
 

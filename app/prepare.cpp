@@ -13,6 +13,7 @@
 #include "core/error.h"
 #include "core/mesh_files.h"
 #include "core/progress.h"
+#include "imaging/surface_nets.h"
 
 namespace limber::app {
 
@@ -77,6 +78,26 @@ PrepareSettings settings_of(const PrepareOptions& options) {
           .only = options.only};
 }
 
+namespace {
+
+meshing::ImportedModel import_label(const PrepareOptions& options, const fs::path& file) {
+  const imaging::LabelMap map = imaging::read_label_map(file);
+  const int row = imaging::row_of_label(map, options.label, file.string());
+  const imaging::LabelSurface label = imaging::surfaces_of(
+      map, {row},
+      {.gap = options.label_gap, .rounds = options.label_rounds, .least_island = options.least_island})[0];
+  meshing::ImportedModel model =
+      meshing::clean(label.surface, {.scale = options.scale},
+                     fmt::format("{}: label {}", file.string(), map.labels[std::size_t(row)]));
+  if (label.islands_dropped > 0)
+    model.mended.push_back(fmt::format("left out {} pieces of fewer than {:g} voxels, {} voxels in all",
+                                       label.islands_dropped, options.least_island, label.voxels_dropped));
+  model.warnings.insert(model.warnings.end(), map.notes.begin(), map.notes.end());
+  return model;
+}
+
+}  // namespace
+
 BodySource source_of(const PrepareOptions& options, const fs::path& file) {
   BodySource source;
   source.model = options.model.string();
@@ -86,6 +107,24 @@ BodySource source_of(const PrepareOptions& options, const fs::path& file) {
   source.load = [file, scale = options.scale, y_up = options.y_up] {
     return meshing::import_model(file, {.scale = scale, .y_up = y_up});
   };
+  if (!imaging::is_label_map(file)) {
+    if (!options.label.empty())
+      throw InputError(
+          fmt::format("{}: is no NIfTI or NRRD file, so it has no labels; leave --label out", file.string()));
+    return source;
+  }
+  if (options.label.empty())
+    throw InputError(
+        fmt::format("{}: is a label map; choose what is to be prepared with --label, of those that "
+                    "limber info {} lists",
+                    file.string(), file.string()));
+  if (options.y_up)
+    throw InputError(fmt::format("{}: a label map says where up is; leave --y-up out", file.string()));
+  source.identity["label"] = {{"name", options.label},
+                              {"gap", options.label_gap},
+                              {"rounds", options.label_rounds},
+                              {"least_island", options.least_island}};
+  source.load = [options, file] { return import_label(options, file); };
   return source;
 }
 

@@ -241,6 +241,9 @@ class Batch {
          text_of_number(o.scale), "--density", text_of_number(o.density_kg_m3), "--shell-corners",
          std::to_string(o.corners)});
     if (o.threshold > 0) add({"--threshold", text_of_number(o.threshold)});
+    if (!o.label.empty())
+      add({"--label", o.label, "--label-gap", text_of_number(o.label_gap), "--label-smoothing",
+           std::to_string(o.label_rounds), "--least-island", text_of_number(o.least_island)});
     if (o.exact) add({"--exact"});
     if (o.y_up) add({"--y-up"});
     if (!o.only.empty()) add({"--only", o.only});
