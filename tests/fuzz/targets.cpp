@@ -12,6 +12,7 @@
 #include "core/mesh_files.h"
 #include "core/npz.h"
 #include "ffd/binding_file.h"
+#include "imaging/surface_nets.h"
 #include "meshing/detail/polygon_soup.h"
 #include "meshing/import.h"
 #include "plan/plan_file.h"
@@ -232,6 +233,34 @@ void read_model(std::string_view bytes) {
                                       &model.left.isolated_vertices, &model.left.non_finite_vertices})
     LIMBER_CHECK(none->count == 0, none->places.front());
   meshing::to_json(model).dump();
+}
+
+imaging::LabelMap small_label_map() {
+  imaging::LabelMap map;
+  map.size = {3, 2, 2}, map.labels = {0, 2, 9}, map.names.assign(3, "");
+  map.material = {0, 1, 2, 2, 1, 1, 0, 0, 1, 2, 2, 0};
+  map.axes_m *= 0.001;
+  return map;
+}
+
+std::vector<std::string> label_map_seeds() {
+  const auto nifti = [](const char* name) {
+    return written(name, [](const fs::path& p) { imaging::write_nifti(p, small_label_map()); });
+  };
+  const std::string nrrd =
+      "NRRD0004\ntype: uchar\ndimension: 3\nsizes: 3 2 2\nspace: RAS\nspace directions: (1,0,0) (0,1,0) "
+      "(0,0.1,1)\nspace origin: (1,2,3)\nencoding: raw\nSegment0_Name:=liver\nSegment0_LabelValue:=2\n\n";
+  return {nifti("a.nii"), nifti("a.nii.gz"), nrrd + std::string("\0\2\2\0\2\3\3\0\0\2\2\2", 12)};
+}
+
+void read_label_map(std::string_view bytes) {
+  const imaging::LabelMap map = imaging::read_label_map(file_of(bytes, "a.nii"));
+  LIMBER_CHECK(std::int64_t(map.material.size()) == map.voxels(), map.material.size());
+  if (map.voxels() > 5000) return;
+  std::vector<int> rows;
+  for (int row = 1; row < int(std::min<std::size_t>(map.labels.size(), 5)); ++row) rows.push_back(row);
+  for (const imaging::LabelSurface& one : imaging::surfaces_of(map, rows, {.least_island = 0}))
+    validate(one.surface, "what surfaces_of gives");
 }
 
 const char* scene_seed() {
@@ -471,6 +500,7 @@ std::vector<Target> made_targets() {
       {"stl_text", [](auto bytes) { meshing::detail::read_stl_text(bytes, "a.stl"); }, stl_seeds},
       {"stl_binary", [](auto bytes) { meshing::detail::read_stl_binary(bytes, "a.stl"); }, {binary_stl()}},
       {"model", read_model, model_seeds()},
+      {"label_map", read_label_map, label_map_seeds()},
       {"surface",
        [](auto bytes) { limber::read_ply(file_of(bytes, "surface.ply")); },
        {written("surface.ply", [](const fs::path& p) { write_ply(p, surface()); })}},
