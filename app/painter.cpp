@@ -4,24 +4,34 @@
 
 #include "app/look.h"
 #include "app/node_values.h"
+#include "app/seen.h"
 #include "app/shot.h"
 #include "fem/observe.h"
 #include "render/annotate.h"
 #include "render/arrow.h"
+#include "render/card.h"
 #include "render/caster.h"
 #include "render/color_map.h"
+#include "render/film.h"
 #include "render/occlusion.h"
+#include "render/outline.h"
 
 namespace limber::app {
 
 namespace {
 
+const Vec3 pane_color(0.62, 0.74, 0.86);
+constexpr double pane_opacity = 0.28, rim_opacity = 0.75;
 const Vec3 push_color(0.93, 0.52, 0.10), contact_color(0.16, 0.42, 0.62);
 const render::LineLook cage_lines{.color_srgb = {0.12, 0.14, 0.18}, .width_px = 1.2, .opacity = 0.55};
 const render::LineLook way_lines{.color_srgb = {0.85, 0.35, 0.05}, .width_px = 3, .opacity = 0.9};
 const render::LineLook tree_lines{.color_srgb = {0.25, 0.28, 0.36}, .width_px = 1, .opacity = 0.45};
 // Above the first, a coarse stand-in of the second casts the shadow of a surface.
 constexpr int most_triangles_that_cast = 60'000, triangles_of_caster = 20'000;
+
+constexpr double outline_step = 0.004, outline_width = 1.6 / 1080;  // of the stage's diagonal, of the height
+const Vec3 outline_color(0.10, 0.11, 0.14);
+constexpr double inset_rim = 3.0 / 1080;  // of the height
 
 constexpr int fine_cells = 300;  // of the maps that find crevices, along a body
 
@@ -113,6 +123,7 @@ struct Shot::Painter::View {
     if (film.bounds_lines) renderer.add_lines(render::edges_of(shot.scene_.bounds_m), {});
     if (shot.way_m_.rows() > 0) renderer.add_lines(shot.way_m_, way_lines);
     if (shot.tree_m_.rows() > 0) renderer.add_lines(shot.tree_m_, tree_lines);
+    for (const PaneOf& pane : shot.panes_) add_pane(pane);
     if (film.forces)
       for (std::size_t i = 0; i <= shot.bodies_.size() + shot.world_.forces.size(); ++i) {
         const bool is_push = i == 0 || i > shot.bodies_.size();
@@ -121,6 +132,36 @@ struct Shot::Painter::View {
             render::arrow_triangles(), render::arrow(nowhere, nowhere + Vec3::UnitX(), shot.arrow_radius_m_),
             {.name = "arrow", .color_srgb = is_push ? push_color : contact_color, .roughness = 0.6}));
       }
+  }
+
+  void add_pane(const PaneOf& of) {
+    const Pane nowhere = pane_behind(Box{shot.look_.stage.center(), shot.look_.stage.center()},
+                                     shot.scene_.bounds_m, of.wall, 1, 0.1);
+    const auto add = [&](const Triangles& triangles, const Points& positions) {
+      const int mesh = renderer.add_mesh(triangles, positions,
+                                         {.name = "pane",
+                                          .color_srgb = pane_color,
+                                          .roughness = 0.3,
+                                          .opacity = 0.5,
+                                          .casts_shadow = false});
+      renderer.set_opacity(mesh, 0);
+      return mesh;
+    };
+    panes.push_back({add(pane_triangles(), nowhere.glass), add(rim_triangles(), nowhere.rim)});
+  }
+
+  void show_pane(std::size_t p, double share) {
+    renderer.set_opacity(panes[p].glass, pane_opacity * share);
+    renderer.set_opacity(panes[p].rim, rim_opacity * share);
+    if (share == 0) return;
+    const PaneOf& of = shot.panes_[p];
+    const double size = size_of(shot.bodies_[std::size_t(of.body)].surface);
+    // A little farther than the wall, beyond which surfaces may be by a hair.
+    Box bounds = shot.scene_.bounds_m;
+    bounds.lower.array() -= 0.004 * size, bounds.upper.array() += 0.004 * size;
+    const Pane pane = pane_behind(boxes[std::size_t(of.body)], bounds, of.wall, 0.08 * size, 0.012 * size);
+    renderer.set_positions(panes[p].glass, pane.glass);
+    renderer.set_positions(panes[p].rim, pane.rim);
   }
 
   bool has_caster(std::size_t b) const {
@@ -137,6 +178,7 @@ struct Shot::Painter::View {
                            : renderer.add_mesh(prepared.surface.triangles, prepared.surface.positions, look));
     rest_normals.push_back(vertex_normals(prepared.surface.positions, prepared.surface.triangles));
     hulls.push_back(prepared.cage.positions);
+    boxes.push_back(bounding_box(prepared.surface.positions));
     crevices.push_back(open_in_crevices(b));
     if (!cages && !shot.scene_.film.cages) return;
     cage_edges.push_back(edges_of(hull));
@@ -236,12 +278,14 @@ struct Shot::Painter::View {
     const Points& hull = hulls[b];
     if (!cage_lines_of.empty()) renderer.set_lines(cage_lines_of[b], ends_of(cage_edges[b], hull));
     if (cages) {
+      boxes[b] = bounding_box(hull);
       renderer.set_positions(meshes[b], hull);
       return;
     }
     surface.resize(prepared.surface.positions.rows(), 3);
     normals.resize(surface.rows(), 3);
     deform(prepared, hull, surface);
+    boxes[b] = bounding_box(surface);
     ffd::deform_normals(prepared.binding, prepared.cage, hull, rest_normals[b], normals);
     renderer.set_positions(meshes[b], surface, normals);
     if (casters[b].mesh >= 0) renderer.set_positions(casters[b].mesh, casters[b].stand_in.positions(surface));
@@ -249,7 +293,7 @@ struct Shot::Painter::View {
 
   void show(int frame) {
     const scenes::ColorBy by = shot.scene_.film.color_by;
-    const State& state = shot.plan_.trajectory.frames[std::size_t(frame)];
+    const State state = shot.state_at(frame);
     std::vector<double> values;
     if (by != scenes::ColorBy::body) values = node_values(shot.world_, state, by);
     for (std::size_t b = 0; b < meshes.size(); ++b) {
@@ -265,6 +309,7 @@ struct Shot::Painter::View {
       move_body(b);
     }
     occlude();
+    for (std::size_t p = 0; p < panes.size(); ++p) show_pane(p, shot.shown(shot.panes_[p].shown, frame));
     if (arrows.empty()) return;
     const Points ends = shot.arrows_at(frame);
     for (std::size_t i = 0; i < arrows.size(); ++i) {
@@ -282,6 +327,11 @@ struct Shot::Painter::View {
   bool cages;
   render::Renderer renderer;
   std::vector<int> meshes, cage_lines_of, arrows;
+  struct PaneMeshes {
+    int glass, rim;
+  };
+  std::vector<PaneMeshes> panes;
+  std::vector<Box> boxes;                   // a body, as it is now
   std::vector<Caster> casters;              // a body
   std::vector<Points> hulls, rest_normals;  // a body; the cage's nodes as they are now
   std::vector<Eigen::ArrayXd> crevices;     // a body; empty: none
@@ -292,6 +342,7 @@ struct Shot::Painter::View {
 Shot::Painter::Painter(const Shot& shot) : shot_(shot) {
   views_.push_back(std::make_unique<View>(shot, false));
   if (shot.scene_.film.side_by_side) views_.push_back(std::make_unique<View>(shot, true));
+  if (shot.inset_) inset_ = std::make_unique<Painter>(*shot.inset_);
 }
 Shot::Painter::~Painter() = default;
 
@@ -317,27 +368,68 @@ render::Image8 Shot::Painter::annotated(render::Image8 image, int frame) const {
   return image;
 }
 
+// In 8 bit and with a background.
+render::Image8 Shot::Painter::without_words(int frame, render::Passes* wanted) {
+  const int moment = shot_.index_in_motion(frame);
+  if (moment == still_ && !wanted) return still_picture_;
+  const render::Camera camera = shot_.camera_of(frame);
+  const bool outlines = shot_.scene_.film.outlines;
+  const auto drawn = [&](View& view) {
+    render::Passes own;
+    view.show(frame);
+    render::Passes* passes = wanted && &view == views_[0].get() ? wanted : outlines ? &own : nullptr;
+    render::Image8 image = view.renderer.draw_shown(camera, passes);
+    if (outlines)
+      render::draw_outlines(image, *passes, outline_step * shot_.look_.stage.diagonal(),
+                            std::max(1.0, outline_width * image.height), outline_color);
+    return image;
+  };
+  render::Image8 image = drawn(*views_[0]);
+  if (views_.size() > 1) image = beside(image, drawn(*views_[1]));
+  if (inset_) {
+    const Eigen::Vector4d place = shot_.place_of_inset(shot_.inset_corner_);
+    render::paste(image, inset_->without_words(frame), int(place[0]), int(place[1]),
+                  std::max(1, int(std::lround(inset_rim * image.height))),
+                  shot_.words_.on_dark ? Vec3(0.85, 0.85, 0.85) : Vec3(1, 1, 1));
+  }
+  return image;
+}
+
+render::Image8 Shot::Painter::with_card(render::Image8 picture, const render::Image8& without_words,
+                                        int frame) {
+  const scenes::CardSpec& spec = *shot_.card_of(frame);
+  const bool is_title = frame < shot_.before_;
+  if (card_.rgb.empty() || card_is_title_ != is_title)
+    card_ = spec.plain ? render::plain_card(picture.width, picture.height, spec.lines,
+                                            shot_.look_.background_bottom_srgb)
+                       : render::card(without_words, spec.lines);
+  card_is_title_ = is_title;
+  return render::mixed(picture, card_, shot_.card_share(frame));
+}
+
 Picture Shot::Painter::paint(int frame) {
   const render::Camera camera = shot_.camera_of(frame);
   const Output& output = shot_.output_;
-  views_[0]->show(frame);
   const bool transparent = shot_.scene_.film.transparent;
-  render::Renderer& renderer = views_[0]->renderer;
   render::Passes passes;
   render::Passes* const wanted = output.passes.empty() ? nullptr : &passes;
-  const auto linear = [&] { return renderer.draw(camera, wanted); };
+  const auto linear = [&] {
+    views_[0]->show(frame);
+    return views_[0]->renderer.draw(camera, wanted);
+  };
   Picture picture;
   if (output.bits == 16)
     picture.frame = transparent ? render::tone_mapped_alpha_16(linear()) : render::tone_mapped_16(linear());
   else if (transparent)
     picture.frame = render::tone_mapped_alpha(linear());
   else {
-    render::Image8 image = renderer.draw_shown(camera, wanted);
-    if (views_.size() > 1) {
-      views_[1]->show(frame);
-      image = beside(image, views_[1]->renderer.draw_shown(camera));
-    }
-    picture.frame = annotated(std::move(image), frame);
+    const render::Image8 image = without_words(frame, wanted);
+    const bool card = shot_.card_of(frame) != nullptr;
+    render::Image8 shown = annotated(image, frame);
+    if (card) shown = with_card(std::move(shown), image, frame);
+    still_ = card ? shot_.index_in_motion(frame) : -1;
+    still_picture_ = card ? image : render::Image8{};
+    picture.frame = std::move(shown);
   }
   for (const std::string& name : output.passes) {
     const bool depth = name == "depth";
@@ -348,6 +440,76 @@ Picture Shot::Painter::paint(int frame) {
       picture.passes[name] = encoded<std::uint16_t>(passes, name, low, high);
   }
   return picture;
+}
+
+Shot::Sight Shot::sight_of_contact() const {
+  constexpr int most_frames = 24, width = 320, most_vertices = 400;
+  constexpr double least_robot = 0.25;  // of what faces the camera
+  constexpr double robot_slack = 0.02,
+                   place_slack = 0.1;  // of its size: places of contact lie between bodies
+  constexpr double least_force = 0.1;  // of the strongest of the frame
+  scenes::Scene plain = scene_;
+  plain.film.inset.reset(), plain.film.title.reset(), plain.film.end_card.reset();
+  plain.film.caption.clear(), plain.film.color_by = scenes::ColorBy::body;
+  for (bool scenes::FilmSpec::*extra :
+       {&scenes::FilmSpec::clock, &scenes::FilmSpec::scale_bar, &scenes::FilmSpec::cages,
+        &scenes::FilmSpec::forces, &scenes::FilmSpec::path, &scenes::FilmSpec::tree,
+        &scenes::FilmSpec::side_by_side, &scenes::FilmSpec::outlines})
+    plain.film.*extra = false;
+  plain.film.panes = false;
+  const int height = std::max(16, width * look_.height / (look_.width * (scene_.film.side_by_side ? 2 : 1)));
+  Output output;
+  output.occlusion = false;
+  Shot small(plain, camera_->name, plan_, world_, bodies_, scenery_, {width, height}, output);
+  if (small.touches_.empty()) small.find_touches();
+  const std::vector<double> forces = small.contact_forces_n();
+  const double strongest = *std::max_element(forces.begin(), forces.end());
+  std::vector<int> pressed;
+  for (int f = 0; f < small.frames(); ++f)
+    if (forces[std::size_t(small.moment_of(f))] > pressing_share * strongest) pressed.push_back(f);
+  if (strongest == 0 || pressed.empty()) return {};
+
+  Painter painter(small);
+  const PreparedBody& robot = bodies_[std::size_t(world_.robot)];
+  const double size = robot_size();
+  Sight sight;
+  for (const int i : render::spread_over(int(pressed.size()), most_frames)) {
+    const int f = pressed[std::size_t(i)];
+    const render::Camera camera = small.camera_of(f);
+    render::Passes passes;
+    painter.without_words(f, &passes);
+    const auto in_sight = [&](const Vec3& place, double slack) {
+      const Vec3 pixel = render::pixel_from_world(camera, place, width, height);
+      if (!(pixel.z() > 0) || pixel.x() < 0 || pixel.x() >= width || pixel.y() < 0 || pixel.y() >= height)
+        return false;
+      return double(passes.depth_m[std::size_t(pixel.y()) * width + std::size_t(pixel.x())]) >=
+             pixel.z() - slack * size;
+    };
+    const Points nodes = fem::body_positions(world_, small.state_at(f), world_.robot);
+    Points surface(robot.surface.positions.rows(), 3);
+    deform(robot, nodes, surface);
+    const Points normals = vertex_normals(surface, robot.surface.triangles);
+    int facing = 0, seen = 0;
+    for (const int v : render::spread_over(int(surface.rows()), most_vertices)) {
+      const Vec3 place = surface.row(v);
+      if (normals.row(v).dot(camera.eye - place) <= 0) continue;
+      ++facing, seen += in_sight(place, robot_slack);
+    }
+    const std::vector<fem::ContactForce>& touches = small.touches_[std::size_t(small.moment_of(f))];
+    double most_n = 0;
+    const auto of_robot = [&](const fem::ContactForce& touch) {
+      return (touch.body == world_.robot) != (touch.other == world_.robot);
+    };
+    for (const fem::ContactForce& touch : touches)
+      if (of_robot(touch)) most_n = std::max(most_n, touch.force_n.norm());
+    const bool place = std::any_of(touches.begin(), touches.end(), [&](const fem::ContactForce& touch) {
+      return of_robot(touch) && touch.force_n.norm() >= least_force * most_n &&
+             in_sight(touch.place_m, place_slack);
+    });
+    const bool shown = facing > 0 && seen >= least_robot * facing;
+    ++sight.frames, sight.robot += shown, sight.place += place, sight.both += shown && place;
+  }
+  return sight;
 }
 
 }  // namespace limber::app

@@ -117,6 +117,17 @@ scenes::Scene filmed_as(const scenes::Scene& planned, const std::vector<std::str
   return scenes::read_scene(planned.text, planned.name, all, planned.script);
 }
 
+std::string told(const Json& time) {
+  const double slowest = time["speed"][0], quickest = time["speed"][1], left_out_s = time["left_out_s"];
+  std::string text = fmt::format("{:.1f} s of film show {:.2f} s of the motion, at {}× its speed",
+                                 time["seconds"].get<double>(), time["motion_s"].get<double>(),
+                                 slowest == quickest ? fmt::format("{:.3g}", slowest)
+                                                     : fmt::format("{:.2g} to {:.2g}", slowest, quickest));
+  if (left_out_s > 0)
+    text += fmt::format("; the last {:.2f} s, in which nothing is seen to move, are left out", left_out_s);
+  return text + "\n";
+}
+
 std::string suffix_of(const RenderOptions& options) {
   const std::string name = !options.name.empty()      ? options.name
                            : options.camera == "main" ? ""
@@ -185,13 +196,15 @@ Outcome render(const RenderOptions& options) {
               {"failed", failures.size()},
               {"size", {size.first, size.second}},
               {"camera", options.camera},
+              {"time", shot.time_told()},
               {"trajectory_hash", hex(plan::hash_of(planned.plan.trajectory))},
               {"cpu_s", cpu_s},
               {"folder", folder.string()}};
   std::string text =
       fmt::format("{} of {} frames in {}: {} painted, {} kept, {} failed; {:.2f} CPU s\n", wanted.size(),
                   frame_count, folder.string(), missing.size() - failures.size(),
-                  wanted.size() - missing.size(), failures.size(), cpu_s);
+                  wanted.size() - missing.size(), failures.size(), cpu_s) +
+      told(result["time"]);
 
   std::vector<fs::path> paths;
   for (int f = 0; f < frame_count; ++f) paths.push_back(files.of(f));
@@ -201,15 +214,27 @@ Outcome render(const RenderOptions& options) {
     const fs::path sheet = options.folder / ("sheet" + suffix + ".png");
     std::vector<fs::path> shown;
     std::vector<std::string> captions;
-    for (const int f : render::spread_over(frame_count, film.sheet_columns * film.sheet_rows)) {
+    for (const int of_motion :
+         render::spread_over(shot.frames_of_motion(), film.sheet_columns * film.sheet_rows)) {
+      const int f = shot.frames_before() + of_motion;
       shown.push_back(files.of(f));
-      captions.push_back(fmt::format("{:.2f} s", double(f) / planned.plan.trajectory.frames_per_second));
+      captions.push_back(fmt::format("{:.2f} s", shot.time_s(f)));
     }
     render::write_png(sheet, render::contact_sheet(shown, captions, {.columns = film.sheet_columns}));
     render::make_film(paths, film.frames_per_second, video);
     events::tell({{"event", "film"}, {"file", video.string()}});
     // Frames of an earlier, longer motion would only confuse.
     for (int f = frame_count; fs::remove(files.of(f)); ++f) {
+    }
+    const Shot::Sight sight = shot.sight_of_contact();
+    if (sight.frames > 0) {
+      const auto share = [&](int frames_seen) { return double(frames_seen) / sight.frames; };
+      result["contact_in_sight"] = {{"frames", sight.frames},
+                                    {"robot", share(sight.robot)},
+                                    {"place", share(sight.place)},
+                                    {"both", share(sight.both)}};
+      text += fmt::format("where the robot is pressed, {:.0f} % of {} frames show it and the place\n",
+                          100 * share(sight.both), sight.frames);
     }
     result["film"] = video.string(), result["sheet"] = sheet.string();
     text += fmt::format("film {}, contact sheet {}\n", video.string(), sheet.string());

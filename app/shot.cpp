@@ -9,8 +9,10 @@
 
 #include "app/look.h"
 #include "app/node_values.h"
+#include "app/seen.h"
 #include "core/error.h"
 #include "core/hash.h"
+#include "core/threads.h"
 #include "core/version.h"
 #include "fem/control_forces.h"
 #include "fem/observe.h"
@@ -24,6 +26,12 @@ constexpr int generation =
     4;  // of pictures: raised when the same film comes out otherwise, so that it is painted anew
 constexpr double longest_arrow = 2;  // times that of the strongest push, which is as long as the robot
 constexpr int most_edges_of_tree = 4000;
+constexpr double at_rest = 0.003;     // of the robot's size: what moves no farther is not seen to move
+constexpr double after_rest_s = 0.5;  // of the film
+constexpr double ease_s = 0.5;        // of the film at its usual speed: so long before contact it slows down
+constexpr double pane_fade_s = 0.25;  // of the film at its usual speed
+constexpr double card_fade_s = 0.5;
+constexpr double full_contact = 0.05;  // of the strongest: from there on the robot is in contact
 
 // From over the photographer's left shoulder, so that what faces the camera is lit, and shadows fall to the
 // right and away.
@@ -110,9 +118,15 @@ std::string length_words(double length_m) {
 }
 
 void require_letters(const scenes::FilmSpec& film) {
-  if (const std::string missing = render::letters_missing(film.caption); !missing.empty())
-    throw InputError(fmt::format(
-        "film.caption: limber's font has no letters for {} (it has Latin, Greek and Cyrillic)", missing));
+  const auto require = [](const char* key, const std::string& text) {
+    if (const std::string missing = render::letters_missing(text); !missing.empty())
+      throw InputError(fmt::format(
+          "{}: limber's font has no letters for {} (it has Latin, Greek and Cyrillic)", key, missing));
+  };
+  require("film.caption", film.caption);
+  for (const auto& [key, card] :
+       {std::pair("film.title", &film.title), std::pair("film.end_card", &film.end_card)})
+    if (*card) require(key, fmt::format("{}", fmt::join((*card)->lines, " ")));
 }
 
 Shot::Shot(const scenes::Scene& scene, const std::string& camera, const plan::Plan& plan,
@@ -136,6 +150,10 @@ Shot::Shot(const scenes::Scene& scene, const std::string& camera, const plan::Pl
     ground_m = std::min(ground_m, bounding_box(mesh.positions).lower.z());
   look_.ground_height_m = ground_m;
   look_.transparent_background = scene.film.transparent;
+  find_controls();
+  const bool panes = scene.film.panes && world.walls;
+  if (scene.film.pace == scenes::Pace::contact || panes) find_touches();
+  lay_out_time();
   look_.stage = box_of_motion();
   for (const SurfaceMesh& mesh : scenery) look_.stage.include(bounding_box(mesh.positions));
   lay_out_camera(double(look_.width) / look_.height);
@@ -143,6 +161,7 @@ Shot::Shot(const scenes::Scene& scene, const std::string& camera, const plan::Pl
   if (!output.passes.empty()) measure_depths();
   if (scene.film.color_by != scenes::ColorBy::body) measure_colors();
   if (scene.film.forces) measure_forces();
+  if (panes) find_panes();
   if (scene.film.path) {
     const std::vector<State>& frames_shown = plan.trajectory.frames;
     way_m_.resize(2 * std::max<Eigen::Index>(0, Eigen::Index(frames_shown.size()) - 1), 3);
@@ -151,6 +170,7 @@ Shot::Shot(const scenes::Scene& scene, const std::string& camera, const plan::Pl
           fem::center_of_mass_m(world, frames_shown[std::size_t((row + 1) / 2)], world.robot).transpose();
   }
   if (scene.film.tree) find_tree();
+  if (scene.film.inset && scene.film.inset->camera != camera) place_inset();
   place_words();
   look_hash_ = hash_of_look();
 }
@@ -163,16 +183,154 @@ void Shot::check() const {
   if (!output_.passes.empty() && film.side_by_side)
     throw InputError("--passes are of one picture; add --set film.side_by_side=false");
   require_letters(film);
-  const bool words = !film.caption.empty() || film.clock || film.scale_bar;
-  if ((film.transparent || output_.bits == 16) && (words || film.side_by_side))
-    throw InputError(
-        fmt::format("{}: caption, clock, scale_bar and side_by_side need 8-bit pictures with a background; "
-                    "add --set film.caption= --set film.clock=false --set film.scale_bar=false --set "
-                    "film.side_by_side=false",
-                    film.transparent ? "film.transparent" : "--bits 16"));
+  std::vector<std::string> in_the_way;  // as sets that take them away, where a table cannot be
+  if (!film.caption.empty()) in_the_way.emplace_back("--set film.caption=");
+  for (const auto& [is_on, key] :
+       {std::pair(film.clock, "clock"), std::pair(film.scale_bar, "scale_bar"),
+        std::pair(film.side_by_side, "side_by_side"), std::pair(film.outlines, "outlines")})
+    if (is_on) in_the_way.push_back(fmt::format("--set film.{}=false", key));
+  for (const auto& [is_on, key] :
+       {std::pair(film.inset.has_value(), "inset"), std::pair(film.title.has_value(), "title"),
+        std::pair(film.end_card.has_value(), "end_card")})
+    if (is_on) in_the_way.push_back(fmt::format("a scene without film.{}", key));
+  if ((film.transparent || output_.bits == 16) && !in_the_way.empty())
+    throw InputError(fmt::format(
+        "{}: words, insets, outlines and side_by_side need 8-bit pictures with a background; it takes: {}",
+        film.transparent ? "film.transparent" : "--bits 16", fmt::join(in_the_way, " ")));
 }
 
-int Shot::frames() const { return int(plan_.trajectory.frames.size()); }
+int Shot::frames() const { return int(moments_.size()); }
+
+double Shot::time_s(int frame) const { return moment_of(frame) / plan_.trajectory.frames_per_second; }
+
+Json Shot::time_told() const {
+  const scenes::FilmSpec& film = scene_.film;
+  double least = std::numeric_limits<double>::infinity(), most = 0;
+  for (const Moment& moment : moments_)
+    least = std::min(least, moment.pace * film.speed), most = std::max(most, moment.pace * film.speed);
+  return {{"frames", frames()},
+          {"seconds", double(frames()) / film.frames_per_second},
+          {"motion_s", time_s(frames() - 1)},
+          {"left_out_s", double(stored() - 1) / plan_.trajectory.frames_per_second - time_s(frames() - 1)},
+          {"speed", {least, most}}};
+}
+
+void Shot::find_controls() {
+  int stored_frame = 0;
+  std::int64_t step = 0;
+  for (const Control& control : plan_.trajectory.controls) {
+    pushes_.push_back({stored_frame, control});
+    step += control.steps;
+    while (stored_frame < stored() && plan_.trajectory.frames[std::size_t(stored_frame)].step < step)
+      ++stored_frame;
+  }
+}
+
+Control Shot::control_at(int stored_frame) const {
+  const auto push = std::find_if(pushes_.rbegin(), pushes_.rend(),
+                                 [&](const Push& p) { return p.first_stored <= stored_frame; });
+  return push != pushes_.rend() ? push->control : Control{};
+}
+
+void Shot::find_touches() {
+  touches_.resize(std::size_t(stored()));
+  parallel_for(stored(), [&](int f) {
+    touches_[std::size_t(f)] =
+        fem::contact_forces(world_, plan_.trajectory.frames[std::size_t(f)], control_at(f));
+  });
+}
+
+std::vector<double> Shot::contact_forces_n() const {
+  std::vector<double> forces(std::size_t(stored()), 0);
+  for (std::size_t f = 0; f < forces.size(); ++f)
+    for (const fem::ContactForce& touch : touches_[f])
+      if ((touch.body == world_.robot) != (touch.other == world_.robot)) forces[f] += touch.force_n.norm();
+  return forces;
+}
+
+// How much each stored frame is one of contact: 1 from a share of the strongest on.
+std::vector<double> Shot::contact_shares() const {
+  std::vector<double> forces = contact_forces_n();
+  const double strongest = *std::max_element(forces.begin(), forces.end());
+  for (double& force : forces) force = strongest > 0 ? std::min(1.0, force / (full_contact * strongest)) : 0;
+  return forces;
+}
+
+double Shot::shown(const std::vector<double>& of_stored, int frame) const {
+  const double moment = moment_of(frame);
+  const std::size_t before = std::size_t(moment), after = std::min(before + 1, of_stored.size() - 1);
+  return of_stored[before] + (moment - double(before)) * (of_stored[after] - of_stored[before]);
+}
+
+// Of what is not held anywhere: what is held at a wall touches it always. The floor is drawn.
+void Shot::find_panes() {
+  std::map<std::pair<int, Wall>, std::vector<double>> forces;
+  double strongest = 0;
+  for (std::size_t f = 0; f < touches_.size(); ++f)
+    for (const fem::ContactForce& touch : touches_[f]) {
+      if (touch.other >= 0) continue;
+      const std::vector<bool>& fixed = world_.bodies[std::size_t(touch.body)].fixed;
+      if (std::find(fixed.begin(), fixed.end(), true) != fixed.end()) continue;
+      const Wall wall = wall_at(world_.bounds_m, touch.place_m);
+      if (wall == Wall{2, false} && look_.ground_height_m == world_.bounds_m.lower.z()) continue;
+      std::vector<double>& force = forces[{touch.body, wall}];
+      force.resize(touches_.size());
+      force[f] += touch.force_n.norm();
+      strongest = std::max(strongest, force[f]);
+    }
+  for (const auto& [side, force] : forces) {
+    std::vector<bool> touching;
+    for (const double newtons : force) touching.push_back(newtons > pressing_share * strongest);
+    panes_.push_back(
+        {side.first, side.second, faded(touching, int(pane_fade_s * scene_.film.frames_per_second))});
+  }
+}
+
+void Shot::lay_out_time() {
+  const scenes::FilmSpec& film = scene_.film;
+  const std::vector<State>& all = plan_.trajectory.frames;
+  int last = stored() - 1;
+  if (film.end == scenes::FilmEnd::rest) {
+    last = std::min(last,
+                    first_at_rest(all, at_rest * robot_size()) + int(after_rest_s * film.frames_per_second));
+  }
+  std::vector<double> contact(std::size_t(last) + 1, 0);
+  PaceRange range{1, 1};
+  std::optional<double> length;
+  if (film.pace == scenes::Pace::contact) {
+    const std::vector<double> shares = contact_shares();
+    contact.assign(shares.begin(), shares.begin() + last + 1);
+    contact = eased(contact, int(ease_s * film.frames_per_second));
+    const bool touched = *std::max_element(contact.begin(), contact.end()) > 0;
+    if (touched) range = {film.slowest, film.quickest};  // else there is nothing to dwell on
+    if (touched && film.length_s) length = *film.length_s * film.frames_per_second;
+  }
+  const std::vector<Moment> motion =
+      paced(contact, range, length, fmt::format("film.length_s = {:g}", film.length_s.value_or(0)));
+  of_motion_ = int(motion.size());
+  const auto frames_of = [&](const std::optional<scenes::CardSpec>& card) {
+    return card ? std::max(1, int(std::lround(card->duration_s * film.frames_per_second))) : 0;
+  };
+  before_ = frames_of(film.title);
+  moments_.assign(std::size_t(before_), motion.front());
+  moments_.insert(moments_.end(), motion.begin(), motion.end());
+  moments_.insert(moments_.end(), std::size_t(frames_of(film.end_card)), motion.back());
+}
+
+const scenes::CardSpec* Shot::card_of(int frame) const {
+  return frame < before_                ? &*scene_.film.title
+         : frame < before_ + of_motion_ ? nullptr
+                                        : &*scene_.film.end_card;
+}
+
+double Shot::card_share(int frame) const {
+  const scenes::CardSpec* card = card_of(frame);
+  if (!card) return 0;
+  const int away = frame < before_ ? before_ - frame : frame - before_ - of_motion_ + 1;
+  const double share = std::min(
+      1.0, double(away) / (std::min(card_fade_s, 0.5 * card->duration_s) * scene_.film.frames_per_second));
+  return share * share * (3 - 2 * share);
+}
 
 Box Shot::box_of_motion() const {
   Box box;
@@ -219,8 +377,7 @@ void Shot::lay_out_camera(double aspect) {
   if (camera_->follow >= 0) {
     followed_m_.resize(frames(), 3);
     for (int f = 0; f < frames(); ++f)
-      followed_m_.row(f) =
-          fem::center_of_mass_m(world_, plan_.trajectory.frames[std::size_t(f)], camera_->follow).transpose();
+      followed_m_.row(f) = fem::center_of_mass_m(world_, state_at(f), camera_->follow).transpose();
     constexpr double room = 0.75;  // about the body, in its own diagonals
     const Vec3 reach = Vec3::Constant(
         room * bounding_box(bodies_[std::size_t(camera_->follow)].surface.positions).diagonal());
@@ -236,7 +393,7 @@ void Shot::lay_out_camera(double aspect) {
 }
 
 render::Camera Shot::camera_of(int frame) const {
-  const double share = frames() < 2 ? 0 : double(frame) / double(frames() - 1);
+  const double share = of_motion_ < 2 ? 0 : double(index_in_motion(frame)) / double(of_motion_ - 1);
   render::Camera camera = render::turned(render::camera_at(path_, share), share * camera_->turn_deg);
   if (followed_m_.rows() > 0) {
     const Vec3 way = (followed_m_.row(frame) - followed_m_.row(0)).transpose();
@@ -248,10 +405,15 @@ render::Camera Shot::camera_of(int frame) const {
 std::string Shot::clock_at(int frame) const {
   const scenes::FilmSpec& film = scene_.film;
   if (!film.clock) return {};
-  const int decimals = film.speed < 0.5 ? 2 : 1;
-  std::string words = fmt::format("{:.{}f} s", double(frame) / plan_.trajectory.frames_per_second, decimals);
-  if (film.speed < 1) words += fmt::format(" · {:.3g}× slow motion", 1 / film.speed);
-  if (film.speed > 1) words += fmt::format(" · {:.3g}× time lapse", film.speed);
+  const double speed = film.speed * moments_[std::size_t(frame)].pace;
+  std::string words = fmt::format("{:.{}f} s", time_s(frame), film.speed < 0.5 ? 2 : 1);
+  // Where the speed changes, its figure goes in steps: one that is read while it runs says nothing.
+  const bool steady = film.pace == scenes::Pace::steady;
+  const auto told = [&](double times) {
+    return steady ? times : times < 2 ? 0.5 * std::round(2 * times) : std::round(times);
+  };
+  if (speed < 1 && told(1 / speed) > 1) words += fmt::format(" · {:.3g}× slow motion", told(1 / speed));
+  if (speed > 1 && told(speed) > 1) words += fmt::format(" · {:.3g}× fast", told(speed));
   return words;
 }
 
@@ -260,32 +422,21 @@ double Shot::pixels_a_metre(const render::Camera& camera) const {
          (camera.target - camera.eye).norm();
 }
 
-// The corner where they hide least of the bodies over the film; of equals the first.
-void Shot::place_words() {
+std::array<int, 4> Shot::hidden_by(const std::array<Eigen::Vector4d, 4>& boxes) const {
   constexpr int most_frames = 24, across = 16, down = 4;
-  const scenes::FilmSpec& film = scene_.film;
-  words_.on_dark = look_.ground_srgb.mean() < 0.4;
-  if (film.scale_bar) scale_m_ = round_length_m(0.2 * look_.width / pixels_a_metre(camera_of(0)));
-  const std::string clock = clock_at(frames() - 1);
-  if (film.caption.empty() && clock.empty()) return;
-  // Places within the words of each corner, where two views are side by side those in their own one.
-  const int width = look_.width * (film.side_by_side ? 2 : 1);
-  std::array<std::vector<Eigen::Vector2d>, render::corners.size()> places_of;
-  for (std::size_t c = 0; c < places_of.size(); ++c) {
-    const Eigen::Vector4d box =
-        render::place_of_caption(width, look_.height, film.caption, clock, render::corners[c]);
+  std::array<std::vector<Eigen::Vector2d>, 4> places_of;
+  for (std::size_t c = 0; c < boxes.size(); ++c)
     for (int x = 0; x < across; ++x)
-      for (int y = 0; y < down; ++y)
-        places_of[c].emplace_back(std::fmod(box[0] + (box[2] - box[0]) * (x + 0.5) / across, look_.width),
-                                  box[1] + (box[3] - box[1]) * (y + 0.5) / down);
-  }
-  std::array<int, render::corners.size()> hidden{};
+      for (int y = 0; y < down; ++y)  // where two views are side by side, in their own one
+        places_of[c].emplace_back(
+            std::fmod(boxes[c][0] + (boxes[c][2] - boxes[c][0]) * (x + 0.5) / across, look_.width),
+            boxes[c][1] + (boxes[c][3] - boxes[c][1]) * (y + 0.5) / down);
+  std::array<int, 4> hidden{};
   Points outermost;
   for (std::size_t b = 0; b < bodies_.size(); ++b) {
     const ffd::Binding part = outermost_part(bodies_[b]);
     for (const int frame : render::spread_over(frames(), most_frames)) {
-      deform(bodies_[b], part,
-             fem::body_positions(world_, plan_.trajectory.frames[std::size_t(frame)], int(b)), outermost);
+      deform(bodies_[b], part, fem::body_positions(world_, state_at(frame), int(b)), outermost);
       const render::Camera camera = camera_of(frame);
       std::vector<Eigen::Vector2d> seen;
       for (Eigen::Index p = 0; p < outermost.rows(); ++p) {
@@ -298,8 +449,59 @@ void Shot::place_words() {
                                        [&](const Eigen::Vector2d& place) { return holds(hull, place); }));
     }
   }
+  return hidden;
+}
+
+// The corner where they hide least of the bodies over the film; of equals the first.
+void Shot::place_words() {
+  const scenes::FilmSpec& film = scene_.film;
+  words_.on_dark = look_.ground_srgb.mean() < 0.4;
+  if (film.scale_bar) scale_m_ = round_length_m(0.2 * look_.width / pixels_a_metre(camera_of(0)));
+  std::string clock;  // the longest
+  for (int f = 0; f < frames(); ++f)
+    clock = std::max(clock, clock_at(f), [](const auto& a, const auto& b) { return a.size() < b.size(); });
+  if (film.caption.empty() && clock.empty()) return;
+  const int width = look_.width * (film.side_by_side ? 2 : 1);
+  std::array<Eigen::Vector4d, 4> boxes;
+  for (std::size_t c = 0; c < boxes.size(); ++c)
+    boxes[c] = render::place_of_caption(width, look_.height, film.caption, clock, render::corners[c]);
+  std::array<int, 4> hidden = hidden_by(boxes);
+  for (std::size_t c = 0; c < hidden.size(); ++c)
+    if (inset_ && render::corners[c] == inset_corner_) hidden[c] = std::numeric_limits<int>::max();
   words_.corner =
       render::corners[std::size_t(std::min_element(hidden.begin(), hidden.end()) - hidden.begin())];
+}
+
+Eigen::Vector4d Shot::place_of_inset(render::Corner corner) const {
+  const double margin = look_.width / 40.0, width = inset_->look_.width, height = inset_->look_.height;
+  const bool right = corner == render::Corner::bottom_right || corner == render::Corner::top_right,
+             bottom = corner == render::Corner::bottom_left || corner == render::Corner::bottom_right;
+  const double left = std::round(right ? look_.width - margin - width : margin),
+               top = std::round(bottom ? look_.height - margin - height : margin);
+  return {left, top, left + width, top + height};
+}
+
+void Shot::place_inset() {
+  const scenes::FilmSpec& film = scene_.film;
+  inset_scene_ = std::make_unique<scenes::Scene>(scene_);
+  inset_scene_->film.inset.reset();
+  Output output;
+  output.occlusion = output_.occlusion;
+  const auto side = [&](int whole) { return std::max(16, int(std::lround(film.inset->size * whole))); };
+  inset_ = std::make_unique<Shot>(*inset_scene_, film.inset->camera, plan_, world_, bodies_, scenery_,
+                                  std::pair(side(look_.width), side(look_.height)), output);
+  std::array<Eigen::Vector4d, 4> boxes;
+  for (std::size_t c = 0; c < boxes.size(); ++c) boxes[c] = place_of_inset(render::corners[c]);
+  const std::array<int, 4> hidden = hidden_by(boxes);
+  std::size_t best = 1;
+  for (std::size_t c = 0; c < boxes.size(); ++c) {
+    const bool right = boxes[c][0] > 0.5 * look_.width - 0.5 * (boxes[c][2] - boxes[c][0]),
+               bottom = boxes[c][1] > 0.5 * look_.height - 0.5 * (boxes[c][3] - boxes[c][1]);
+    // Bars of colours and of length have their places.
+    if ((film.color_by != scenes::ColorBy::body && right) || (film.scale_bar && bottom)) continue;
+    if (hidden[c] < hidden[best]) best = c;
+  }
+  inset_corner_ = render::corners[best];
 }
 
 void Shot::measure_depths() {
@@ -342,13 +544,6 @@ void Shot::measure_colors() {
 }
 
 void Shot::measure_forces() {
-  int frame = 0;
-  std::int64_t step = 0;
-  for (const Control& control : plan_.trajectory.controls) {
-    pushes_.push_back({frame, control});
-    step += control.steps;
-    while (frame < frames() && plan_.trajectory.frames[std::size_t(frame)].step < step) ++frame;
-  }
   double strongest = 0;
   for (const Control& control : plan_.trajectory.controls)
     strongest = std::max(strongest, double(largest_force(control)));
@@ -361,14 +556,32 @@ void Shot::measure_forces() {
   arrow_radius_m_ = 0.02 * robot;
 }
 
-bool Shot::acts(const fem::Force& force, int frame) const {
+bool Shot::acts(const fem::Force& force, int stored_frame) const {
   const std::vector<State>& all = plan_.trajectory.frames;
-  const std::int64_t step = all[std::size_t(frame)].step,
-                     next = frame + 1 < frames() ? all[std::size_t(frame) + 1].step : step + 1;
+  const std::int64_t step = all[std::size_t(stored_frame)].step,
+                     next = stored_frame + 1 < stored() ? all[std::size_t(stored_frame) + 1].step : step + 1;
   return force.first_step < next && force.end_step > step;
 }
 
 Points Shot::arrows_at(int frame) const {
+  const double moment = moment_of(frame);
+  const int before = int(moment);
+  Points ends = arrows_at_stored(before);
+  const double share = moment - before;
+  if (share == 0) return ends;
+  const Points later = arrows_at_stored(before + 1);
+  for (Eigen::Index row = 0; row < ends.rows(); row += 2) {
+    const Vec3 from = ends.row(row), to = later.row(row), force = ends.row(row + 1) - ends.row(row),
+               force_later = later.row(row + 1) - later.row(row);
+    // One that begins or ends grows where it stands.
+    const Vec3 foot = force_later.isZero() ? from : force.isZero() ? to : Vec3(from + share * (to - from));
+    ends.row(row) = foot.transpose();
+    ends.row(row + 1) = (foot + force + share * (force_later - force)).transpose();
+  }
+  return ends;
+}
+
+Points Shot::arrows_at_stored(int frame) const {
   const State& state = plan_.trajectory.frames[std::size_t(frame)];
   const Vec3 robot = fem::center_of_mass_m(world_, state, world_.robot);
   const int bodies = int(world_.bodies.size());
@@ -386,9 +599,7 @@ Points Shot::arrows_at(int frame) const {
   };
   Points ends(2 * (1 + bodies + Eigen::Index(world_.forces.size())), 3);
   ends.rowwise() = robot.transpose();
-  const auto push =
-      std::find_if(pushes_.rbegin(), pushes_.rend(), [&](const Push& p) { return p.first_frame <= frame; });
-  const Control control = push != pushes_.rend() ? push->control : Control{};
+  const Control control = control_at(frame);
   if (control.manipulation != Manipulation::none) {
     const bool at_point = control.manipulation == Manipulation::control_point;
     Vec3 force_n = control.force_n.cast<double>();
@@ -446,18 +657,23 @@ std::uint64_t Shot::hash_of_look() const {
   for (const bool flag : {film.bounds_lines, film.transparent, film.clock, film.cages, film.forces, film.path,
                           film.tree, film.side_by_side, film.scale_bar})
     hasher.value(int(flag));
+  if (film.outlines) hasher.value(1);
+  if (film.pace != scenes::Pace::steady)
+    hasher.value(int(film.pace)).value(film.slowest).value(film.quickest).value(film.length_s.value_or(0));
   hasher.text(film.caption).value(int(film.color_by)).value(low_).value(high_).value(film.speed);
   hasher.value(film.frames_per_second).value(frames()).value(output_.bits);
   if (!output_.occlusion) hasher.value(0);
   hasher.value(arrow_m_per_n_).matrix(way_m_).matrix(tree_m_);
-  for (const auto& [first_frame, control] : pushes_)
-    hasher.value(first_frame)
+  for (const auto& [first_stored, control] : pushes_) {
+    if (!film.forces) break;
+    hasher.value(first_stored)
         .value(int(control.manipulation))
         .matrix(control.force_n)
         .value(control.node)
         .value(control.radius_m)
         .matrix(control.target_m)
         .value(control.max_force_n);
+  }
   for (const fem::Force& force : world_.forces) {
     if (!film.forces) break;
     hasher.value(force.body).value(force.first_step).value(force.end_step).matrix(force.force_n);
@@ -487,10 +703,20 @@ std::string Shot::hash_of(int frame) const {
   Hasher hasher;
   hasher.value(look_hash_)
       .value(frame)
-      .value(limber::hash_of(plan_.trajectory.frames[std::size_t(frame)]))
+      .value(limber::hash_of(state_at(frame)))
       .matrix(camera.eye)
       .matrix(camera.target)
       .matrix(camera.up);
+  if (const scenes::CardSpec* card = card_of(frame))
+    hasher.value(card_share(frame))
+        .text(fmt::format("{}", fmt::join(card->lines, "\n")))
+        .value(int(card->plain));
+  if (inset_) hasher.text(inset_->hash_of(frame)).value(int(inset_corner_)).value(scene_.film.inset->size);
+  for (const PaneOf& pane : panes_)
+    if (const double share = shown(pane.shown, frame); share > 0)
+      hasher.value(pane.body).value(pane.wall.axis).value(int(pane.wall.upper)).value(share);
+  if (scene_.film.pace != scenes::Pace::steady)
+    hasher.value(moment_of(frame)).value(moments_[std::size_t(frame)].pace);
   return hex(hasher.value(camera.fov_deg).digest());
 }
 

@@ -1,14 +1,19 @@
 // What one camera sees of a planned motion: from the number of a frame to a picture, by any worker alike.
 #pragma once
 
+#include <algorithm>
+#include <array>
 #include <map>
 #include <memory>
 #include <string>
 #include <variant>
 #include <vector>
 
+#include "app/film_time.h"
+#include "app/pane.h"
 #include "app/plan_folder.h"
 #include "app/scene_world.h"
+#include "fem/observe.h"
 #include "render/annotate.h"
 #include "render/camera.h"
 #include "render/image.h"
@@ -42,6 +47,19 @@ class Shot {
        const Output& = {});
 
   int frames() const;
+  // Of the motion, when a frame of the film shows it.
+  double time_s(int frame) const;
+  // Frames before the motion, and those of it; what is left over comes after it.
+  int frames_before() const { return before_; }
+  int frames_of_motion() const { return of_motion_; }
+  // {"frames": …, "seconds": …, "motion_s": …, "pace": [least, most]}: how the film tells the motion.
+  Json time_told() const;
+  // Of some frames in which something presses the robot: in how many at least a quarter of what it turns
+  // towards the camera is seen, a place where it is pressed, and both. Veils hide nothing.
+  struct Sight {
+    int frames = 0, robot = 0, place = 0, both = 0;
+  };
+  Sight sight_of_contact() const;
   // {"depth_m": [near, far], "objects": ["", NAME…], "scalar": {…}}: what the levels of the passes mean.
   Json key_of_passes() const;
   // Of all that the picture depends on.
@@ -53,18 +71,53 @@ class Shot {
     explicit Painter(const Shot&);
     ~Painter();
     Picture paint(int frame);
+    render::Image8 without_words(int frame, render::Passes* = nullptr);
 
    private:
     struct View;
     render::Image8 annotated(render::Image8, int frame) const;
     const Shot& shot_;
     std::vector<std::unique_ptr<View>> views_;  // from left to right
+    std::unique_ptr<Painter> inset_;
+    // While a card is shown, the motion stands still: its picture, and the card over it.
+    int still_ = -1;
+    bool card_is_title_ = false;
+    render::Image8 still_picture_, card_;
+    render::Image8 with_card(render::Image8, const render::Image8& without_words, int frame);
   };
 
  private:
   struct Push {
-    int first_frame;  // of the frames that it lasts
+    int first_stored;  // of the frames that it lasts
     Control control;
+  };
+  // Frames are those of the film but where they are called stored: of the plan.
+  int stored() const { return int(plan_.trajectory.frames.size()); }
+  State state_at(int frame) const {
+    return app::state_at(plan_.trajectory.frames, world_.dt_s, moment_of(frame));
+  }
+  double moment_of(int frame) const { return moments_[std::size_t(frame)].at; }
+  double robot_size() const {  // the longest edge of its box, at rest
+    return bounding_box(bodies_[std::size_t(world_.robot)].surface.positions).size().maxCoeff();
+  }
+  void lay_out_time();
+  int index_in_motion(int frame) const { return std::clamp(frame - before_, 0, of_motion_ - 1); }
+  // How much of a card is over a frame, 0 … 1.
+  double card_share(int frame) const;
+  const scenes::CardSpec* card_of(int frame) const;  // none: nullptr
+  void find_controls();
+  // At a stored frame.
+  Control control_at(int stored) const;
+  void find_touches();
+  void find_panes();
+  double shown(const std::vector<double>& of_stored, int frame) const;
+  std::vector<double> contact_forces_n() const;  // on the robot, lengths summed; a stored frame
+  std::vector<double> contact_shares() const;
+  // Of a body and a wall that touch at some time.
+  struct PaneOf {
+    int body;
+    Wall wall;
+    std::vector<double> shown;  // 0 … 1 a stored frame
   };
   render::Camera camera_of(int frame) const;
   Box box_of_motion() const;
@@ -73,6 +126,11 @@ class Shot {
   void lay_out_camera(double aspect);
   void check() const;
   void place_words();
+  void place_inset();
+  Eigen::Vector4d place_of_inset(render::Corner) const;
+  // How many of some places in each box, one a corner (pixels: left, top, right, bottom), are on bodies, over
+  // the film.
+  std::array<int, 4> hidden_by(const std::array<Eigen::Vector4d, 4>& boxes) const;
   std::string clock_at(int frame) const;
   double pixels_a_metre(const render::Camera&) const;  // at the distance of what it looks at
   void measure_depths();
@@ -82,7 +140,8 @@ class Shot {
   // Arrows of a frame, rows 2i and 2i + 1 their ends; always the same number, those of no force without
   // length: the control's push, what each body does to the robot and last the walls, each force of the world.
   Points arrows_at(int frame) const;
-  bool acts(const fem::Force&, int frame) const;  // in some step of those from this frame to the next
+  Points arrows_at_stored(int stored) const;
+  bool acts(const fem::Force&, int stored) const;  // in some step of those from this frame to the next
   std::uint64_t hash_of_look() const;
 
   const scenes::Scene& scene_;
@@ -100,8 +159,15 @@ class Shot {
   double low_ = 0, high_ = 1;            // of the bar of colours
   double near_m_ = 0, far_m_ = 1;        // depths of all that is ever seen
   double strongest_push_n_ = 0, arrow_m_per_n_ = 0, arrow_radius_m_ = 0;
+  std::vector<Moment> moments_;  // a frame
+  int before_ = 0, of_motion_ = 1;
+  std::unique_ptr<scenes::Scene> inset_scene_;
+  std::unique_ptr<Shot> inset_;
+  render::Corner inset_corner_ = render::Corner::top_right;
   std::vector<Push> pushes_;
-  Points way_m_, tree_m_;  // ends of lines
+  std::vector<PaneOf> panes_;
+  std::vector<std::vector<fem::ContactForce>> touches_;  // a stored frame; empty where nothing asks for them
+  Points way_m_, tree_m_;                                // ends of lines
   std::uint64_t look_hash_ = 0;
 };
 

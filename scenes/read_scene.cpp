@@ -842,12 +842,47 @@ std::vector<CameraSpec> read_cameras(const Node& root, const Scene& scene) {
   return cameras;
 }
 
+void check_inset(const Node& film, const Scene& scene) {
+  if (!scene.film.inset) return;
+  std::vector<std::string> names;
+  for (const CameraSpec& camera : scene.cameras) names.push_back(camera.name);
+  if (std::find(names.begin(), names.end(), scene.film.inset->camera) == names.end())
+    complain(child(child(film, "inset"), "camera"),
+             fmt::format("film.inset.camera: the scene has no camera \"{}\"; there are: {}",
+                         scene.film.inset->camera, fmt::join(names, ", ")));
+}
+
 ColorBy read_color_by(const std::string& word) {
   return word == "strain"        ? ColorBy::strain
          : word == "volume"      ? ColorBy::volume
          : word == "penetration" ? ColorBy::penetration
          : word == "speed"       ? ColorBy::speed
                                  : ColorBy::body;
+}
+
+// One line or several, without letters that cannot be seen.
+std::vector<std::string> lines_of(const Node& node, const char* key) {
+  std::vector<std::string> lines{""};
+  for (const char c : as_text(node)) {
+    if (c == '\n')
+      lines.emplace_back();
+    else if (static_cast<unsigned char>(c) < ' ' || c == 127)
+      complain(node, fmt::format("{} has letters that cannot be seen", key));
+    else
+      lines.back() += c;
+  }
+  while (lines.size() > 1 && lines.back().empty()) lines.pop_back();
+  constexpr std::size_t most = 8;
+  if (lines.size() > most)
+    complain(node, fmt::format("{} has {} lines; at most {} fit on the picture", key, lines.size(), most));
+  return lines;
+}
+
+std::optional<CardSpec> read_card(const Node& film, const char* name) {
+  const Node* table = film.find(name);
+  if (!table) return {};
+  return CardSpec{lines_of(child(*table, "text"), fmt::format("film.{}.text", name).c_str()),
+                  number(*table, "duration_s"), text(*table, "ground") == "plain"};
 }
 
 FilmSpec read_film(const Node& table) {
@@ -861,6 +896,13 @@ FilmSpec read_film(const Node& table) {
     complain(child(table, "speed"), fmt::format("film.frames_per_second over film.speed are {:g} states a "
                                                 "second of motion, more than 10,000; raise speed",
                                                 film.frames_per_second / film.speed));
+  film.pace = named<Pace>(text(table, "pace"), {{"steady", Pace::steady}, {"contact", Pace::contact}});
+  film.slowest = vector2(table, "pace_range")[0], film.quickest = vector2(table, "pace_range")[1];
+  if (table.find("length_s")) film.length_s = number(table, "length_s");
+  if (film.length_s && film.pace == Pace::steady)
+    complain(child(table, "length_s"),
+             "film.length_s needs film.pace = \"contact\"; a steady film is as long as speed makes it");
+  film.end = named<FilmEnd>(text(table, "end"), {{"rest", FilmEnd::rest}, {"path", FilmEnd::path}});
   film.look = named<FilmLook>(text(table, "look"), {{"studio", FilmLook::studio},
                                                     {"dark", FilmLook::dark},
                                                     {"clinical", FilmLook::clinical},
@@ -886,6 +928,14 @@ FilmSpec read_film(const Node& table) {
   film.path = flag(table, "path");
   film.tree = flag(table, "tree");
   film.side_by_side = flag(table, "side_by_side");
+  film.panes = flag(table, "panes");
+  film.outlines = flag(table, "outlines");
+  if (const Node* inset = table.find("inset"))
+    film.inset = InsetSpec{text(*inset, "camera"), number(*inset, "size")};
+  film.title = read_card(table, "title"), film.end_card = read_card(table, "end_card");
+  if (film.inset && film.side_by_side)
+    complain(child(table, "inset"),
+             "film.inset and film.side_by_side both show a second picture; take one of them");
   film.sheet_columns = sheet[0], film.sheet_rows = sheet[1];
   return film;
 }
@@ -948,7 +998,11 @@ Scene read(const std::string& toml, const std::string& name_for_messages,
     complaints.during([&] { scene.planner = read_planner(*planner); });
   if (scene.planner.preset == "paper") keep_to_the_paper(root, scene);
   fill_in_max_stretch(scene);
-  if (all_bodies) complaints.during([&] { scene.cameras = read_cameras(root, scene); });
+  if (all_bodies)
+    complaints.during([&] {
+      scene.cameras = read_cameras(root, scene);
+      check_inset(child(root, "film"), scene);
+    });
   complaints.during([&] { scene.film = read_film(child(root, "film")); });
   scene.text = toml;
   scene.sets = sets;

@@ -105,6 +105,9 @@ constexpr double usual_max_stretch = 2, any_stretch = 1000;
 // What a body's surface is of, and the light it is filmed in: docs/rendering.md.
 enum class BodyLook { plain, rubber, tissue, bone, fabric, skin };
 enum class FilmLook { studio, dark, clinical, paper };
+// How time goes in films, and when they end: docs/rendering.md, "Time".
+enum class Pace { steady, contact };
+enum class FilmEnd { rest, path };
 
 struct BodySpec {
   std::string name;  // letters, digits, _ and -: it names a folder
@@ -220,10 +223,27 @@ struct CameraSpec {
 // What the colours of the bodies mean.
 enum class ColorBy { body, strain, volume, penetration, speed };
 
+// A second camera's picture in a corner.
+struct InsetSpec {
+  std::string camera;
+  double size = 0.3;  // of the film's width
+};
+
+// Words before or after the motion.
+struct CardSpec {
+  std::vector<std::string> lines;  // UTF-8; the first is set larger
+  double duration_s = 0;
+  bool plain = false;  // on a plain ground, instead of the first or last picture, blurred
+};
+
 struct FilmSpec {
   int width_px = 0, height_px = 0;
   int frames_per_second = 0;
   double speed = 1;  // a second of film shows so many of the motion
+  Pace pace = Pace::steady;
+  double slowest = 1, quickest = 1;  // of the pace contact, times speed
+  std::optional<double> length_s;    // of the pace contact
+  FilmEnd end = FilmEnd::path;
   FilmLook look = FilmLook::studio;
   std::optional<Vec3> background_srgb;  // nothing: the look's
   bool bounds_lines = true;             // draw the edges of the bounds as pale lines
@@ -233,6 +253,10 @@ struct FilmSpec {
   ColorBy color_by = ColorBy::body;
   std::optional<Eigen::Vector2d> color_range;  // nothing: over the whole motion
   bool cages = false, forces = false, path = false, tree = false, side_by_side = false;
+  bool panes = true;      // where bodies touch walls that are not drawn
+  bool outlines = false;  // silhouettes and creases as dark lines
+  std::optional<InsetSpec> inset;
+  std::optional<CardSpec> title, end_card;
   int sheet_columns = 0, sheet_rows = 0;
 };
 
