@@ -3,6 +3,9 @@
 // docs/import.md
 #pragma once
 
+#include <map>
+
+#include "core/appearance.h"
 #include "meshing/defects.h"
 
 namespace limber::meshing {
@@ -15,7 +18,10 @@ struct ImportOptions {
 };
 
 struct ImportedModel {
-  SurfaceMesh surface;                // validate() holds; welded, oriented, no duplicate or degenerate face
+  SurfaceMesh surface;    // validate() holds; welded, oriented, no duplicate or degenerate face
+  Appearance appearance;  // of `surface`, as the file has it; its images are not looked into here
+  // The other files that it names, as paths beside it, and the hash of their bytes, "" where there are none.
+  std::map<std::string, std::string> companions = {};
   Defects found;                      // in the file, before mending; vertex numbers are the file's, from 0
   Defects left;                       // in `surface`
   std::vector<std::string> mended;    // what was done, as sentences

@@ -30,6 +30,14 @@ void PolygonSoup::add_corner(int vertex) {
 
 void PolygonSoup::end_polygon() { first_corner.push_back(int(corners.size())); }
 
+int PolygonSoup::add_image(NamedImage image) {
+  const auto same = [&](const NamedImage& other) { return other.path == image.path; };
+  const auto at = std::find_if(images.begin(), images.end(), same);
+  if (at != images.end()) return int(at - images.begin());
+  images.push_back(std::move(image));
+  return int(images.size()) - 1;
+}
+
 void PolygonSoup::note_single_precision() {
   double farthest = 0;
   for (const Vec3& p : positions)

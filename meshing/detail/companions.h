@@ -1,0 +1,25 @@
+// Files that a model names: its materials, its images.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+
+#include "core/file.h"
+
+namespace limber::meshing::detail {
+
+// `named` as a path beside the model, with slashes; nothing where it leads out of the model's folder. Of a
+// path from the root of another machine the last part is what is looked for.
+std::optional<fs::path> path_beside(const fs::path& model, std::string named);
+
+struct Companion {
+  std::optional<std::string> bytes;
+  std::string complaint;  // where there are none: "… is not there"
+};
+// Reads a file that the model names, and notes its hash in `companions`.
+Companion read_companion(const fs::path& model, const std::string& named, std::uintmax_t most_bytes,
+                         std::map<std::string, std::string>& companions);
+
+}  // namespace limber::meshing::detail
