@@ -2,6 +2,7 @@
 
 #include "app/export.h"
 #include "app/preview.h"
+#include "core/appearance_file.h"
 #include "core/contact_shape_file.h"
 #include "core/error.h"
 #include "core/events.h"
@@ -16,6 +17,7 @@
 #include "ffd/binding_file.h"
 #include "meshing/quality.h"
 #include "meshing/split_edges.h"
+#include "render/image_file.h"
 
 namespace limber::app {
 
@@ -100,18 +102,25 @@ void require_report(const Json& report, const fs::path& file) {
   constexpr const char* remedy = "limber did not write that";
   require_like(report, example_of_report(), Keys::all, file.string(), remedy);
   require_like(report, {{"shells", {{"vertices_uncovered", -1}}}}, Keys::those_there, file.string(), remedy);
+  require_like(report,
+               {{"appearance", {{"materials", -1}, {"images", Json::array()}, {"corner_colors", true}}},
+                {"companions", Json::object()}},
+               Keys::those_there, file.string(), remedy);
   for (const auto& [stage, any] : report.at("cpu_seconds").items())
     require_like(report, {{"cpu_seconds", {{stage, 0.5}}}}, Keys::all, file.string(), remedy);
 }
 
-bool up_to_date(const fs::path& folder, const Json& input) {
+bool up_to_date(const fs::path& folder, const Json& input, const fs::path& model_file) {
   try {
     const Json report = read_json(folder / "report.json");
     require_report(report, folder / "report.json");
     if (report.at("version") != version || report.at("input") != input) return false;
     for (const char* name : body_files)
       if (report.at("files").at(name) != hash_of_file(folder / name)) return false;
-    return true;
+    if (report.at("files").contains(appearance_file))
+      for (const std::string& name : files_of_body(read_appearance(folder, read_ply(folder / "surface.ply"))))
+        if (report.at("files").at(name) != hash_of_file(folder / name)) return false;
+    return has_its_companions(model_file, report);
   } catch (const InputError&) {
     return false;
   } catch (const Json::exception&) {
@@ -169,9 +178,71 @@ PrepareSettings settings_of_input(const Json& input) {
           s.at("exact").get<bool>(), s.at("tets").get<int>(),         s.at("mode").get<std::string>()};
 }
 
-SurfaceMesh surface_that_bends(const SurfaceMesh& surface, const PrepareSettings& settings) {
-  if (settings.tets == 0) return surface;
-  return meshing::split_long_edges(surface, meshing::longest_edge(surface, settings.tets));
+namespace {
+
+bool is_grey(const render::Image8& image) {
+  for (std::size_t i = 0; i + 2 < image.rgb.size(); i += 3)
+    if (image.rgb[i] != image.rgb[i + 1] || image.rgb[i] != image.rgb[i + 2]) return false;
+  return true;
+}
+
+// Leaves out those that cannot be decoded, are too large together, or are no normals though they should be.
+void look_into_images(Appearance& appearance, std::vector<std::string>& warnings) {
+  std::int64_t pixels = 0;
+  for (int i = 0; i < int(appearance.images.size()); ++i) {
+    const ImageFile& file = appearance.images[std::size_t(i)];
+    try {
+      const render::Image8 image = render::decoded_image(file.bytes, file.name);
+      if (pixels + std::int64_t(image.width) * image.height > render::most_image_pixels)
+        throw InputError(fmt::format("\"{}\": the images of the model have more than {} pixels together",
+                                     file.name, render::most_image_pixels));
+      pixels += std::int64_t(image.width) * image.height;
+      bool has_heights = false;
+      for (SurfaceMaterial& material : appearance.materials)
+        if (material.normal_image == i && is_grey(image)) material.normal_image = -1, has_heights = true;
+      if (has_heights)
+        warnings.push_back(
+            fmt::format("image \"{}\" has heights, not normals: its relief is left out", file.name));
+    } catch (const InputError& error) {
+      warnings.push_back(fmt::format("image {}; what shows it is plain", error.what()));
+      appearance.drop_image(i);
+    }
+  }
+  appearance.drop_unused();
+}
+
+}  // namespace
+
+void make_model_of_body(meshing::ImportedModel& model, const PrepareSettings& settings) {
+  look_into_images(model.appearance, model.warnings);
+  if (settings.tets > 0) {
+    const Eigen::Index own_vertices = model.surface.positions.rows();
+    CornerMap corners;
+    model.surface =
+        meshing::split_long_edges(model.surface, meshing::longest_edge(model.surface, settings.tets), {},
+                                  model.appearance.empty() ? nullptr : &corners);
+    model.appearance = carried(model.appearance, corners);
+    if (const Eigen::Index more = model.surface.positions.rows() - own_vertices; more > 0)
+      model.mended.push_back(
+          fmt::format("cut long edges at {} places, so that its {} triangles bend as the cage does", more,
+                      model.surface.triangles.rows()));
+  }
+  round_to_floats(model.appearance);
+}
+
+bool has_its_companions(const fs::path& model_file, const Json& report) {
+  if (!report.contains("companions")) return true;
+  for (const auto& [name, hash] : report.at("companions").items()) {
+    std::string now;
+    try {
+      const fs::path file = model_file.parent_path() / name;
+      if (fs::exists(file)) now = hex(hash_of(std::string_view(read_file(file, most_image_bytes))));
+    } catch (const InputError&) {  // larger than images may be, or no file
+    } catch (const fs::filesystem_error&) {
+    }
+    if (hash != now) return false;
+  }
+  return true;
 }
 
 meshing::Decomposition make_shells(const SurfaceMesh& surface, const PrepareSettings& settings) {
@@ -214,7 +285,7 @@ Json facts_of_making(const MadeBody& made, const PrepareSettings& settings) {
 
 Json prepare_body(const BodySource& source, const PrepareSettings& settings, const fs::path& folder) {
   const Json input = input_of(source.identity, settings);
-  if (up_to_date(folder, input)) {
+  if (up_to_date(folder, input, source.file)) {
     log::info("{}: up to date", folder.string());
     events::tell({{"event", "body"}, {"folder", folder.string()}, {"up_to_date", true}});
     return read_json(folder / "report.json");
@@ -228,12 +299,7 @@ Json prepare_body(const BodySource& source, const PrepareSettings& settings, con
   progress.update(0, "import");
   meshing::ImportedModel model = source.load();
   validate(model.surface, source.model);
-  const Eigen::Index own_vertices = model.surface.positions.rows();
-  model.surface = surface_that_bends(model.surface, settings);
-  if (const Eigen::Index more = model.surface.positions.rows() - own_vertices; more > 0)
-    model.mended.push_back(
-        fmt::format("cut long edges at {} places, so that its {} triangles bend as the cage does", more,
-                    model.surface.triangles.rows()));
+  make_model_of_body(model, settings);
   costs.end_stage("import");
   progress.update(1, "decompose");
   throw_if_stopped();
@@ -274,11 +340,13 @@ Json prepare_body(const BodySource& source, const PrepareSettings& settings, con
   // These would be of the body before.
   remove_exports(folder);
   for (const char* name : preview_files) fs::remove(folder / name, ignored);
+  remove_appearance(folder);
   write_ply(folder / "surface.ply", model.surface);
   write_obj(folder / "shells.obj", made.decomposition.shells);
   write_msh(folder / "cage.msh", cage.mesh, cage.shell_from_tet);
   ffd::write_binding(folder / "binding.npz", binding, model.surface, cage.mesh);
   write_contact_shape(folder / "contact.npz", made.contact, model.surface, cage.mesh);
+  write_appearance(folder, model.appearance, model.surface);
   costs.end_stage("write");
 
   std::vector<std::string> warnings = model.warnings;
@@ -295,12 +363,15 @@ Json prepare_body(const BodySource& source, const PrepareSettings& settings, con
   report["warnings"] = warnings;
   report.update(
       facts_of_body(model.surface, made.decomposition.shells, cage.mesh, binding, made.contact, certificate));
+  if (!model.appearance.empty()) report["appearance"] = facts_of_appearance(model.appearance);
+  if (!model.companions.empty()) report["companions"] = model.companions;
   const Json making = facts_of_making(made, settings);
   for (const auto& [table, figures] : making.items()) report[table].update(figures);
   report["cpu_seconds"] = costs.cpu_s;
   report["peak_memory_mb_after"] = costs.peak_mb;
   report["peak_memory_mb"] = std::round(peak_memory_mb());
-  for (const char* name : body_files) report["files"][name] = hash_of_file(folder / name);
+  for (const std::string& name : files_of_body(model.appearance))
+    report["files"][name] = hash_of_file(folder / name);
   write_json(folder / "report.json", report);
   for (const std::string& warning : warnings) log::warn("{}: {}", source.model, warning);
   return report;
@@ -340,19 +411,47 @@ Json facts_of_body(const SurfaceMesh& surface, const std::vector<ConvexShell>& s
   return facts;
 }
 
+Json facts_of_appearance(const Appearance& a) {
+  if (a.empty()) return {};
+  Json images = Json::array();
+  for (const ImageFile& image : a.images)
+    images.push_back({{"name", image.name}, {"bytes", image.bytes.size()}});
+  return {
+      {"coordinates", a.uv.rows() > 0},
+      {"corner_colors", a.colors.rows() > 0},
+      {"materials", a.materials.size()},
+      {"plain_triangles", std::count(a.material_from_triangle.begin(), a.material_from_triangle.end(), -1)},
+      {"images", images}};
+}
+
+std::vector<std::string> files_of_body(const Appearance& a) {
+  std::vector<std::string> names(std::begin(body_files), std::end(body_files));
+  if (a.empty()) return names;
+  names.push_back(appearance_file);
+  for (std::size_t i = 0; i < a.images.size(); ++i) names.push_back(name_of_image_file(a, i));
+  return names;
+}
+
 PreparedBody read_body(const fs::path& folder) {
   PreparedBody body;
   try {
     body.report = read_json(folder / "report.json");
     require_report(body.report, folder / "report.json");
-    for (const char* name : body_files)
+    const auto require_hash = [&](const std::string& name) {
       if (body.report.at("files").at(name) != hash_of_file(folder / name))
         throw InputError(
             fmt::format("{}: is not the file that report.json was written for", (folder / name).string()));
+    };
+    for (const char* name : body_files) require_hash(name);
     body.surface = read_ply(folder / "surface.ply");
     body.cage = read_msh(folder / "cage.msh", &body.shell_from_tet);
     body.binding = ffd::read_binding(folder / "binding.npz", body.surface, body.cage);
     body.contact = read_contact_shape(folder / "contact.npz", body.surface, body.cage);
+    if (body.report.at("files").contains(appearance_file)) {
+      require_hash(appearance_file);
+      body.appearance = read_appearance(folder, body.surface);
+      for (const std::string& name : files_of_body(body.appearance)) require_hash(name);
+    }
     body.gradients = node_gradients(body.cage);
   } catch (const InputError& error) {
     throw InputError(fmt::format(
@@ -405,6 +504,12 @@ std::string summary_of_report(const Json& report) {
                     contact.at("memory_mb").get<double>(), contact.at("error_p99_m").get<double>(),
                     contact.at("error_max_m").get<double>())
               : "  contact      by the cage\n";
+  if (report.contains("appearance")) {
+    const Json& a = report.at("appearance");
+    text +=
+        fmt::format("  appearance   {} materials, {} images{}\n", a.at("materials").get<int>(),
+                    a.at("images").size(), a.at("corner_colors").get<bool>() ? ", colors of vertices" : "");
+  }
   for (const Json& sentence : report.at("mended"))
     text += fmt::format("  mended       {}\n", sentence.get<std::string>());
   for (const Json& sentence : report.at("warnings"))

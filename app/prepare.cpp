@@ -12,6 +12,7 @@ namespace limber::app {
 Outcome prepare(const PrepareOptions& options) {
   BodySource source;
   source.model = options.model.string();
+  source.file = options.model;
   source.identity = {{"file_hash", hex(hash_of(std::string_view(read_file(options.model))))},
                      {"scale", options.scale},
                      {"y_up", options.y_up}};

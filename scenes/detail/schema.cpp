@@ -154,6 +154,16 @@ constexpr Key all_keys[] = {
      "`\"#rrggbb\"`; else robot #c0392b, obstacle #3f7cac, free #e0a030, scenery #c8ccd0",
      "",
      ""},
+    {"bodies[].texture",
+     Type::boolean,
+     {},
+     0,
+     may_lack,
+     "the colors and images that its model's file has are shown (docs/import.md), where it has some: `color` "
+     "is "
+     "then that of what has none; else where no `color` is given; not of scenery",
+     "",
+     ""},
     {"bodies[].opacity",
      Type::number,
      {0, 1, true, false},

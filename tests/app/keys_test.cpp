@@ -186,6 +186,7 @@ const std::vector<Row> rows{
     {"bodies[].max_volume_change", "bodies.cart.max_volume_change=0.2", world},
     {"bodies[].max_stretch", "bodies.cart.max_stretch=3", world},
     {"bodies[].color", "bodies.cart.color=\"#123456\"", film},
+    {"bodies[].texture", "bodies.cart.texture=false", film, "film.color_by=body"},
     {"bodies[].opacity", "bodies.veil.opacity=0.5", film},
     {"bodies[].look", "bodies.veil.look=skin", film},
     {"bodies[].roughness", "bodies.veil.roughness=0.6", film},
@@ -404,7 +405,10 @@ TEST_F(Keys_slow, ChangeWhatTheyShapeAndNothingElse) {
   const std::string file = scene(stage);
   ASSERT_EQ(limber_program({"plan", file, "-o", out(), "--iterations", "3", "-q"}).code, exit_no_plan);
   const PlanFolder planned = read_plan_folder(out());
-  const std::vector<PreparedBody> prepared = read_bodies_of(planned, out());
+  std::vector<PreparedBody> prepared = read_bodies_of(planned, out());
+  Appearance& of_cart = prepared[2].appearance;  // as if its model had a color of its own
+  of_cart.material_from_triangle.assign(std::size_t(prepared[2].surface.triangles.rows()), 0);
+  of_cart.materials = {{.name = "green", .color = Vec3(0, 1, 0)}};
   const std::vector<SurfaceMesh> scenery = read_scenery(planned.scene, out());
   struct Identities {
     std::vector<Json> bodies;
