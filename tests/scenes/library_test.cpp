@@ -119,6 +119,48 @@ TEST(Library, WindowsAreNarrowerThanTheBall) {
       << "straight through the first window";
 }
 
+// The walls are those of windows. Every 4 s the leaves meet before the first window of the way round, and
+// part until it is free.
+TEST(Library, TheMovingDoorClosesTheFirstWindowEveryFourSeconds) {
+  const Scene scene = read_scene_file(find_scene("moving_door")),
+              windows = read_scene_file(find_scene("windows"));
+  const auto& holes = std::get<BlocksModel>(scene.bodies[1].model).holes;
+  const auto& same = std::get<BlocksModel>(windows.bodies[1].model).holes;
+  ASSERT_EQ(holes.size(), same.size());
+  for (std::size_t h = 0; h < holes.size(); ++h)
+    EXPECT_TRUE(holes[h].lower == same[h].lower && holes[h].upper == same[h].upper) << h;
+  const Box window = holes[1];
+  ASSERT_EQ(scene.motions.size(), 2U);
+  const auto leaf_at = [&](int side, std::size_t keyframe) {
+    const MotionSpec& motion = scene.motions[std::size_t(side)];
+    const BodySpec& body = scene.bodies[std::size_t(motion.body)];
+    Box leaf = *start_box(body);
+    const Vec3 way = motion.keyframes[keyframe].position_m - body.pose.position_m;
+    leaf.lower += way, leaf.upper += way;
+    return leaf;
+  };
+  const auto& frames = scene.motions[0].keyframes;
+  for (std::size_t k = 0; k < frames.size(); ++k) {
+    SCOPED_TRACE(k);
+    EXPECT_EQ(frames[k].at_s, scene.motions[1].keyframes[k].at_s);
+    if (k >= 4) {
+      EXPECT_NEAR(frames[k].at_s, frames[k - 4].at_s + 4, 1e-12);
+    }
+    const Box left = leaf_at(0, k), right = leaf_at(1, k);
+    EXPECT_LT(left.upper.y(), window.lower.y()) << "before the wall";
+    EXPECT_LT(left.lower.z(), window.lower.z());
+    EXPECT_GT(left.upper.z(), window.upper.z());
+    if (k % 4 == 1 || k % 4 == 2) {
+      EXPECT_LT(right.lower.x() - left.upper.x(), 0.02) << "closed";
+      EXPECT_LT(left.lower.x(), window.lower.x());
+      EXPECT_GT(right.upper.x(), window.upper.x());
+    } else {
+      EXPECT_LT(left.upper.x(), window.lower.x()) << "open";
+      EXPECT_GT(right.lower.x(), window.upper.x());
+    }
+  }
+}
+
 TEST(Library, SqueezeLeavesSixTenthsOfTheBall) {
   const Scene scene = read_scene_file(find_scene("squeeze"));
   const Vec3 slit = std::get<BlocksModel>(scene.bodies[1].model).holes[0].size();
@@ -154,9 +196,10 @@ TEST(Library, UnknownSceneNamesTheNearest) {
     find_scene("bariers1");
     FAIL();
   } catch (const InputError& error) {
-    EXPECT_THAT(error.what(), HasSubstr("did you mean \"barriers1\"? known scenes: barriers1, barriers2, "
-                                        "body_parts, bunny_gate, falling_objects, heart_and_lung, squeeze, "
-                                        "there_and_back, torso, windows"));
+    EXPECT_THAT(error.what(),
+                HasSubstr("did you mean \"barriers1\"? known scenes: barriers1, barriers2, "
+                          "body_parts, bunny_gate, falling_objects, heart_and_lung, moving_door, "
+                          "squeeze, there_and_back, torso, windows"));
   }
 }
 
