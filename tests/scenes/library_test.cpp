@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cstdlib>
+#include <numbers>
 
 #include "core/error.h"
 #include "scenes/library.h"
@@ -161,6 +162,32 @@ TEST(Library, TheMovingDoorClosesTheFirstWindowEveryFourSeconds) {
   }
 }
 
+// Between the robot's corner and the goal's, 16 balls of 0.8 to 1.2 m cover six tenths of the floor with the
+// robot, and none touches another or a wall.
+TEST(Library, TheCrowdFillsItsFloorAndTouchesNothing) {
+  const Scene scene = read_scene_file(find_scene("crowd"));
+  ASSERT_EQ(scene.bodies.size(), 17U);
+  const auto diameter = [](const BodySpec& body) { return std::get<SphereModel>(body.model).diameter_m; };
+  double covered = 0;
+  for (std::size_t b = 0; b < scene.bodies.size(); ++b) {
+    SCOPED_TRACE(scene.bodies[b].name);
+    EXPECT_EQ(scene.bodies[b].role, b == 0 ? Role::robot : Role::free);
+    const double d = diameter(scene.bodies[b]);
+    EXPECT_TRUE(d >= 0.8 && d <= 1.2) << d;
+    covered += std::numbers::pi / 4 * d * d;
+    const Vec3 place = scene.bodies[b].pose.position_m;
+    EXPECT_GT((place - scene.bounds_m.lower).minCoeff(), d / 2);
+    EXPECT_GT((scene.bounds_m.upper - place).minCoeff(), d / 2);
+    for (std::size_t other = 0; other < b; ++other)
+      EXPECT_GT((place - scene.bodies[other].pose.position_m).norm(),
+                (d + diameter(scene.bodies[other])) / 2 + 0.02);
+  }
+  const Vec3 size = scene.bounds_m.size();
+  EXPECT_NEAR(covered / (size.x() * size.y()), 0.6, 0.005);
+  const Vec3 way = scene.goal.center_of_mass_m - scene.bodies[0].pose.position_m;
+  for (int axis = 0; axis < 2; ++axis) EXPECT_GT(way[axis], size[axis] - 1.5);
+}
+
 TEST(Library, SqueezeLeavesSixTenthsOfTheBall) {
   const Scene scene = read_scene_file(find_scene("squeeze"));
   const Vec3 slit = std::get<BlocksModel>(scene.bodies[1].model).holes[0].size();
@@ -198,7 +225,7 @@ TEST(Library, UnknownSceneNamesTheNearest) {
   } catch (const InputError& error) {
     EXPECT_THAT(error.what(),
                 HasSubstr("did you mean \"barriers1\"? known scenes: barriers1, barriers2, "
-                          "body_parts, bunny_gate, falling_objects, heart_and_lung, moving_door, "
+                          "body_parts, bunny_gate, crowd, falling_objects, heart_and_lung, moving_door, "
                           "squeeze, there_and_back, torso, windows"));
   }
 }
