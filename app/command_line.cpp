@@ -126,6 +126,19 @@ void add_limits(CLI::App& command, Options& options) {
       ->capture_default_str();
 }
 
+void add_from(CLI::App& command, fs::path& folder, std::optional<int>& frame) {
+  CLI::Option* const from =
+      command
+          .add_option(
+              "--from", folder,
+              "begin as a frame of the plan or simulation in this folder, positions and velocities as it "
+              "stores them; the clock goes on from there")
+          ->type_name("DIR");
+  command.add_option("--frame", frame, "of --from, counted from 0; default: its last")
+      ->type_name("N")
+      ->needs(from);
+}
+
 void add_plan(CLI::App& command, PlanOptions& options) {
   command.add_option("-o,--out", options.out, "work folder; it is made where it is missing")
       ->required()
@@ -162,16 +175,7 @@ void add_simulate(CLI::App& command, SimulateOptions& options) {
       .add_option("--control", options.script,
                   "a TOML file with more [[forces]] and [[motions]], as the scene has them")
       ->type_name("FILE");
-  CLI::Option* const from =
-      command
-          .add_option(
-              "--from", options.from,
-              "begin as a frame of the plan or simulation in this folder, positions and velocities as it "
-              "stores them; the clock goes on from there")
-          ->type_name("DIR");
-  command.add_option("--frame", options.frame, "of --from, counted from 0; default: its last")
-      ->type_name("N")
-      ->needs(from);
+  add_from(command, options.from, options.frame);
   command.add_flag("--resume", options.resume,
                    "go on from the simulation in the work folder: longer, or after it was stopped");
 }
@@ -499,7 +503,7 @@ int run_command_line(int argc, const char* const* argv) {
 
   CLI::App& plan_command = *program.add_subcommand("plan", "scene → bodies, tree, path");
   add_scene(plan_command, plan_options.scene), add_plan(plan_command, plan_options);
-  add_shortcut(plan_command, plan_options);
+  add_shortcut(plan_command, plan_options), add_from(plan_command, plan_options.from, plan_options.frame);
   plan_command.add_flag("--resume", plan_options.resume,
                         "go on from the plan in the work folder: more iterations, or after it was stopped");
   add_global(plan_command, global), add_threads(plan_command, global), add_progress(plan_command, global);

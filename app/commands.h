@@ -84,6 +84,8 @@ struct PlanOptions {
   int in_flight = 0;  // 0: chosen from threads and lanes
   bool resume = false;
   std::optional<fs::path> stats;  // JSON lines: how the search went
+  fs::path from;                  // a folder with a plan or a simulation; empty: the scene's start
+  std::optional<int> frame;       // of `from`; nothing: its last
 
   std::optional<int> shortcut_rounds;  // nothing: the scene's
   std::string cost = "duration";       // what shortcutting and improving make less of

@@ -219,7 +219,7 @@ FemSystem::FemSystem(const fem::World& world, const GoalRules& goal, std::option
       goal_(goal),
       goal_body_start_m_(Vec3::Zero()),
       hash_(hash_of_world) {
-  if (goal.body >= 0) goal_body_start_m_ = fem::center_of_mass_m(world, this->start(), goal.body);
+  if (goal.body >= 0) goal_body_start_m_ = fem::center_of_mass_m(world, fem::start_state(world), goal.body);
   Hasher hasher;
   hasher.value(hash_);
   for (const int body : {goal.body, goal.above, goal.below, goal.clear_of}) hasher.value(body);
@@ -234,8 +234,9 @@ FemSystem::FemSystem(const fem::World& world, const GoalRules& goal, std::option
   hash_ = hasher.digest();
 }
 
-FemSystem::FemSystem(const fem::World& world, const std::vector<PreparedBody>& bodies, const GoalRules& goal)
-    : FemSystem(world, goal) {
+FemSystem::FemSystem(const fem::World& world, const std::vector<PreparedBody>& bodies, const GoalRules& goal,
+                     std::optional<State> start)
+    : FemSystem(world, goal, std::move(start)) {
   surfaces_ = std::make_shared<const Surfaces>(world, bodies);
   surface_size_m_ = bounding_box(bodies[std::size_t(world.robot)].surface.positions).size().maxCoeff();
   for (const auto& via : via_) via->surfaces_ = surfaces_, via->surface_size_m_ = surface_size_m_;
@@ -322,7 +323,7 @@ plan::Measures FemSystem::measures(const State& state) const {
 Vec3 FemSystem::goal_velocity(const State& state) const {
   return goal_.body < 0 ? Vec3::Zero() : fem::center_velocity_m_s(world_, state, goal_.body);
 }
-plan::Workspace FemSystem::workspace() const { return workspace_of(world_); }
+plan::Workspace FemSystem::workspace() const { return workspace_of(world_, given_start_); }
 int FemSystem::lanes() const { return preferred_lanes; }
 std::unique_ptr<plan::Propagator> FemSystem::make_propagator() const {
   return std::make_unique<Propagator>(*this);

@@ -32,7 +32,8 @@ class FemSystem final : public plan::System {
   // For searches: ways are refused on which surfaces are deeper in one another, or in themselves, or press
   // one another through a wider gap, than SeenLimits has it, where contact is on them. The bodies must
   // outlive it.
-  FemSystem(const fem::World&, const std::vector<PreparedBody>&, const GoalRules&);
+  FemSystem(const fem::World&, const std::vector<PreparedBody>&, const GoalRules&,
+            std::optional<State> start = std::nullopt);
 
   State start() const override;
   Vec3 robot_center(const State&) const override;

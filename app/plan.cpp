@@ -7,6 +7,7 @@
 #include "app/plan_folder.h"
 #include "app/scene_world.h"
 #include "app/search_log.h"
+#include "app/simulate.h"
 #include "app/tree_plot.h"
 #include "core/error.h"
 #include "core/hash.h"
@@ -320,6 +321,7 @@ scenes::Scene read_scene(const PlanOptions& options) {
 
 Outcome plan(const PlanOptions& options) {
   const scenes::Scene scene = read_scene(options);
+  require_other_folder(options.from, options.out);
   make_folder(options.out);
   const FolderLock lock(options.out, FolderLock::alone);
   return plan(options, scene);
@@ -331,7 +333,8 @@ Outcome plan(const PlanOptions& options, const scenes::Scene& scene) {
   const std::vector<PreparedBody> bodies =
       prepare_bodies(scene, options.scene.data, options.out, options.scene.store);
   const fem::World world = build_world(scene, bodies);
-  const FemSystem system(world, bodies, goal_rules_of(scene));
+  const Beginning beginning = beginning_of(options.from, options.frame, options.out, scene, world);
+  const FemSystem system(world, bodies, goal_rules_of(scene), beginning.start);
   const plan::Settings settings = settings_of(scene, options);
   const fs::path file = options.out / "plan.npz";
   const bool several = options.portfolio > 1;
@@ -349,8 +352,10 @@ Outcome plan(const PlanOptions& options, const scenes::Scene& scene) {
     earlier_summary = std::move(folder.summary);
     nodes_kept = earlier->tree.size();
     if (earlier->system_hash != system.hash())
-      throw InputError(fmt::format(
-          "{}: was made for another world than this scene's; plan anew without --resume", file.string()));
+      throw InputError(
+          fmt::format("{}: was made for another world than this scene's, or begins elsewhere; "
+                      "resume with the same --from and --frame, or plan anew without --resume",
+                      file.string()));
     log::info("{}: going on after {} iterations", file.string(), earlier->statistics.iterations);
   }
   std::optional<SearchLog> search_log;
@@ -366,6 +371,11 @@ Outcome plan(const PlanOptions& options, const scenes::Scene& scene) {
   const plan::ShortcutSettings shortcuts = shortcuts_of(scene, options, earlier_summary);
   Json extra;
   std::string extra_text;
+  if (beginning.start) {
+    extra["from"] = beginning.from;
+    extra_text += fmt::format("  from         frame {} of {}\n", beginning.from.at("frame").get<int>(),
+                              options.from.string());
+  }
   for (const char* later : {"shortcut", "improve", "refine"})
     if (earlier_summary.contains(later)) extra[later] = earlier_summary.at(later);
   if (several) {
@@ -456,6 +466,7 @@ bool plan_is_up_to_date(const PlanOptions& options, const scenes::Scene& scene) 
     const std::vector<PreparedBody> bodies =
         prepare_bodies(scene, options.scene.data, options.out, options.scene.store);
     const PlanFolder folder = read_searched_folder(options.out);
+    if (begins_elsewhere(folder)) return false;
     const fem::World world = build_world(scene, bodies, State(folder.plan.tree.states[0]).positions);
     plan::Settings settings = settings_of(scene, options);
     const Json searches = folder.summary.value("portfolio", Json::object()).value("searches", Json::array());

@@ -48,7 +48,8 @@ void require_summary(const PlanFolder& planned, const fs::path& file) {
         Keys::all, file.string() + ": given.summary.shortcut", remedy);
   if (begins_elsewhere(planned))
     require_like(planned.summary.at("from"), {{"folder", ""}, {"frame", -1}, {"trajectory_hash", ""}},
-                 Keys::all, file.string() + ": given.summary.from", "simulate anew with limber simulate");
+                 Keys::all, file.string() + ": given.summary.from",
+                 planned.plan.simulation ? "simulate anew with limber simulate" : remedy);
   kinds_of(planned.cage_hashes, Json::object(), "cage_hashes");
   for (const auto& [body, hash] : planned.cage_hashes.items()) kinds_of(hash, "", "cage_hashes");
 }
@@ -112,15 +113,24 @@ PlanFolder read_searched_folder(const fs::path& folder) {
   return planned;
 }
 
-bool begins_elsewhere(const PlanFolder& planned) {
-  return planned.plan.simulation && planned.summary.contains("from");
+PlanFolder read_folder_from_the_start(const fs::path& folder, const std::string& what) {
+  PlanFolder planned = read_searched_folder(folder);
+  if (begins_elsewhere(planned))
+    throw InputError(
+        fmt::format("{}: begins as frame {} of another motion, and {} takes plans from their scene's start "
+                    "alone; name the folder of one",
+                    folder.string(), planned.summary.at("from").at("frame").get<int>(), what));
+  return planned;
 }
+
+bool begins_elsewhere(const PlanFolder& planned) { return planned.summary.contains("from"); }
 
 FemSystem system_of(const PlanFolder& planned, const fem::World& world,
                     const std::vector<PreparedBody>& bodies) {
-  if (!planned.plan.simulation) return FemSystem(world, bodies, goal_rules_of(planned.scene));
-  if (!begins_elsewhere(planned)) return FemSystem(world);
-  return FemSystem(world, {}, State(planned.plan.tree.states[0]));
+  std::optional<State> start;
+  if (begins_elsewhere(planned)) start = planned.plan.tree.states[0];
+  if (planned.plan.simulation) return FemSystem(world, {}, std::move(start));
+  return FemSystem(world, bodies, goal_rules_of(planned.scene), std::move(start));
 }
 
 void require_of_world(const plan::Plan& plan, const fem::World& world, const fs::path& folder) {

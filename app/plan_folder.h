@@ -56,11 +56,13 @@ PlanFolder read_plan_folder(const fs::path& folder);
 // The same of a plan that was searched: throws InputError where the folder holds a simulation.
 PlanFolder read_searched_folder(const fs::path& folder);
 
-// Whether it is a simulation from a frame of another folder (its summary's "from"), not from the scene's
-// start.
+// The same, for what knows but motions from the scene's start: `what` says who.
+PlanFolder read_folder_from_the_start(const fs::path& folder, const std::string& what);
+
+// Whether it begins as a frame of another folder (its summary's "from"), not at the scene's start.
 bool begins_elsewhere(const PlanFolder&);
 
-// The system that the folder's motion is of: of a simulation without a goal, and from where it began.
+// The system that the folder's motion is of, from where it began; of a simulation without a goal.
 FemSystem system_of(const PlanFolder&, const fem::World&, const std::vector<PreparedBody>&);
 
 // The first entry of plan.npz that limber would write otherwise, or not at all; "" where there is none.

@@ -49,7 +49,7 @@ int same_node(const TetMesh& coarse, int node, const TetMesh& fine) {
 }  // namespace
 
 Outcome refine(const RefineOptions& options) {
-  const PlanFolder planned = read_searched_folder(options.folder);
+  const PlanFolder planned = read_folder_from_the_start(options.folder, "limber refine");
   if (!planned.plan.solved())
     throw InputError(
         fmt::format("{}: its plan does not reach the goal, so there is no path to carry; plan on with limber "

@@ -143,7 +143,7 @@ Json json_of(const Fate& f) {
 
 Outcome robust(const RobustOptions& options) {
   const NothingToKeep nothing_to_keep;
-  const PlanFolder planned = read_searched_folder(options.folder);
+  const PlanFolder planned = read_folder_from_the_start(options.folder, "limber robust");
   if (!planned.plan.solved())
     throw InputError(
         fmt::format("{}: its plan does not reach the goal, so there is nothing to perturb; plan on with "

@@ -46,35 +46,32 @@ void require_bodies_of(const fem::World& there, const fem::World& world, const s
         what, fmt::join(theirs, ", "), fmt::join(ours, ", ")));
 }
 
-struct Beginning {
-  std::optional<State> start;  // nothing: the scene's
-  Json from;                   // what the summary tells of it; null likewise
-};
-
-Beginning beginning_of(const SimulateOptions& options, const scenes::Scene& scene, const fem::World& world) {
-  if (options.from.empty()) return {};
-  const PlanFolder other = read_plan_folder(options.from);
-  const int frames = int(other.plan.trajectory.frames.size()), frame = options.frame.value_or(frames - 1);
-  const State start = start_from(options.from, other, frame, scene, world);
-  return {start,
-          {{"folder", fs::relative(options.from, options.out).generic_string()},
-           {"frame", frame},
-           {"trajectory_hash", hex(plan::hash_of(other.plan.trajectory))}}};
-}
-
 void require_options(const SimulateOptions& options) {
-  if (options.frame && options.from.empty())
-    throw InputError("--frame goes with --from DIR: it is a frame of the motion in that folder");
-  if (!options.from.empty() && fs::exists(options.out) && fs::exists(options.from) &&
-      fs::equivalent(options.from, options.out))
-    throw InputError(fmt::format("{}: is the folder that the simulation begins from; name another with -o",
-                                 options.out.string()));
   if (!(options.duration_s > 0))
     throw InputError(
         fmt::format("--duration is {} s; it must be above 0, for example --duration 5s", options.duration_s));
 }
 
 }  // namespace
+
+Beginning beginning_of(const fs::path& from, std::optional<int> frame, const fs::path& out,
+                       const scenes::Scene& scene, const fem::World& world) {
+  if (frame && from.empty())
+    throw InputError("--frame goes with --from DIR: it is a frame of the motion in that folder");
+  if (from.empty()) return {};
+  const PlanFolder other = read_plan_folder(from);
+  const int chosen = frame.value_or(int(other.plan.trajectory.frames.size()) - 1);
+  return {start_from(from, other, chosen, scene, world),
+          {{"folder", fs::relative(from, out).generic_string()},
+           {"frame", chosen},
+           {"trajectory_hash", hex(plan::hash_of(other.plan.trajectory))}}};
+}
+
+void require_other_folder(const fs::path& from, const fs::path& out) {
+  if (!from.empty() && fs::exists(out) && fs::exists(from) && fs::equivalent(from, out))
+    throw InputError(
+        fmt::format("{}: is the folder that this motion begins from; name another with -o", out.string()));
+}
 
 State start_from(const fs::path& folder, const PlanFolder& other, int frame, const scenes::Scene& scene,
                  const fem::World& world) {
@@ -112,6 +109,7 @@ State start_from(const fs::path& folder, const PlanFolder& other, int frame, con
 
 Outcome simulate(const SimulateOptions& options) {
   require_options(options);
+  require_other_folder(options.from, options.out);
   const scenes::Scene scene =
       scenes::read_scene_file(scenes::find_scene(options.scene.scene), options.scene.sets, options.script);
   make_folder(options.out);
@@ -120,7 +118,7 @@ Outcome simulate(const SimulateOptions& options) {
   const std::vector<PreparedBody> bodies =
       prepare_bodies(scene, options.scene.data, options.out, options.scene.store);
   const fem::World world = build_world(scene, bodies);
-  const Beginning beginning = beginning_of(options, scene, world);
+  const Beginning beginning = beginning_of(options.from, options.frame, options.out, scene, world);
   const FemSystem system(world, {}, beginning.start);
   const fs::path file = options.out / "plan.npz";
 

@@ -1,4 +1,4 @@
-// A simulation that begins where another motion was.
+// A motion that begins where another one was.
 #pragma once
 
 #include "app/plan_folder.h"
@@ -12,5 +12,15 @@ namespace limber::app {
 // has another cage there, or a kinematic body was elsewhere.
 State start_from(const fs::path& folder, const PlanFolder& other, int frame, const scenes::Scene&,
                  const fem::World&);
+
+struct Beginning {
+  std::optional<State> start;  // nothing: the scene's
+  Json from;                   // what the summary tells of it; null likewise
+};
+// `from` may be empty, then there is no frame; the summary is of a motion in `out`. Throws as start_from.
+Beginning beginning_of(const fs::path& from, std::optional<int> frame, const fs::path& out,
+                       const scenes::Scene&, const fem::World&);
+// Throws InputError where they are one: what begins there would write over it.
+void require_other_folder(const fs::path& from, const fs::path& out);
 
 }  // namespace limber::app

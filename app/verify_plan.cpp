@@ -387,7 +387,7 @@ void check_claims(const PlanFolder& planned, const fem::World& world, const FemS
       wrong = "summary." + key + (within == "." ? "" : "." + within);
   for (const auto& [key, value] : planned.summary.items())
     if (!facts.contains(key) && key != "dynamics" && key != "shortcut" && key != "improve" &&
-        key != "refine" && key != "portfolio")
+        key != "refine" && key != "portfolio" && key != "from")
       wrong = "summary." + key;
   if (planned.summary.contains("portfolio") && !is_quickest(plan, planned.summary.at("portfolio")))
     wrong = "summary.portfolio";
@@ -482,7 +482,7 @@ void check_shapes(const MotionFigures& figures, const fem::World& world, Promise
   check_seen(figures, world.touches_on_surfaces(), table);
 }
 
-// Also false where no simulation could begin there.
+// Also false where no motion could begin there.
 bool starts_from(const fs::path& folder, const PlanFolder& other, int frame, const scenes::Scene& scene,
                  const fem::World& world, const State& start) {
   try {
@@ -492,7 +492,7 @@ bool starts_from(const fs::path& folder, const PlanFolder& other, int frame, con
   }
 }
 
-// Where a simulation begins. Of a frame of another motion the folder must be here, as it was then.
+// Where a motion begins. Of a frame of another motion the folder must be here, as it was then.
 void check_beginning(const fs::path& folder, const PlanFolder& planned, const fem::World& world,
                      Promises& table) {
   const State start = planned.plan.tree.states[0];
@@ -578,7 +578,10 @@ void check_plan(const fs::path& folder, const PlanFolder& planned, const std::ve
   table.row("the plan's settings are the scene's", other.empty(), other.empty() ? "" : other + " is not");
   table.row("the plan is of this world", plan.system_hash == system.hash(), hex(system.hash()));
 
-  check_start(plan, world, table);
+  if (begins_elsewhere(planned))
+    check_beginning(folder, planned, world, table);
+  else
+    check_start(plan, world, table);
 
   const Replay replay(system, plan, settings);
   const plan::Course& course = replay.course();

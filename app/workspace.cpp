@@ -60,7 +60,7 @@ void mark_surface(const DistanceField& field, plan::Workspace::Cell kind, plan::
 
 }  // namespace
 
-plan::Workspace workspace_of(const fem::World& world) {
+plan::Workspace workspace_of(const fem::World& world, const std::optional<State>& given) {
   plan::Workspace w;
   w.robot_radius_m = fem::inner_radius_m(world, world.robot);
   w.box = world.bounds_m, w.walls = world.walls;
@@ -68,12 +68,12 @@ plan::Workspace workspace_of(const fem::World& world) {
   w.cell_m = std::max(w.robot_radius_m / cells_a_radius, std::cbrt(size.prod() / most_cells));
   for (int i = 0; i < 3; ++i) w.cells[i] = std::max(1, int(std::ceil(size[i] / w.cell_m - 1e-9)));
   w.what.assign(std::size_t(w.cells.prod()), plan::Workspace::open);
-  const State start = fem::start_state(world);
+  const State start = given.value_or(fem::start_state(world));
   for (int b = 0; b < int(world.bodies.size()); ++b) {
     const fem::Body& body = world.bodies[std::size_t(b)];
     if (b == world.robot) continue;
     const auto kind = body.kind == fem::BodyKind::deformable ? plan::Workspace::soft : plan::Workspace::rigid;
-    const bool at_rest = !body.moving || world.parting.pairs.empty();
+    const bool at_rest = !body.moving || (!given && world.parting.pairs.empty());
     if (body.shape && at_rest) {
       mark_surface(body.shape->field, kind, w);
       continue;

@@ -277,7 +277,7 @@ List of_files() {
   return list;
 }
 
-// Of a simulation that begins as a frame of another motion, which is there.
+// Of a motion that begins as a frame of another one, which is there.
 List of_its_beginning() {
   List list;
   const std::string starts = "it starts as frame 4 of another motion";
@@ -331,7 +331,12 @@ class SimulationMutations_slow : public testing::Test {
       if (result.code != exit_done) trouble_ += result.err;
     };
     simulate("good", {});
-    simulate("on", {"--from", (shared_->path() / "good").string(), "--frame", "4"});
+    const std::string good = (shared_->path() / "good").string();
+    simulate("on", {"--from", good, "--frame", "4"});
+    const Result planned =
+        limber_program({"plan", scene, "-o", (shared_->path() / "planned").string(), "--from", good,
+                        "--frame", "4", "--set", "world.gravity_m_s2=[0, 0, 0]"});
+    if (planned.code != exit_done) trouble_ += planned.err;
   }
   static void TearDownTestSuite() { delete shared_; }
   void SetUp() override { ASSERT_EQ(trouble_, ""); }
@@ -386,6 +391,10 @@ TEST_F(SimulationMutations_slow, OfItsSummary) {
 }
 TEST_F(SimulationMutations_slow, OfFiles) { expect_named("good", of_files()); }
 TEST_F(SimulationMutations_slow, OfItsBeginning) { expect_named("on", of_its_beginning()); }
+TEST_F(SimulationMutations_slow, OfAPlansBeginning) {
+  expect_good("planned");
+  expect_named("planned", of_its_beginning());
+}
 
 }  // namespace
 }  // namespace limber::app

@@ -366,6 +366,61 @@ TEST_F(Simulate_slow, ASceneThatOnlyHappensNeedsNoRobotGoalOrPlanner) {
   }
 }
 
+// Planning goes on from a state that a motion has reached, robot and obstacles as they are there.
+TEST_F(Simulate_slow, APlanBeginsAsAFrameOfAnotherMotion) {
+  std::string text = small_scene;
+  const auto plan = [&](const std::string& name, std::vector<std::string> more) {
+    std::vector<std::string> words{"plan", scene(text), "-o", out(name), "--json"};
+    words.insert(words.end(), more.begin(), more.end());
+    return limber_program(words);
+  };
+  ASSERT_EQ(plan("plan", {"--preset", "fast"}).code, exit_done);
+  const Moved first = moved("plan");
+  const std::size_t frame = first.frames().size() / 2;
+  const std::vector<std::string> from{"--preset",  "fast",    "--from",
+                                      out("plan"), "--frame", std::to_string(frame)};
+  const auto with = [&](std::vector<std::string> more) {
+    more.insert(more.end(), from.begin(), from.end());
+    return more;
+  };
+  // To another goal, and in a softer world.
+  const std::vector<std::string> back{"--set", "goal.center_of_mass_m=[0.8, 1, 1.2]", "--set",
+                                      "bodies.block.youngs_modulus_pa=4e3"};
+  const Result result = plan("back", with(back));
+  ASSERT_EQ(result.code, exit_done) << result.err;
+  EXPECT_EQ(result.json().at("from").at("frame"), frame);
+  EXPECT_EQ(moved("back").frames()[0], first.frames()[frame]);
+  EXPECT_LT((moved("back").center(moved("back").frames().size() - 1) - Vec3(0.8, 1, 1.2)).norm(), 0.3 + 0.1);
+  const Table table = verify("back");
+  EXPECT_EQ(table.code, exit_done);
+  EXPECT_TRUE(table.kept.at(fmt::format("it starts as frame {} of another motion", frame)));
+  EXPECT_TRUE(table.kept.at("searched again from the scene: the same tree"));
+
+  // Cut short and resumed, it is the same plan.
+  std::vector<std::string> few = with(back), on = with(back);
+  few.insert(few.end(), {"--iterations", "1"}), on.emplace_back("--resume");
+  plan("cut", few);
+  EXPECT_EQ(plan("cut", back).code, exit_done) << "anew, from the scene's start";
+  EXPECT_NE(moved("cut").frames()[0], first.frames()[frame]);
+  plan("cut", few);
+  EXPECT_EQ(plan("cut", on).code, exit_done);
+  EXPECT_EQ(moved("cut").frames(), moved("back").frames());
+  std::vector<std::string> elsewhere = back;
+  elsewhere.insert(elsewhere.end(), {"--preset", "fast", "--resume"});
+  EXPECT_NE(plan("cut", elsewhere).err.find("the same --from and --frame"), std::string::npos);
+
+  for (const char* command : {"robust", "refine"}) {
+    std::vector<std::string> words{command, out("back")};
+    if (command == std::string("refine")) words.insert(words.end(), {"-o", out("fine")});
+    const Result refused = limber_program(words);
+    EXPECT_EQ(refused.code, exit_bad_input);
+    EXPECT_NE(refused.err.find(fmt::format("begins as frame {} of another motion", frame)), std::string::npos)
+        << refused.err;
+  }
+  EXPECT_NE(plan("plan", with({})).err.find("name another with -o"), std::string::npos);
+  EXPECT_EQ(plan("none", {"--frame", "1"}).code, exit_bad_input);
+}
+
 // An arrow of the colour of pushes, in the frames between which it acts, from where it acts.
 TEST_F(Simulate_slow, FilmShowsTheScenesForces) {
   const std::string push =
