@@ -10,6 +10,7 @@
 #include "core/threads.h"
 #include "fem/batch.h"
 #include "fem/observe.h"
+#include "scenes/models.h"
 
 namespace limber::app {
 
@@ -193,9 +194,13 @@ class FemSystem::Propagator final : public plan::Propagator {
     return rollout.control.steps - batch.steps_left(int(lane));
   }
 
-  plan::Look look(const fem::Batch& batch, int lane, int steps) const {
+  plan::Look look(const fem::Batch& batch, int lane, int steps) {
     const fem::Batch::Motion robot = batch.motion(lane, system_.world_.robot);
     plan::Look look{steps, robot.center_m, robot.velocity_m_s};
+    if (!system_.lead_nodes_.empty()) {
+      batch.peek(lane, peeked_);
+      look.center = system_.robot_center(peeked_), look.velocity = system_.robot_velocity(peeked_);
+    }
     if (system_.goal_.body >= 0)
       look.goal_shift = batch.motion(lane, system_.goal_.body).center_m - system_.goal_body_start_m_;
     if (const GoalRules& last = system_.last_->goal_; last.lost_below_m)
@@ -225,7 +230,10 @@ FemSystem::FemSystem(const fem::World& world, const GoalRules& goal, std::option
   for (const int body : {goal.body, goal.above, goal.below, goal.clear_of}) hasher.value(body);
   for (const auto& rule : {goal.lost_below_m, goal.turn_tolerance_deg, goal.shape_tolerance_m})
     hasher.value(int(rule.has_value())).value(rule.value_or(0));
-  for (const GoalRules& rules : goal.via) {
+  if (!goal.patches_m.empty()) find_patches(), hasher.text("patches").value(int(goal.lead));
+  for (const Box& patch : goal.patches_m) hasher.matrix(patch.lower).matrix(patch.upper);
+  for (GoalRules rules : goal.via) {
+    rules.patches_m = goal.patches_m, rules.lead = goal.lead;
     via_.push_back(std::unique_ptr<FemSystem>(new FemSystem(world, rules, given_start_, hash_of_world)));
     via_.back()->last_ = this;
     hasher.value(via_.back()->hash());
@@ -243,10 +251,40 @@ FemSystem::FemSystem(const fem::World& world, const std::vector<PreparedBody>& b
 }
 
 State FemSystem::start() const { return given_start_ ? *given_start_ : fem::start_state(world_); }
+void FemSystem::find_patches() {
+  const fem::Body& robot = world_.bodies[std::size_t(world_.robot)];
+  for (const Box& patch : goal_.patches_m) {
+    const Vec3 middle = (patch.lower + patch.upper) / 2;
+    int nearest = -1;
+    double least = std::numeric_limits<double>::infinity();
+    for (int n = 0; n < robot.node_count(); ++n)
+      if (const double d = (robot.cage.positions.row(n).transpose() - middle).squaredNorm();
+          !robot.fixed[std::size_t(n)] && d < least)
+        nearest = n, least = d;
+    patch_nodes_.push_back(nearest);
+  }
+  if (!goal_.lead) return;
+  lead_nodes_ = scenes::nodes_in(goal_.patches_m[0], world_.bounds_m, robot.cage.positions);
+  if (lead_nodes_.empty()) lead_nodes_ = {patch_nodes_[0]};
+  for (const int n : lead_nodes_) lead_mass_kg_ += robot.node_mass_kg[std::size_t(n)];
+}
+// Of the nodes that lead, the mean of what the state has of each, by their
+// masses.
+Vec3 FemSystem::mean_of_lead(const std::vector<float>& of_nodes) const {
+  const fem::Body& robot = world_.bodies[std::size_t(world_.robot)];
+  Vec3 sum = Vec3::Zero();
+  for (const int n : lead_nodes_)
+    for (int c = 0; c < 3; ++c)
+      sum[c] += robot.node_mass_kg[std::size_t(n)] *
+                double(of_nodes[3 * std::size_t(robot.first_node + n) + std::size_t(c)]);
+  return sum / lead_mass_kg_;
+}
 Vec3 FemSystem::robot_center(const State& state) const {
+  if (!lead_nodes_.empty()) return mean_of_lead(state.positions);
   return fem::center_of_mass_m(world_, state, world_.robot);
 }
 Vec3 FemSystem::robot_velocity(const State& state) const {
+  if (!lead_nodes_.empty()) return mean_of_lead(state.velocities);
   return fem::center_velocity_m_s(world_, state, world_.robot);
 }
 double FemSystem::robot_mass_kg() const { return world_.bodies[std::size_t(world_.robot)].mass_kg; }
@@ -254,6 +292,9 @@ double FemSystem::mean_speed(const State& state) const {
   return fem::mean_speed_m_s(world_, state, world_.robot);
 }
 int FemSystem::robot_nodes() const { return world_.bodies[std::size_t(world_.robot)].node_count(); }
+int FemSystem::control_node(int drawn) const {
+  return patch_nodes_.empty() ? drawn : patch_nodes_[std::size_t(drawn) % patch_nodes_.size()];
+}
 Box FemSystem::sample_bounds() const { return world_.bounds_m; }
 double FemSystem::dt_s() const { return world_.dt_s; }
 std::uint64_t FemSystem::hash() const { return hash_; }

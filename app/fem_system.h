@@ -21,7 +21,11 @@ struct GoalRules {
   std::optional<double> shape_tolerance_m;   // no node is farther from its place in that shape
   int above = -1, below = -1;                // the whole robot is higher, lower than all of this body
   int clear_of = -1;                         // no contact with this body pushes the robot
-  std::vector<GoalRules> via;                // of the goals before it, likewise; lost_below_m is of the last
+  // Where control points are, in world coordinates at the start; empty: at any node. With `lead` the middle
+  // of the first is where the robot is taken to be. Those of all goals are the last one's.
+  std::vector<Box> patches_m;
+  bool lead = false;
+  std::vector<GoalRules> via;  // of the goals before it, likewise; lost_below_m is of the last
 };
 
 class FemSystem final : public plan::System {
@@ -41,6 +45,7 @@ class FemSystem final : public plan::System {
   double robot_mass_kg() const override;
   double mean_speed(const State&) const override;
   int robot_nodes() const override;
+  int control_node(int drawn) const override;
   Box sample_bounds() const override;
   double dt_s() const override;
   std::uint64_t hash() const override;
@@ -60,10 +65,15 @@ class FemSystem final : public plan::System {
  private:
   class Propagator;
   FemSystem(const fem::World&, const GoalRules&, std::optional<State> start, std::uint64_t hash_of_world);
+  void find_patches();
+  Vec3 mean_of_lead(const std::vector<float>& of_nodes) const;
   const fem::World& world_;
   std::optional<State> given_start_;
   GoalRules goal_;
   std::vector<std::unique_ptr<FemSystem>> via_;
+  std::vector<int> patch_nodes_;  // of the robot, nearest to the middles of the patches
+  std::vector<int> lead_nodes_;   // of the robot; empty: no patch leads
+  double lead_mass_kg_ = 0;
   const FemSystem* last_ = this;  // on the leg to the last goal: what is lost to it is lost
   Vec3 goal_body_start_m_;
   std::uint64_t hash_;

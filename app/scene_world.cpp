@@ -425,6 +425,7 @@ GoalRules goal_rules_of(const scenes::Scene& scene) {
   };
   GoalRules rules = rules_of(scene.goal);
   for (const scenes::Via& via : scene.via) rules.via.push_back(rules_of(via.goal));
+  rules.patches_m = scene.planner.patches_m, rules.lead = scene.planner.lead;
   return rules;
 }
 
@@ -520,6 +521,26 @@ bool all_touched_at_cages(const scenes::Scene& scene) {
                      [](const scenes::BodySpec& body) { return body.contact == scenes::Contact::cage; });
 }
 
+namespace {
+
+void require_patches(const scenes::Scene& scene, const PreparedBody& robot) {
+  const std::vector<int> held =
+      scenes::fixed_nodes(scene.bodies[std::size_t(scene.robot)], scene.bounds_m, robot.cage.positions);
+  for (std::size_t i = 0; i < scene.planner.patches_m.size(); ++i) {
+    const std::vector<int> nodes =
+        scenes::nodes_in(scene.planner.patches_m[i], scene.bounds_m, robot.cage.positions);
+    if (std::includes(held.begin(), held.end(), nodes.begin(),
+                      nodes.end()))  // none are, too
+      throw InputError(
+          fmt::format("{}: planner.patches: no node of the "
+                      "robot's cage that can be pushed is in "
+                      "box {}; enlarge or move it",
+                      scene.planner.patches_where, i));
+  }
+}
+
+}  // namespace
+
 fem::World build_world(const scenes::Scene& scene, const std::vector<PreparedBody>& prepared,
                        const std::vector<float>& start_positions) {
   fem::WorldSpec spec;
@@ -545,6 +566,7 @@ fem::World build_world(const scenes::Scene& scene, const std::vector<PreparedBod
     set_parts(body, prepared[b], share, fem_body);
     spec.bodies.push_back(std::move(fem_body));
   }
+  require_patches(scene, prepared[std::size_t(scene.robot)]);
   set_script(scene, prepared, spec);
   set_contact(scene, prepared, spec);
   spec.robot = scene.robot;

@@ -189,6 +189,11 @@ struct PlannerSpec {
   double min_force_share = 0, max_force_share = 0;  // of max_force_n, drawn evenly between
   double min_duration_s = 0, max_duration_s = 0;    // one manipulation is held so long, drawn evenly between
   double control_point_radius_m = 0;
+  // Where control points are, in world coordinates at the start; empty: at any
+  // node. With `lead` the first one's middle is where the robot is taken to be.
+  std::vector<Box> patches_m;
+  bool lead = false;
+  std::string patches_where;      // their place in the text, for complaints
   double settle_time_s = 0;       // the robot gets at most so long to come to rest at the goal,
   double settle_speed_m_s = 0;    // which it does when its mean speed is below this
   double settle_force_share = 0;  // of max_force_n: the largest force of the settle

@@ -576,6 +576,21 @@ constexpr Key all_keys[] = {
     {"planner.control_point_radius_m", Type::number, positive, 0, "0.25",
      "m; round the node, in the rest shape; wider where that is less than a tenth of the robot's mass", "",
      ""},
+    {"planner.patches_m", Type::boxes, any, 0, "[]",
+     "m; in world coordinates at the start: control points are in these boxes alone, one as often as "
+     "another, "
+     "each at the node of the robot's cage that is nearest to the box's middle",
+     "", ""},
+    {"planner.lead",
+     Type::boolean,
+     {},
+     0,
+     "false",
+     "the first of these patches leads: the mean of its nodes, by mass, is what is near, guided, and in a "
+     "goal, "
+     "wherever else the centre of mass is; goes with weights.interpolation = 0 and settle_time_s = 0",
+     "",
+     ""},
     {"planner.settle_time_s", Type::number, from_to(0, 100), 0, "3.0",
      "s; at the goal the robot is given at most so long to come to rest", "", ""},
     {"planner.settle_speed_m_s", Type::number, positive, 0, "0.02",
