@@ -510,14 +510,15 @@ void check_beginning(const fs::path& folder, const PlanFolder& planned, const fe
     const PlanFolder there = read_plan_folder(other);
     read_bodies_of(there, other);
     if (hex(plan::hash_of(there.plan.trajectory)) == from.at("trajectory_hash")) {
-      table.row(promise, starts_from(other, there, frame, planned.scene, world, start), name);
+      table.row(promise, starts_from(other, there, frame, planned.scene, world, start),
+                fmt::format("{}, of which limber verify tells apart", name));
       return;
     }
-    why = "holds another motion now";
+    why = "holds another motion";
   } catch (const InputError& error) {
-    why = "is not here any more";
+    why = "is not here";
   }
-  table.measured(promise + ", taken for granted", fmt::format("{} {}", name, why));
+  table.row(promise, false, fmt::format("{} {}, so nobody can tell; put back what it began from", name, why));
 }
 
 void check_claims_of_simulation(const PlanFolder& planned, const fem::World& world, const FemSystem& system,

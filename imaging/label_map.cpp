@@ -20,21 +20,40 @@ namespace limber::imaging {
 
 namespace detail {
 
-int bytes_of(Number number) {
+namespace {
+
+// Calls body(T()) with the type that the numbers have.
+template <class Body>
+auto with_type_of(Number number, const Body& body) {
   switch (number) {
     case Number::i8:
+      return body(std::int8_t());
     case Number::u8:
-      return 1;
+      return body(std::uint8_t());
     case Number::i16:
+      return body(std::int16_t());
     case Number::u16:
-      return 2;
+      return body(std::uint16_t());
     case Number::i32:
+      return body(std::int32_t());
     case Number::u32:
+      return body(std::uint32_t());
+    case Number::i64:
+      return body(std::int64_t());
+    case Number::u64:
+      return body(std::uint64_t());
     case Number::f32:
-      return 4;
-    default:
-      return 8;
+      return body(float());
+    case Number::f64:
+      return body(double());
   }
+  throw InternalError("a type of numbers that is none");
+}
+
+}  // namespace
+
+int bytes_of(Number number) {
+  return with_type_of(number, [](auto value) { return int(sizeof value); });
 }
 
 void require_size(const std::array<std::int64_t, 3>& size, const std::string& file) {
@@ -143,28 +162,7 @@ void take_voxels(const RawVoxels& raw, const std::string& file, LabelMap& map) {
                     "wrong",
                     file, raw.bytes.size(), needed, map.size));
   map.material.resize(std::size_t(map.voxels()));
-  switch (raw.number) {
-    case Number::i8:
-      return take<std::int8_t>(raw, file, map);
-    case Number::u8:
-      return take<std::uint8_t>(raw, file, map);
-    case Number::i16:
-      return take<std::int16_t>(raw, file, map);
-    case Number::u16:
-      return take<std::uint16_t>(raw, file, map);
-    case Number::i32:
-      return take<std::int32_t>(raw, file, map);
-    case Number::u32:
-      return take<std::uint32_t>(raw, file, map);
-    case Number::i64:
-      return take<std::int64_t>(raw, file, map);
-    case Number::u64:
-      return take<std::uint64_t>(raw, file, map);
-    case Number::f32:
-      return take<float>(raw, file, map);
-    case Number::f64:
-      return take<double>(raw, file, map);
-  }
+  with_type_of(raw.number, [&](auto value) { take<decltype(value)>(raw, file, map); });
 }
 
 void require_frame(const LabelMap& map, const std::string& file) {
@@ -182,10 +180,13 @@ void require_frame(const LabelMap& map, const std::string& file) {
 
 namespace {
 
+constexpr std::size_t head_bytes = 352;
+
+// More of them than that, compressed or not, or all that there are.
 std::string first_bytes(const fs::path& path) {
   std::error_code none;
   if (!fs::is_regular_file(path, none)) return "";
-  std::string bytes(352, '\0');
+  std::string bytes(4 * head_bytes, '\0');
   std::ifstream file(path, std::ios::binary);
   file.read(bytes.data(), std::streamsize(bytes.size()));
   bytes.resize(std::size_t(file.gcount()));
@@ -209,11 +210,11 @@ bool is_nrrd(std::string_view bytes) { return bytes.starts_with("NRRD000"); }
 
 bool is_label_map(const fs::path& path) {
   std::string bytes = first_bytes(path);
-  if (detail::is_gzip(bytes)) {
-    const std::string name = path.string();
-    if (!name.ends_with(".nii.gz")) return false;
-    return true;
-  }
+  if (detail::is_gzip(bytes)) try {
+      bytes = detail::inflate(bytes, head_bytes, path.string());
+    } catch (const InputError&) {
+      return false;
+    }
   return is_nifti(bytes) || is_nrrd(bytes);
 }
 

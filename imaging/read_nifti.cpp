@@ -4,6 +4,7 @@
 #include <bit>
 #include <cmath>
 #include <cstring>
+#include <map>
 
 #include <zlib.h>
 
@@ -51,31 +52,14 @@ class Header {
 };
 
 Number number_of(int code, const std::string& file) {
-  switch (code) {
-    case 2:
-      return Number::u8;
-    case 4:
-      return Number::i16;
-    case 8:
-      return Number::i32;
-    case 16:
-      return Number::f32;
-    case 64:
-      return Number::f64;
-    case 256:
-      return Number::i8;
-    case 512:
-      return Number::u16;
-    case 768:
-      return Number::u32;
-    case 1024:
-      return Number::i64;
-    case 1280:
-      return Number::u64;
-    default:
-      throw InputError(
-          fmt::format("{}: has voxels of type {}, which are no labels; write whole numbers", file, code));
-  }
+  static const std::map<int, Number> known{
+      {2, Number::u8},   {4, Number::i16},   {8, Number::i32},   {16, Number::f32},   {64, Number::f64},
+      {256, Number::i8}, {512, Number::u16}, {768, Number::u32}, {1024, Number::i64}, {1280, Number::u64}};
+  const auto found = known.find(code);
+  if (found == known.end())
+    throw InputError(
+        fmt::format("{}: has voxels of type {}, which are no labels; write whole numbers", file, code));
+  return found->second;
 }
 
 // Turns by the unit quaternion (√(1 − b² − c² − d²), b, c, d), then steps, the third reversed where qfac is

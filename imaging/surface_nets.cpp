@@ -173,8 +173,11 @@ class Nets {
     if (i < 0 || j < 0 || k < 0 || i >= map_.size[0] || j >= map_.size[1] || k >= map_.size[2]) return 0;
     return material_[std::size_t(i + std::int64_t(map_.size[0]) * (j + std::int64_t(map_.size[1]) * k))];
   }
-  std::int64_t point(int i, int j, int k) const {
-    return i + std::int64_t(points_[0]) * (j + std::int64_t(points_[1]) * k);
+  bool has(const Eigen::Vector3i& p) const {
+    return (p.array() >= 0).all() && p.x() < points_[0] && p.y() < points_[1] && p.z() < points_[2];
+  }
+  std::int64_t point(const Eigen::Vector3i& p) const {
+    return p.x() + std::int64_t(points_[0]) * (p.y() + std::int64_t(points_[1]) * p.z());
   }
   std::array<int, 8> round(int i, int j, int k) const {
     std::array<int, 8> materials;
@@ -193,7 +196,8 @@ class Nets {
   void smooth();
   void unfold();
   bool is_whole(const Eigen::Vector3i& voxel) const;
-  Vec3 middle_of(const Eigen::Vector3i& voxel) const;
+  std::array<Vec3, 8> corners_of(const Eigen::Vector3i& voxel) const;
+  static Vec3 middle_of(const std::array<Vec3, 8>& corners);
   LabelSurface surface(int row) const;
   class OneLabel;
 
@@ -260,7 +264,7 @@ void Nets::find_boundary() {
       for (int i = 0; i < points_[0]; ++i) {
         const std::array<int, 8> m = round(i, j, k);
         if (std::any_of(m.begin(), m.end(), [&](int one) { return one != m[0]; }))
-          boundary_.set(point(i, j, k));
+          boundary_.set(point({i, j, k}));
       }
   }
   boundary_.count();
@@ -272,7 +276,7 @@ void Nets::find_boundary() {
   for (int k = 0; k < points_[2]; ++k)
     for (int j = 0; j < points_[1]; ++j)
       for (int i = 0; i < points_[0]; ++i) {
-        if (!boundary_.test(point(i, j, k))) continue;
+        if (!boundary_.test(point({i, j, k}))) continue;
         grid_.emplace_back(i, j, k);
         const std::array<int, 8> m = round(i, j, k);
         std::uint8_t bits = 0;
@@ -302,7 +306,7 @@ void Nets::smooth() {
     });
   };
   for_all([&](std::size_t r) {
-    const std::int64_t at = point(grid_[r].x(), grid_[r].y(), grid_[r].z());
+    const std::int64_t at = point(grid_[r]);
     for (int e = 0; e < 6; ++e)
       neighbour[r][std::size_t(e)] =
           edges_[r] >> e & 1
@@ -330,45 +334,44 @@ void Nets::smooth() {
   unfold();
 }
 
+std::array<Vec3, 8> Nets::corners_of(const Eigen::Vector3i& voxel) const {
+  std::array<Vec3, 8> corners;
+  for (int c = 0; c < 8; ++c) {
+    const Eigen::Vector3i p = voxel + Eigen::Vector3i(c & 1, c >> 1 & 1, c >> 2 & 1);
+    const bool moved = has(p) && boundary_.test(point(p));
+    corners[std::size_t(c)] = moved ? grid_of(boundary_.rank(point(p))) : Vec3(p.cast<double>());
+  }
+  return corners;
+}
+
+Vec3 Nets::middle_of(const std::array<Vec3, 8>& corners) {
+  Vec3 sum = Vec3::Zero();
+  for (const Vec3& corner : corners) sum += corner;
+  return sum / 8;
+}
+
 // Whether the voxel between its moved corners is seen whole from the middle of them: then no two voxels
 // overlap, and no surface made of their faces meets itself.
 bool Nets::is_whole(const Eigen::Vector3i& voxel) const {
-  std::array<Vec3, 8> corner;
-  std::array<std::int64_t, 8> rank;
-  Vec3 middle = Vec3::Zero();
-  for (int c = 0; c < 8; ++c) {
-    const Eigen::Vector3i p = voxel + Eigen::Vector3i(c & 1, c >> 1 & 1, c >> 2 & 1);
-    const bool inside =
-        (p.array() >= 0).all() && p.x() < points_[0] && p.y() < points_[1] && p.z() < points_[2];
-    const std::int64_t number = inside ? point(p.x(), p.y(), p.z()) : -1;
-    rank[std::size_t(c)] = number;
-    corner[std::size_t(c)] =
-        inside && boundary_.test(number) ? grid_of(boundary_.rank(number)) : Vec3(p.cast<double>());
-    middle += corner[std::size_t(c)] / 8;
-  }
+  const std::array<Vec3, 8> corners = corners_of(voxel);
+  const Vec3 middle = middle_of(corners);
   for (int axis = 0; axis < 3; ++axis)
     for (const int side : {0, 1}) {
-      const int a = (axis + 1) % 3, b = (axis + 2) % 3, first = side << axis;
-      std::array<std::size_t, 4> q{std::size_t(first), std::size_t(first | 1 << a),
-                                   std::size_t(first | 1 << a | 1 << b), std::size_t(first | 1 << b)};
-      const std::size_t from = diagonal({corner[q[0]], corner[q[1]], corner[q[2]], corner[q[3]]},
-                                        {rank[q[0]], rank[q[1]], rank[q[2]], rank[q[3]]});
+      const int a = 1 << (axis + 1) % 3, b = 1 << (axis + 2) % 3, first = side << axis;
+      std::array<Vec3, 4> face;
+      std::array<std::int64_t, 4> number;
+      for (std::size_t q = 0; q < 4; ++q) {
+        const int c = first | (q == 1 || q == 2 ? a : 0) | (q >= 2 ? b : 0);
+        face[q] = corners[std::size_t(c)];
+        number[q] = point(voxel + Eigen::Vector3i(c & 1, c >> 1 & 1, c >> 2 & 1));
+      }
+      const std::size_t from = diagonal(face, number);
       for (const std::size_t half : {from, from + 2}) {
-        const auto at = [&](std::size_t n) -> Vec3 { return corner[q[(half + n) % 4]] - middle; };
+        const auto at = [&](std::size_t n) -> Vec3 { return face[(half + n) % 4] - middle; };
         if ((side ? 1 : -1) * at(0).cross(at(1)).dot(at(2)) < least_tet) return false;
       }
     }
   return true;
-}
-
-Vec3 Nets::middle_of(const Eigen::Vector3i& voxel) const {
-  Vec3 middle = Vec3::Zero();
-  for (int c = 0; c < 8; ++c) {
-    const Eigen::Vector3i p = voxel + Eigen::Vector3i(c & 1, c >> 1 & 1, c >> 2 & 1);
-    const std::int64_t number = point(p.x(), p.y(), p.z());
-    middle += (boundary_.test(number) ? grid_of(boundary_.rank(number)) : Vec3(p.cast<double>())) / 8;
-  }
-  return middle;
 }
 
 // Corners of voxels that are not whole go back towards their places, until all are.
@@ -394,10 +397,7 @@ void Nets::unfold() {
       for (int c = 0; c < 27; ++c) {
         const Eigen::Vector3i p =
             grid_[std::size_t(all[n])] + Eigen::Vector3i(c % 3 - 1, c / 3 % 3 - 1, c / 9 - 1);
-        if ((p.array() < 0).any() || p.x() >= points_[0] || p.y() >= points_[1] || p.z() >= points_[2])
-          continue;
-        const std::int64_t number = point(p.x(), p.y(), p.z());
-        if (boundary_.test(number)) again.push_back(std::int32_t(boundary_.rank(number)));
+        if (has(p) && boundary_.test(point(p))) again.push_back(std::int32_t(boundary_.rank(point(p))));
       }
     }
     std::sort(again.begin(), again.end());
@@ -462,7 +462,7 @@ int Nets::OneLabel::vertex(std::int64_t key, const Vec3& grid, bool touches) {
 
 Nets::OneLabel::Corner Nets::OneLabel::corner(const Eigen::Vector3i& point, const Eigen::Vector3i& inside,
                                               const Eigen::Vector3i& outside, bool touches) {
-  const std::int64_t rank = nets_.boundary_.rank(nets_.point(point.x(), point.y(), point.z()));
+  const std::int64_t rank = nets_.boundary_.rank(nets_.point(point));
   const std::array<int, 8> m = nets_.round(point.x(), point.y(), point.z());
   int mask = 0;
   for (int bit = 0; bit < 8; ++bit) mask |= (m[std::size_t(bit)] == row_) << bit;
@@ -515,7 +515,7 @@ void Nets::OneLabel::add_face(const Eigen::Vector3i& inside, int axis, int side)
   const std::size_t from = diagonal({nets_.grid_of(c[0].rank), nets_.grid_of(c[1].rank),
                                      nets_.grid_of(c[2].rank), nets_.grid_of(c[3].rank)},
                                     {c[0].rank, c[1].rank, c[2].rank, c[3].rank});
-  const Vec3 middle = nets_.middle_of(inside);
+  const Vec3 middle = middle_of(nets_.corners_of(inside));
   const bool flip = (side == 0) != (nets_.map_.axes_m.determinant() < 0);
   for (const std::size_t half : {from, from + 2}) {
     std::vector<int> rim;

@@ -304,6 +304,13 @@ List of_its_beginning() {
     m.planned.summary["from"]["frame"] = -1;
     m.write_summary();
   });
+  for (const auto& [key, value] :
+       {std::pair("trajectory_hash", "0123456789abcdef"), {"folder", "../nowhere"}})
+    add(fmt::format("a start of one's own, and of its {} another", key), starts, [key, value](Mutant& m) {
+      change_start(m.planned.plan, [](State& s) { s.positions[0] += 1e-4f; });
+      m.planned.summary["from"][key] = value;
+      m.write();
+    });
   add("from the scene", "", [](Mutant& m) {
     m.planned.summary.erase("from");
     m.write();
