@@ -29,6 +29,7 @@ void write_seeds(const limber::fs::path& folder) {
 limber::meshing::detail::PolygonSoup limber::meshing::detail::read_by_assimp(const fs::path&) {
   throw InputError("a format for assimp");
 }
+std::vector<std::string> limber::meshing::detail::endings_of_assimp() { return {}; }
 
 extern "C" int LLVMFuzzerInitialize(int* argc, char*** argv) {
   for (int i = 1; i < *argc; ++i) {
