@@ -167,10 +167,17 @@ void add_simulate(CLI::App& command, SimulateOptions& options) {
   command.add_option("-o,--out", options.out, "work folder; it is made where it is missing")
       ->required()
       ->type_name("DIR");
-  command.add_option("--duration", options.duration_s, "how long, from its start: 5, 5s, 2min or 1h")
+  command
+      .add_option("--duration", options.duration_s,
+                  "how long, from its start: 5, 5s, 2min or 1h; default: 5s, or as long as the plan that is "
+                  "followed")
       ->transform(CLI::AsNumberWithUnit(std::map<std::string, double>{{"s", 1}, {"min", 60}, {"h", 3600}},
-                                        CLI::AsNumberWithUnit::DEFAULT, "s|min|h"))
-      ->capture_default_str();
+                                        CLI::AsNumberWithUnit::DEFAULT, "s|min|h"));
+  command
+      .add_option("--follow", options.follow,
+                  "push the robot along the path of the plan in this folder, by feedback, with no more than "
+                  "planner.max_force_n of this scene")
+      ->type_name("DIR");
   command
       .add_option("--control", options.script,
                   "a TOML file with more [[forces]] and [[motions]], as the scene has them")
@@ -672,6 +679,8 @@ int run_command_line(int argc, const char* const* argv) {
       .add_option("--turn", robust_options.force_deg, "and is turned by up to so many degrees, 0 … 90")
       ->check(within(0.0, 90.0))
       ->capture_default_str();
+  robust_command.add_flag("--follow", robust_options.follow,
+                          "also follow the plan's path by feedback in the same worlds under the same errors");
   add_global(robust_command, global), add_threads(robust_command, global);
   robust_command.callback([&] { chosen = [&] { return robust(robust_options); }; });
 

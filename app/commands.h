@@ -100,11 +100,12 @@ Outcome plan(const PlanOptions&);
 struct SimulateOptions {
   SceneOptions scene;
   fs::path out;
-  double duration_s = 5;     // > 0, from the start
-  fs::path script;           // more forces and motions; empty: the scene's alone
-  fs::path from;             // a folder with a plan or a simulation; empty: the scene's start
-  std::optional<int> frame;  // of `from`
-  bool resume = false;       // go on from the simulation in `out`
+  std::optional<double> duration_s;  // > 0, from the start; nothing: 5 s, or as long as the plan followed
+  fs::path script;                   // more forces and motions; empty: the scene's alone
+  fs::path from;                     // a folder with a plan or a simulation; empty: the scene's start
+  std::optional<int> frame;          // of `from`
+  bool resume = false;               // go on from the simulation in `out`
+  fs::path follow;  // a folder with a plan that is followed by feedback; empty: no control acts
 };
 // The scene left to itself: initial velocities, forces and motions that it tells, no search.
 Outcome simulate(const SimulateOptions&);
@@ -192,6 +193,7 @@ struct RobustOptions {
   double material_share = 0.1;  // Young's modulus, density and friction of each body: ± this
   double force_share = 0.1;     // each control's force: ± this,
   double force_deg = 5;         // and turned by up to so much
+  bool follow = false;          // besides open loop
 };
 // The found plan replayed in worlds that are a little different: a report, no verdict.
 Outcome robust(const RobustOptions&);

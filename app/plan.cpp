@@ -235,7 +235,7 @@ Json facts_of_motion(const plan::Plan& plan, const fem::World& world, const Moti
 
 Json facts_of_simulation(const plan::Plan& plan, const fem::World& world, const MotionFigures& figures) {
   Json json = facts_of_motion(plan, world, figures);
-  json.erase("largest_force_n");  // of controls, and there are none
+  if (!plan.simulation->steered) json.erase("largest_force_n");  // of controls, and there are none
   json["simulation"] = {{"duration_s", plan.simulation->duration_s},
                         {"starts_at_s", double(plan.tree.states.steps()[0]) * world.dt_s},
                         {"forces", world.forces.size()},

@@ -50,6 +50,16 @@ void require_summary(const PlanFolder& planned, const fs::path& file) {
     require_like(planned.summary.at("from"), {{"folder", ""}, {"frame", -1}, {"trajectory_hash", ""}},
                  Keys::all, file.string() + ": given.summary.from",
                  planned.plan.simulation ? "simulate anew with limber simulate" : remedy);
+  if (planned.summary.contains("follows"))
+    require_like(planned.summary.at("follows"),
+                 {{"folder", ""},
+                  {"trajectory_hash", ""},
+                  {"farthest_from_path_m", 0.5},
+                  {"largest_force_n", 0.5},
+                  {"distance_m", 0.5},
+                  {"speed_m_s", 0.5},
+                  {"reaches", true}},
+                 Keys::all, file.string() + ": given.summary.follows", "simulate anew with limber simulate");
   kinds_of(planned.cage_hashes, Json::object(), "cage_hashes");
   for (const auto& [body, hash] : planned.cage_hashes.items()) kinds_of(hash, "", "cage_hashes");
 }

@@ -89,11 +89,11 @@ Outcome refine(const RefineOptions& options) {
   json["coarse_tets"] = tets_of(coarse_bodies);
   json["tets"] = tets_of(bodies);
   const std::string text = fmt::format(
-      "  refine       {}; followed for {:.2f} s, at most {:.3f} m off; {} iterations; CPU s: replay {:.2f}, "
-      "following "
-      "{:.2f}, search {:.2f}\n",
-      json.at("how").get<std::string>(), report.tracked_s, report.largest_error_m, report.iterations,
-      report.replay_cpu_s, report.track_cpu_s, report.search_cpu_s);
+      "  refine       {}; replayed to {:.3f} m from the goal, followed for {:.2f} s, at most {:.3f} m off; "
+      "{} "
+      "iterations; CPU s: replay {:.2f}, following {:.2f}, search {:.2f}\n",
+      json.at("how").get<std::string>(), report.replay_distance_m, report.tracked_s, report.largest_error_m,
+      report.iterations, report.replay_cpu_s, report.track_cpu_s, report.search_cpu_s);
   const Outcome outcome =
       keep_plan(options.out, scene, bodies, world, system, plan, {{"refine", json}}, text);
   throw_if_stopped();

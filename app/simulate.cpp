@@ -1,6 +1,7 @@
 #include "app/simulate.h"
 
 #include "app/commands.h"
+#include "app/follow_plan.h"
 #include "app/scene_world.h"
 #include "core/error.h"
 #include "core/events.h"
@@ -46,10 +47,27 @@ void require_bodies_of(const fem::World& there, const fem::World& world, const s
         what, fmt::join(theirs, ", "), fmt::join(ours, ", ")));
 }
 
+std::string text_of_following(const Json& follows, const fs::path& folder) {
+  return fmt::format(
+      "  follows      {}; at most {:.3f} m from its path, with at most {:.4g} N\n"
+      "  goal         {}: {:.3f} m from it at {:.4f} m/s\n",
+      folder.string(), follows.at("farthest_from_path_m").get<double>(),
+      follows.at("largest_force_n").get<double>(),
+      follows.at("reaches").get<bool>() ? "reached" : "not reached", follows.at("distance_m").get<double>(),
+      follows.at("speed_m_s").get<double>());
+}
+
 void require_options(const SimulateOptions& options) {
-  if (!(options.duration_s > 0))
-    throw InputError(
-        fmt::format("--duration is {} s; it must be above 0, for example --duration 5s", options.duration_s));
+  if (options.duration_s && !(*options.duration_s > 0))
+    throw InputError(fmt::format("--duration is {} s; it must be above 0, for example --duration 5s",
+                                 *options.duration_s));
+  if (options.follow.empty()) return;
+  if (!options.from.empty())
+    throw InputError("--follow begins where the plan begins, and --from elsewhere; leave one of the two out");
+  if (options.resume) throw InputError("--resume does not go with --follow; simulate anew, without --resume");
+  if (fs::exists(options.out) && fs::exists(options.follow) && fs::equivalent(options.follow, options.out))
+    throw InputError(fmt::format("{}: is the folder of the plan that is followed; name another with -o",
+                                 options.out.string()));
 }
 
 }  // namespace
@@ -120,6 +138,9 @@ Outcome simulate(const SimulateOptions& options) {
   const fem::World world = build_world(scene, bodies);
   const Beginning beginning = beginning_of(options.from, options.frame, options.out, scene, world);
   const FemSystem system(world, {}, beginning.start);
+  std::optional<FollowedPlan> followed;
+  if (!options.follow.empty()) followed.emplace(options.follow, scene, world);
+  const double duration_s = options.duration_s.value_or(followed ? followed->duration_s() : 5);
   const fs::path file = options.out / "plan.npz";
 
   std::optional<plan::Plan> earlier;
@@ -131,11 +152,12 @@ Outcome simulate(const SimulateOptions& options) {
   }
   plan::Plan plan;
   try {
-    Progress progress("simulating", std::int64_t(1000 * options.duration_s));
+    Progress progress("simulating", std::int64_t(1000 * duration_s));
     const double frames_per_second = scene.film.frames_per_second / scene.film.speed;
     plan = plan::simulate_for(
-        system, options.duration_s, frames_per_second, std::move(earlier),
-        [&](double now_s) { progress.update(std::int64_t(1000 * now_s), fmt::format("{:.2f} s", now_s)); });
+        system, duration_s, frames_per_second, std::move(earlier),
+        [&](double now_s) { progress.update(std::int64_t(1000 * now_s), fmt::format("{:.2f} s", now_s)); },
+        followed ? [&](const State& state) { return followed->next(state); } : plan::Steer());
   } catch (const InputError& error) {
     throw InputError(fmt::format("{}: {}", options.resume ? file.string() : "--duration", error.what()));
   }
@@ -148,14 +170,19 @@ Outcome simulate(const SimulateOptions& options) {
   }
   Json extra;
   if (!beginning.from.is_null()) extra["from"] = beginning.from;
-  const std::string extra_text =
-      extra.is_null() ? ""
-                      : fmt::format("  from         frame {} of {}\n",
-                                    extra.at("from").at("frame").get<int>(), options.from.string());
+  std::string extra_text = extra.is_null()
+                               ? ""
+                               : fmt::format("  from         frame {} of {}\n",
+                                             extra.at("from").at("frame").get<int>(), options.from.string());
+  if (followed) {
+    extra["follows"] = followed->facts(plan, options.out);
+    extra_text = text_of_following(extra.at("follows"), options.follow);
+  }
   const Outcome outcome =
       keep_measured_plan(options.out, scene, bodies, world, system, plan, figures, extra, extra_text);
   if (stop_signal() != 0) {
-    log::info("{}: what was simulated is kept; go on with --resume", file.string());
+    log::info("{}: what was simulated is kept; {}", file.string(),
+              followed ? "simulate anew for the rest" : "go on with --resume");
     throw_if_stopped();
   }
   return outcome;

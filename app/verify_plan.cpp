@@ -3,6 +3,7 @@
 #include <set>
 
 #include "app/fem_system.h"
+#include "app/follow_plan.h"
 #include "app/goal_terms.h"
 #include "app/manifest.h"
 #include "app/scene_world.h"
@@ -324,10 +325,10 @@ std::string wrong_of_later(const Json& summary, const plan::Plan& plan, const Js
   if (told && plan.solved() && !now) return summary.contains("improve") ? "improve" : "shortcut.after";
   if (!summary.contains("refine")) return "";
   const Json& s = summary.at("refine");
-  if (!has_just(s, {"how", "tracked_s", "largest_error_m", "iterations", "replay_cpu_s", "track_cpu_s",
-                    "search_cpu_s", "coarse_tets", "tets"}) ||
-      s.at("tets") != tets)
-    return "refine";
+  std::set<std::string> keys{"how",         "tracked_s",    "largest_error_m", "iterations", "replay_cpu_s",
+                             "track_cpu_s", "search_cpu_s", "coarse_tets",     "tets"};
+  if (s.contains("replay_distance_m")) keys.insert("replay_distance_m");  // not told by older limbers
+  if (!has_just(s, keys) || s.at("tets") != tets) return "refine";
   const std::string how = s.at("how");
   if (how == "replanned" || how == "failed") return "";
   if (how != "replayed" && how != "tracked") return "refine.how";
@@ -463,6 +464,8 @@ void check_stretch(const MotionFigures& figures, const fem::World& world, Promis
   }
 }
 
+}  // namespace
+
 void check_shapes(const MotionFigures& figures, const fem::World& world, Promises& table) {
   for (std::size_t b = 0; b < world.bodies.size(); ++b)
     if (world.bodies[b].moving)
@@ -481,6 +484,8 @@ void check_shapes(const MotionFigures& figures, const fem::World& world, Promise
   check_stretch(figures, world, table);
   check_seen(figures, world.touches_on_surfaces(), table);
 }
+
+namespace {
 
 // Also false where no motion could begin there.
 bool starts_from(const fs::path& folder, const PlanFolder& other, int frame, const scenes::Scene& scene,
@@ -521,10 +526,50 @@ void check_beginning(const fs::path& folder, const PlanFolder& planned, const fe
   table.row(promise, false, fmt::format("{} {}, so nobody can tell; put back what it began from", name, why));
 }
 
+// Of a plan that must be here, as it was then: each control is the follower's, and what is told of it is so.
+void check_following(const fs::path& folder, const PlanFolder& planned, const fem::World& world,
+                     Promises& table) {
+  const plan::Plan& plan = planned.plan;
+  const Json told = planned.summary.value("follows", Json::object());
+  const fs::path other = folder / told.value("folder", "");
+  const std::string promise = "each control is the follower's of another plan",
+                    name = other.lexically_normal().string();
+  double largest = 0;
+  for (const Control& control : plan.trajectory.controls)
+    largest = std::max(largest, double(largest_force(control)));
+  const double most = planned.scene.planner.max_force_n;
+  table.row("no force is above the maximum", largest <= most * rounding,
+            fmt::format("{:.1f} of {:.1f} N", largest, most));
+  std::optional<FollowedPlan> followed;
+  std::string why;
+  try {
+    followed.emplace(other, planned.scene, world);
+    if (followed->facts(plan, folder).at("trajectory_hash") != told.value("trajectory_hash", ""))
+      why = "holds another plan";
+  } catch (const InputError&) {
+    why = "is not here";
+  }
+  if (!why.empty()) {
+    table.row(promise, false, fmt::format("{} {}, so nobody can tell; put back what it followed", name, why));
+    return;
+  }
+  bool same = true;
+  for (int node = 1; same && node < plan.tree.size(); ++node) {
+    Control control = followed->next(plan.tree.states[std::size_t(node - 1)]);
+    const Control& there = plan.tree.controls[std::size_t(node)];
+    const bool last = node + 1 == plan.tree.size();
+    if (last && there.steps > 0) control.steps = std::min(control.steps, there.steps);
+    same = same_bits(control, there);
+  }
+  table.row(promise, same, fmt::format("{}, of which limber verify tells apart", name));
+  table.row("what it tells of following is so", followed->facts(plan, folder) == told, "");
+}
+
 void check_claims_of_simulation(const PlanFolder& planned, const fem::World& world, const FemSystem& system,
                                 const MotionFigures& figures, Promises& table) {
   Json facts = facts_of(planned.plan, world, system, figures);
-  if (planned.summary.contains("from")) facts["from"] = planned.summary.at("from");
+  for (const char* key : {"from", "follows"})
+    if (planned.summary.contains(key)) facts[key] = planned.summary.at(key);
   const std::string other = first_difference(facts, planned.summary);
   table.row("what the simulation tells of itself is so", other.empty(),
             other.empty() ? "" : "summary." + other + " is not");
@@ -551,7 +596,10 @@ void check_simulation(const fs::path& folder, const PlanFolder& planned,
   check_path(plan, settings, replay, table);
   Control nothing;
   nothing.steps = std::int32_t(plan.trajectory.end.step - system.start().step);
-  table.row("nothing acts but what the scene says", plan.trajectory.controls == std::vector{nothing}, "");
+  if (simulation.steered)
+    check_following(folder, planned, world, table);
+  else
+    table.row("nothing acts but what the scene says", plan.trajectory.controls == std::vector{nothing}, "");
   const std::int64_t asked = plan::steps_of_simulation(system, simulation.duration_s);
   table.row("it lasts as long as was asked for",
             simulation.ending == plan::Simulation::whole && nothing.steps == asked,

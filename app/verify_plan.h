@@ -12,6 +12,9 @@ namespace limber::app {
 void check_plan(const fs::path& folder, const PlanFolder&, const std::vector<PreparedBody>&,
                 const fem::World&, MotionFigures& figures, Promises&);
 
+// What is promised of every frame of any motion: volume, inverted tets, penetration or what is seen, stretch.
+void check_shapes(const MotionFigures&, const fem::World&, Promises&);
+
 // That the folder's other files show this plan: manifest.json, tree.svg, volume.svg, volume.png.
 void check_pictures(const fs::path& folder, const PlanFolder&, const fem::World&, const MotionFigures&,
                     Promises&);

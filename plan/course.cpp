@@ -40,6 +40,7 @@ class Runner {
         settle_limit_(int(std::lround(settings.settle.max_duration_s / system.dt_s()))) {
     course_.states.clear(), course_.costs_of_states.clear(), course_.frames.clear();
     course_.settle_steps = 0;
+    if (course_.next) course_.controls.clear();
     take_due_frames();
     begin_control();
   }
@@ -96,6 +97,11 @@ class Runner {
 
   void begin_control() {
     const std::size_t done = course_.states.size();
+    if (course_.next)
+      if (const std::optional<Control> control = course_.next(state_)) {
+        LIMBER_CHECK(control->steps > 0, control->steps, state_.step);
+        course_.controls.push_back(*control);
+      }
     if (done == course_.controls.size()) return begin_reach();
     control_ = course_.controls[done];
     steps_left_ = std::exchange(control_.steps, 0);

@@ -4,6 +4,7 @@
 
 #include <functional>
 #include <limits>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -28,7 +29,10 @@ Json json_of(const Costs&);
 struct Course {
   State from;
   std::vector<Control> controls;  // in; out: those that were run, with the one that reaches for the goal
-  Costs costs;                    // in: of what led to `from`; out: of all
+  // Instead: asked at the start and at each control's end for the next, from the state reached; nothing: they
+  // are over. A control has a step at least.
+  std::function<std::optional<Control>(const State&)> next = {};
+  Costs costs;  // in: of what led to `from`; out: of all
   std::int64_t last_step = std::numeric_limits<std::int64_t>::max();  // who lasts longer ends as too_costly
   // Where the controls end outside the goal, interpolation of at most this force goes on until the robot is
   // in it; it wants a last_step. 0: it does not.

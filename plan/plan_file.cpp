@@ -337,7 +337,9 @@ namespace {
 Json json_of(const Simulation& simulation) {
   const auto ending = std::find_if(std::begin(simulation_endings), std::end(simulation_endings),
                                    [&](const auto& e) { return e.first == simulation.ending; });
-  return {{"simulation", {{"duration_s", simulation.duration_s}, {"ending", ending->second}}}};
+  Json json{{"simulation", {{"duration_s", simulation.duration_s}, {"ending", ending->second}}}};
+  if (simulation.steered) json["simulation"]["steered"] = true;
+  return json;
 }
 
 Json json_of_search(const Plan& plan) {
@@ -369,8 +371,13 @@ void read_simulation(const Reader& reader, const Json& json, double frames_per_s
   reader.require(frames_per_second >= least_frames_per_second && frames_per_second <= most_frames_per_second,
                  fmt::format("frames_per_second is {}", frames_per_second));
   plan.settings.frames_per_second = frames_per_second;
-  reader.require(plan.tree.size() == 2, "a simulation has a start and an end, and nothing else");
-  plan.best_node = 1;
+  simulation.steered = json.value("steered", false);
+  reader.require(simulation.steered || plan.tree.size() == 2,
+                 "a simulation has a start and an end, and nothing else");
+  for (int node = 1; node < plan.tree.size(); ++node)
+    reader.require(plan.tree.parents[std::size_t(node)] == node - 1,
+                   fmt::format("node {} does not come after node {}", node, node - 1));
+  plan.best_node = plan.tree.size() - 1;
 }
 
 void read_search(const Reader& reader, const Json& meta, const std::string& file, Plan& plan) {

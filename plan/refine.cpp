@@ -178,13 +178,10 @@ const char* name_of(RefineReport::How how) {
 }  // namespace
 
 Json json_of(const RefineReport& report) {
-  return {{"how", name_of(report.how)},
-          {"tracked_s", report.tracked_s},
-          {"largest_error_m", report.largest_error_m},
-          {"iterations", report.iterations},
-          {"replay_cpu_s", report.replay_cpu_s},
-          {"track_cpu_s", report.track_cpu_s},
-          {"search_cpu_s", report.search_cpu_s}};
+  return {{"how", name_of(report.how)},        {"replay_distance_m", report.replay_distance_m},
+          {"tracked_s", report.tracked_s},     {"largest_error_m", report.largest_error_m},
+          {"iterations", report.iterations},   {"replay_cpu_s", report.replay_cpu_s},
+          {"track_cpu_s", report.track_cpu_s}, {"search_cpu_s", report.search_cpu_s}};
 }
 
 Reference reference_of(const System& system, const Trajectory& trajectory) {
@@ -226,6 +223,7 @@ Plan refine(const System& system, const Settings& settings, const Reference& ref
   replay.controls = in_steps_of(system.dt_s(), reference.controls, reference.dt_s);
   run(system, settings, {&replay, 1}, {});
   report.replay_cpu_s = spent();
+  report.replay_distance_m = distance_from_goal(system, settings, replay.end);
   if (replay.result == Course::rests_in_goal && may_be_shown(system, settings, replay)) {
     report.how = RefineReport::replayed;
     return solved_by(system, settings, replay);

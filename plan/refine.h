@@ -19,9 +19,10 @@ Reference reference_of(const System&, const Trajectory&);
 
 struct RefineReport {
   enum How { replayed, tracked, replanned, failed } how = failed;
-  double tracked_s = 0;         // of the reference; all of it unless the robot lost it
-  double largest_error_m = 0;   // between the centres while it was tracked
-  std::int64_t iterations = 0;  // of the search from the states tracked so far
+  double replay_distance_m = 0;  // of the end of the reference's controls as they are, from the goal
+  double tracked_s = 0;          // of the reference; all of it unless the robot lost it
+  double largest_error_m = 0;    // between the centres while it was tracked
+  std::int64_t iterations = 0;   // of the search from the states tracked so far
   double replay_cpu_s = 0, track_cpu_s = 0, search_cpu_s = 0;
 };
 Json json_of(const RefineReport&);

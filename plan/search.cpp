@@ -550,7 +550,8 @@ std::string explain_simulation(const Plan& plan) {
     case Simulation::whole:
       return "simulated " + asked;
     case Simulation::stopped:
-      return fmt::format("a signal ended the simulation before its {}; resume it to go on", asked);
+      return fmt::format("a signal ended the simulation before its {}; {}", asked,
+                         s.steered ? "simulate anew" : "resume it to go on");
     case Simulation::diverged:
       return fmt::format(
           "the dynamics diverged before the {} were over; try a smaller world.max_dt_s, or weaker "

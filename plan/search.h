@@ -40,6 +40,7 @@ struct Leg {
 struct Simulation {
   double duration_s = 0;  // asked for
   enum Ending { whole, stopped, diverged } ending = whole;
+  bool steered = false;  // controls were chosen on the way: its tree is a chain, a node after each
 };
 
 struct Plan {

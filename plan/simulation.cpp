@@ -28,6 +28,8 @@ Plan begun(const System& system, double frames_per_second) {
 
 void require_earlier(const System& system, const Plan& earlier, double frames_per_second) {
   if (!earlier.simulation) throw InputError("what is there is no simulation; simulate anew");
+  if (earlier.simulation->steered)
+    throw InputError("the earlier simulation was steered, and is not gone on with; simulate anew");
   if (earlier.system_hash != system.hash())
     throw InputError("the earlier simulation is of another world, script or start; simulate anew");
   if (earlier.trajectory.frames_per_second != frames_per_second)
@@ -36,13 +38,28 @@ void require_earlier(const System& system, const Plan& earlier, double frames_pe
                     earlier.trajectory.frames_per_second, frames_per_second));
 }
 
+Vec3f center(const System& system, const State& state) { return system.robot_center(state).cast<float>(); }
+
 void put_tree(const System& system, Plan& plan) {
-  const auto center = [&](const State& state) { return Vec3f(system.robot_center(state).cast<float>()); };
   const State start = system.start(), &end = plan.trajectory.end;
   plan.trajectory.controls = {nothing_for(end.step - start.step)};
   plan.tree = {};
-  plan.tree.add(start, -1, Control{}, -1, center(start));
-  plan.best_node = plan.tree.add(end, 0, plan.trajectory.controls.front(), -1, center(end));
+  plan.tree.add(start, -1, Control{}, -1, center(system, start));
+  plan.best_node = plan.tree.add(end, 0, plan.trajectory.controls.front(), -1, center(system, end));
+}
+
+// As far as whole controls go.
+void put_chain(const System& system, Plan& plan, Course& course) {
+  Trajectory& path = plan.trajectory;
+  course.controls.resize(course.states.size());
+  plan.tree = {};
+  plan.best_node = plan.tree.add(course.from, -1, Control{}, -1, center(system, course.from));
+  for (std::size_t i = 0; i < course.states.size(); ++i)
+    plan.best_node =
+        plan.tree.add(course.states[i], int(i), course.controls[i], -1, center(system, course.states[i]));
+  path.end = course.states.empty() ? course.from : std::move(course.states.back());
+  path.controls = std::move(course.controls);
+  while (path.frames.back().step > path.end.step) path.frames.pop_back();
 }
 
 }  // namespace
@@ -58,7 +75,8 @@ std::int64_t steps_of_simulation(const System& system, double duration_s) {
 }
 
 Plan simulate_for(const System& system, double duration_s, double frames_per_second,
-                  std::optional<Plan> earlier, const std::function<void(double)>& watch) {
+                  std::optional<Plan> earlier, const std::function<void(double)>& watch, const Steer& steer) {
+  LIMBER_CHECK(!steer || !earlier, bool(steer));
   const std::int64_t first_step = system.start().step,
                      last_step = first_step + steps_of_simulation(system, duration_s);
   if (earlier) require_earlier(system, *earlier, frames_per_second);
@@ -72,7 +90,15 @@ Plan simulate_for(const System& system, double duration_s, double frames_per_sec
   settings.frames_per_second = frames_per_second;
   Course course;
   course.from = path.end;
-  course.controls = {nothing_for(last_step - path.end.step)};
+  if (steer)
+    course.next = [&](const State& state) -> std::optional<Control> {
+      if (state.step == last_step) return std::nullopt;
+      Control control = steer(state);
+      control.steps = std::int32_t(std::min<std::int64_t>(control.steps, last_step - state.step));
+      return control;
+    };
+  else
+    course.controls = {nothing_for(last_step - path.end.step)};
   bool stopped = false;
   try {
     run(system, settings, {&course, 1},
@@ -90,11 +116,13 @@ Plan simulate_for(const System& system, double duration_s, double frames_per_sec
   for (State& frame : course.frames)
     if (frame.step > shown) path.frames.push_back(std::move(frame));
   const bool whole = !stopped && course.result != Course::diverged;
-  path.end = whole ? std::move(course.end) : path.frames.back();
-  plan.simulation = Simulation{duration_s, whole     ? Simulation::whole
-                                           : stopped ? Simulation::stopped
-                                                     : Simulation::diverged};
-  put_tree(system, plan);
+  if (!steer) path.end = whole ? std::move(course.end) : path.frames.back();
+  plan.simulation = Simulation{duration_s,
+                               whole     ? Simulation::whole
+                               : stopped ? Simulation::stopped
+                                         : Simulation::diverged,
+                               bool(steer)};
+  steer ? put_chain(system, plan, course) : put_tree(system, plan);
   return plan;
 }
 

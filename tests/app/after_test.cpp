@@ -91,6 +91,55 @@ TEST_F(Program_slow, APlanThatIsNotPerturbedIsItself) {
   EXPECT_NE(reports[0], limber_program({"robust", out(), "-n", "6", "--seed", "2", "--json"}).json());
 }
 
+TEST_F(Program_slow, AFollowedPlanIsItselfWhereNothingIsPerturbed) {
+  ASSERT_EQ(limber_program({"plan", scene(), "-o", out()}).code, exit_done);
+  const Json exact = limber_program({"robust", out(), "--follow", "-n", "2", "--materials", "0", "--forces",
+                                     "0", "--turn", "0", "--json"})
+                         .json();
+  const Json& followed = exact.at("followed");
+  EXPECT_EQ(followed.at("reached"), 2);
+  EXPECT_EQ(followed.at("end_farthest_m"), 0);
+  EXPECT_EQ(followed.at("replays"), exact.at("replays"));
+  EXPECT_EQ(followed.at("keep_all_promises"), exact.at("keep_all_promises"));
+}
+
+// Pushes that are 40 % too strong or too weak and turned by up to 30 degrees miss; who looks where it is does
+// not. Both are told of the same worlds and errors, and open loop as it is without --follow.
+TEST_F(Program_slow, FollowingReachesWhatOpenLoopMisses) {
+  ASSERT_EQ(limber_program({"plan", scene(), "-o", out(), "--seed", "3"}).code, exit_done);
+  std::vector<std::string> words{"robust", out(), "-n", "8", "--forces", "0.4", "--turn", "30", "--json"};
+  Json open_loop = limber_program(words).json();
+  words.push_back("--follow");
+  std::vector<Json> reports;
+  for (const char* threads : {"1", "2"}) {
+    std::vector<std::string> with_threads = words;
+    with_threads.insert(with_threads.end(), {"--threads", threads});
+    reports.push_back(limber_program(with_threads).json());
+  }
+  EXPECT_EQ(reports[0], reports[1]);
+  const Json followed = reports[0].at("followed");
+  reports[0].erase("followed");
+  EXPECT_EQ(reports[0], open_loop);
+  EXPECT_LT(open_loop.at("reached"), 8);
+  EXPECT_EQ(followed.at("reached"), 8);
+  EXPECT_LT(followed.at("end_spread_m"), open_loop.at("end_spread_m"));
+  const double most = open_loop.at("max_force_n");
+  for (const Json& report : {open_loop, followed}) {
+    int kept = 0;
+    for (const Json& replay : report.at("replays")) {
+      EXPECT_LE(replay.at("largest_force_asked_n").get<double>(), most);
+      EXPECT_LE(replay.at("largest_force_n").get<double>(), 1.4 * most * (1 + 1e-6));
+      kept += replay.at("broken_promises").empty();
+    }
+    EXPECT_EQ(report.at("keep_all_promises"), kept);
+  }
+  words.erase(std::find(words.begin(), words.end(), "--json"));
+  const std::string text = limber_program(words).out;
+  EXPECT_NE(text.find("open loop\n"), text.npos);
+  EXPECT_NE(text.find("followed\n"), text.npos);
+  EXPECT_NE(text.find("8 of 8 come to rest in the goal"), text.npos) << text;
+}
+
 // Perturbed much and given little time to settle, some rest and some do not.
 TEST_F(Program_slow, RobustCallsAtRestWhatIsSlowAtItsEndAndNothingElse) {
   constexpr double slow_m_s = 0.02;  // planner.settle_speed_m_s

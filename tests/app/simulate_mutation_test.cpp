@@ -2,12 +2,14 @@
 // adversary who knows limber, changes one thing and then makes all hashes, figures and pictures fit. verify
 // must name each.
 #include "app/fem_system.h"
+#include "app/follow_plan.h"
 #include "app/manifest.h"
 #include "app/plan_folder.h"
 #include "app/scene_world.h"
 #include "core/hash.h"
 #include "core/npz.h"
 #include "plan/plan_file.h"
+#include "plan/simulation.h"
 #include "tests/app/program.h"
 
 namespace limber::app {
@@ -322,6 +324,82 @@ List of_its_beginning() {
   return list;
 }
 
+// As if the follower had chosen what `change` makes of its third control.
+void follow_otherwise(Mutant& m, const std::function<void(Control&)>& change) {
+  plan::Plan& p = m.planned.plan;
+  const fem::World world = build_world(m.planned.scene, m.bodies);
+  const FemSystem system = system_of(m.planned, world, m.bodies);
+  const fs::path other = m.folder / m.planned.summary.at("follows").at("folder").get<std::string>();
+  const FollowedPlan followed(other, m.planned.scene, world);
+  int control = 0;
+  p = plan::simulate_for(system, p.simulation->duration_s, p.trajectory.frames_per_second, std::nullopt, {},
+                         [&](const State& state) {
+                           Control next = followed.next(state);
+                           if (++control == 3) change(next);
+                           return next;
+                         });
+  m.planned.summary["follows"] = followed.facts(p, m.folder);
+  m.write();
+}
+
+// Of a motion that follows a plan, which is there.
+List of_what_it_follows() {
+  List list;
+  const std::string follows = "each control is the follower's of another plan",
+                    tells = "what it tells of following is so";
+  const auto add = [&](std::string what, std::string named, std::function<void(Mutant&)> make) {
+    list.push_back({std::move(what), std::move(named), std::move(make)});
+  };
+  add("a push of one's own", follows,
+      [](Mutant& m) { follow_otherwise(m, [](Control& c) { c.force_n.x() *= 0.99f; }); });
+  add("a push for longer", follows, [](Mutant& m) { follow_otherwise(m, [](Control& c) { ++c.steps; }); });
+  add("too strong a push", "no force is above the maximum",
+      [](Mutant& m) { follow_otherwise(m, [](Control& c) { c.force_n = Vec3f(0, 0, 150); }); });
+  for (const auto& [key, value] :
+       {std::pair("trajectory_hash", "0123456789abcdef"), {"folder", "../nowhere"}})
+    add(fmt::format("a push of one's own, and of the plan's {} another", key), follows,
+        [key, value](Mutant& m) {
+          follow_otherwise(m, [](Control& c) { c.force_n.x() *= 0.99f; });
+          m.planned.summary["follows"][key] = value;
+          m.write_summary();
+        });
+  add("nothing is followed", follows, [](Mutant& m) {
+    m.planned.summary.erase("follows");
+    m.write_summary();
+  });
+  add("follows itself", follows, [](Mutant& m) {
+    m.planned.summary["follows"]["folder"] = ".";
+    m.write_summary();
+  });
+  add("not steered", "has a start and an end, and nothing else", [](Mutant& m) {
+    m.planned.plan.simulation->steered = false;
+    m.write();
+  });
+  add("shorter", lasts, [](Mutant& m) {
+    m.planned.plan.simulation->duration_s += 0.1;
+    m.write();
+  });
+  for (const char* key : {"farthest_from_path_m", "largest_force_n", "distance_m", "speed_m_s"})
+    add(std::string(key), tells, [key](Mutant& m) {
+      m.planned.summary["follows"][key] = 0.5 * m.planned.summary["follows"][key].get<double>();
+      m.write_summary();
+    });
+  add("reaches", tells, [](Mutant& m) {
+    Json& reaches = m.planned.summary["follows"]["reaches"];
+    reaches = !reaches.get<bool>();
+    m.write_summary();
+  });
+  add("reaches as a text", "given.summary.follows", [](Mutant& m) {
+    m.planned.summary["follows"]["reaches"] = "yes";
+    m.write_summary();
+  });
+  add("a list for what is followed", "given.summary.follows", [](Mutant& m) {
+    m.planned.summary["follows"] = Json::array({1, 2});
+    m.write_summary();
+  });
+  return list;
+}
+
 class SimulationMutations_slow : public testing::Test {
  protected:
   static void SetUpTestSuite() {
@@ -344,6 +422,14 @@ class SimulationMutations_slow : public testing::Test {
         limber_program({"plan", scene, "-o", (shared_->path() / "planned").string(), "--from", good,
                         "--frame", "4", "--set", "world.gravity_m_s2=[0, 0, 0]"});
     if (planned.code != exit_done) trouble_ += planned.err;
+    const std::string small = (shared_->path() / "small.toml").string(),
+                      route = (shared_->path() / "route").string();
+    std::ofstream(small) << small_scene;
+    for (const std::vector<std::string>& words :
+         {std::vector<std::string>{"plan", small, "-o", route},
+          {"simulate", small, "-o", (shared_->path() / "following").string(), "--follow", route, "--set",
+           "bodies.robot.material.density_kg_m3=110"}})
+      if (const Result result = limber_program(words); result.code != exit_done) trouble_ += result.err;
   }
   static void TearDownTestSuite() { delete shared_; }
   void SetUp() override { ASSERT_EQ(trouble_, ""); }
@@ -401,6 +487,10 @@ TEST_F(SimulationMutations_slow, OfItsBeginning) { expect_named("on", of_its_beg
 TEST_F(SimulationMutations_slow, OfAPlansBeginning) {
   expect_good("planned");
   expect_named("planned", of_its_beginning());
+}
+TEST_F(SimulationMutations_slow, OfWhatItFollows) {
+  expect_good("following");
+  expect_named("following", of_what_it_follows());
 }
 
 }  // namespace

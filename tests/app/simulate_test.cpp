@@ -497,5 +497,74 @@ TEST_F(Simulate_slow, WrongInputsSayWhatAndWhere) {
   refused(run(thrown, "nothing", {"--resume"}), "there is none to go on from");
 }
 
+// In its own world the plan comes out again, bit for bit; in another, where its controls alone go astray, the
+// robot still arrives. verify asks the follower again.
+TEST_F(Simulate_slow, APlanIsFollowedByFeedback) {
+  const Json plan = limber_program({"plan", scene(), "-o", out("plan"), "--json"}).json();
+  ASSERT_TRUE(plan.at("solved"));
+  const auto follow = [&](const std::string& name, std::vector<std::string> more = {}) {
+    more.insert(more.begin(), {"--follow", out("plan")});
+    return simulate(small_scene, name, more);
+  };
+  const Json same = follow("same");
+  EXPECT_EQ(same.at("motion_s"), plan.at("motion_s"));
+  EXPECT_EQ(same.at("follows").at("farthest_from_path_m"), 0);
+  EXPECT_TRUE(same.at("follows").at("reaches"));
+  const PlanFolder planned = read_plan_folder(out("plan")), followed = read_plan_folder(out("same"));
+  EXPECT_TRUE(planned.plan.trajectory.frames == followed.plan.trajectory.frames);
+  EXPECT_TRUE(planned.plan.trajectory.end == followed.plan.trajectory.end);
+  EXPECT_EQ(verify("same").code, exit_done);
+
+  const std::vector<std::string> heavier{"--set", "bodies.robot.material.density_kg_m3=110", "--duration",
+                                         "30"};
+  const Json other = follow("other", heavier);
+  EXPECT_TRUE(other.at("follows").at("reaches")) << other.at("follows");
+  EXPECT_GT(other.at("follows").at("farthest_from_path_m"), 0);
+  EXPECT_LE(other.at("largest_force_n").get<double>(), 100);
+  const Table verified = verify("other");
+  EXPECT_EQ(verified.code, exit_done);
+  for (const auto& [promise, kept] : verified.kept) EXPECT_TRUE(kept) << promise;
+  const std::string first = bytes("other");
+  std::vector<std::string> one_thread = heavier;
+  one_thread.insert(one_thread.end(), {"--threads", "1"});
+  follow("other", one_thread);
+  EXPECT_EQ(bytes("other"), first);
+  EXPECT_EQ(limber_program({"render", out("other"), "--frames", "0-1"}).code, exit_done);
+  EXPECT_EQ(limber_program({"info", out("other")}).code, exit_done);
+  EXPECT_EQ(limber_program({"report", out("other")}).code, exit_done);
+
+  // Without the plan nobody can tell whether its follower chose the controls.
+  fs::rename(out("plan"), out("gone"));
+  const Result alone = limber_program({"verify", out("other"), "--json"});
+  EXPECT_EQ(alone.code, exit_defect);
+  EXPECT_NE(alone.out.find("so nobody can tell"), alone.out.npos) << alone.out;
+}
+
+TEST_F(Simulate_slow, WhatCannotBeFollowedIsRefusedWithASentence) {
+  limber_program({"plan", scene(), "-o", out("plan")});
+  limber_program({"plan", scene(), "-o", out("few"), "--iterations", "1"});
+  const auto refused = [&](const std::string& text, std::vector<std::string> more, const std::string& why) {
+    const Result result = run(text, "out", std::move(more));
+    EXPECT_EQ(result.code, exit_bad_input) << why;
+    EXPECT_NE(result.err.find(why), result.err.npos) << result.err;
+  };
+  refused(small_scene, {"--follow", out("few")}, "does not reach the goal");
+  refused(small_scene, {"--follow", out("nowhere")}, "there is no such file");
+  fs::create_directories(out("out"));
+  refused(small_scene, {"--follow", out("out")}, "is the folder of the plan that is followed");
+  refused(small_scene, {"--follow", out("plan"), "--resume"}, "--resume does not go with --follow");
+  refused(small_scene, {"--follow", out("plan"), "--from", out("plan")},
+          "--follow begins where the plan begins");
+  refused(small_scene, {"--follow", out("plan"), "--set", "bodies.robot.cage.cells=[3, 2, 2]"},
+          "limber refine");
+  refused(thrown, {"--follow", out("plan")}, "has another name, place or cage");
+  simulate(small_scene, "followed", {"--follow", out("plan"), "--duration", "0.2"});
+  refused(small_scene, {"--follow", out("followed")}, "holds a simulation");
+  const Result resumed =
+      limber_program({"simulate", scene(), "-o", out("followed"), "--resume", "--duration", "1"});
+  EXPECT_EQ(resumed.code, exit_bad_input);
+  EXPECT_NE(resumed.err.find("was steered"), resumed.err.npos) << resumed.err;
+}
+
 }  // namespace
 }  // namespace limber::app
