@@ -715,13 +715,20 @@ int run_command_line(int argc, const char* const* argv) {
   NewSceneOptions new_options;
   CLI::App& scene_command = *program.add_subcommand("scene", "makes scene files, and checks them");
   scene_command.require_subcommand(1);
-  CLI::App& new_command =
-      *scene_command.add_subcommand("new", "a scene to begin with, from a folder of models in one frame");
+  CLI::App& new_command = *scene_command.add_subcommand(
+      "new", "a scene to begin with, from models in one frame, a scan or an atlas");
   new_command
-      .add_option("--from", new_options.from, "folder of models, as heart.obj, lung_left.obj, skin.obj")
+      .add_option("--from", new_options.from,
+                  "folder of models, as heart.obj, lung_left.obj, skin.obj; or a label map (NIfTI, NRRD); or "
+                  "BodyParts3D's folder with its tables")
       ->required()
-      ->type_name("DIR")
-      ->check(CLI::ExistingDirectory);
+      ->type_name("DIR|FILE")
+      ->check(CLI::ExistingPath);
+  new_command
+      .add_option("--labels", new_options.labels,
+                  "names of the label map's labels: a JSON file, {\"5\": \"liver\"} or {\"liver\": 5}")
+      ->type_name("FILE")
+      ->check(CLI::ExistingFile);
   new_command.add_option("-o,--out", new_options.out, "scene file to write")->required()->type_name("FILE");
   new_command.add_option("--robot", new_options.robot, "the model that is to move")
       ->required()
@@ -732,11 +739,11 @@ int run_command_line(int argc, const char* const* argv) {
         ->delimiter(',')
         ->allow_extra_args(false);
   };
-  names("--only", new_options.only, "take these models alone; default: all of the folder");
+  names("--only", new_options.only, "take these models alone (of an atlas: names or FMA ids); default: all");
   names("--see-through", new_options.see_through,
         "only seen, and seen through, besides those called skin, body, ribcage");
   names("--rigid", new_options.rigid,
-        "bones, besides those called spine, rib, skull, pelvis, bone, vertebra, sternum, femur");
+        "bones, besides those called spine, rib, skull, vertebra, femur, … (docs/imaging.md)");
   new_command.add_option("--scale", new_options.scale, "metres a file unit, 1e-9 … 1e9")
       ->check(within(1e-9, 1e9))
       ->capture_default_str();

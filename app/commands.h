@@ -212,9 +212,10 @@ struct RefineOptions {
 Outcome refine(const RefineOptions&);
 
 struct NewSceneOptions {
-  fs::path from, out;  // a folder of models in one frame; the scene file to write
+  fs::path from, out;  // models in one frame: a folder, a label map, an atlas; the scene file to write
+  fs::path labels;     // names of a label map's labels; empty: as it has them
   std::string robot;
-  std::vector<std::string> only;                // names without ending; empty: all models of the folder
+  std::vector<std::string> only;  // names without ending, labels, an atlas' names or ids; empty: all
   std::vector<std::string> see_through, rigid;  // besides those whose names say so
   double scale = 0.001;                         // metres a file unit
   double shrink = 1;                            // at most so much of every organ's true size

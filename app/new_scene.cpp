@@ -9,13 +9,16 @@
 #include "app/commands.h"
 #include "app/layout.h"
 #include "app/line_of_sight.h"
+#include "app/part_models.h"
 #include "app/scene_world.h"
 #include "core/error.h"
 #include "core/log.h"
 #include "core/progress.h"
+#include "imaging/label_map.h"
 #include "meshing/cage.h"
 #include "meshing/contact_shape.h"
 #include "meshing/import.h"
+#include "scenes/anatomy.h"
 #include "scenes/models.h"
 #include "scenes/scene.h"
 
@@ -23,35 +26,7 @@ namespace limber::app {
 
 namespace {
 
-// What is usual for a part of the body whose name begins so: stiffness of the organ as a whole and colour, as
-// anatomical atlases have it. Moduli: order of magnitude of small strain, as in the scenes that come along.
-struct Usual {
-  const char* name;
-  double youngs_modulus_pa, density_kg_m3;
-  const char* color;
-};
-constexpr Usual usual[] = {
-    {"heart", 5e3, 1050, "#b0413e"},     {"lung", 1.5e4, 400, "#e0a3a0"},
-    {"liver", 1e4, 1050, "#8c4a3a"},     {"kidney", 1e4, 1050, "#8f4b45"},
-    {"stomach", 5e3, 1050, "#d9a08a"},   {"spleen", 1e4, 1050, "#7b3f52"},
-    {"pancreas", 5e3, 1050, "#e3b778"},  {"trachea", 5e4, 1100, "#cfd8d2"},
-    {"diaphragm", 2e4, 1050, "#b5695f"}, {"brain", 3e3, 1040, "#e4b8ab"},
-    {"muscle", 2e4, 1060, "#a8453f"},    {"", 1e4, 1000, "#c9a58c"},
-};
-constexpr const char* bones[] = {"spine", "rib", "skull", "pelvis", "bone", "vertebra", "sternum", "femur"};
-constexpr const char* hulls[] = {"skin", "body", "ribcage"};
 constexpr const char* endings[] = {".obj", ".off", ".ply", ".stl", ".glb", ".gltf", ".dae", ".fbx"};
-
-template <class Names>
-bool begins_with_one_of(const std::string& name, const Names& beginnings) {
-  return std::any_of(std::begin(beginnings), std::end(beginnings),
-                     [&](const char* beginning) { return name.starts_with(beginning); });
-}
-
-const Usual& usual_of(const std::string& name) {
-  return *std::find_if(std::begin(usual), std::end(usual),
-                       [&](const Usual& u) { return name.starts_with(u.name); });
-}
 
 constexpr int bone_tets = 500;
 // What is thinner, of its diagonal, is a sheet, as a diaphragm: no coarse cage is near it, so it is only
@@ -130,8 +105,9 @@ std::vector<Organ> read_organs(const NewSceneOptions& options) {
     organ.volume_m3 = std::abs(volume(placed));
     organ.thickness_m = 2 * organ.volume_m3 / area(placed);
     organ.pieces = int(model.left.components);
-    organ.see_through = begins_with_one_of(organ.name, hulls);
-    organ.bone = begins_with_one_of(organ.name, bones);
+    const scenes::PartKind kind = scenes::anatomy_of(organ.name).kind;
+    organ.see_through = kind == scenes::PartKind::hull,
+    organ.bone = kind == scenes::PartKind::bone || scenes::is_of_ribcage(organ.name);
     for (const auto& [list, flag] :
          {std::pair(&options.see_through, &organ.see_through), {&options.rigid, &organ.bone}})
       if (std::count(list->begin(), list->end(), organ.name) > 0) *flag = true;
@@ -255,13 +231,13 @@ std::string body_text(const Organ& organ, const NewSceneOptions& options, double
                       center.y(), center.z());
   if (organ.way_m.norm() > 0) text += fmt::format("   # {:.2g} m from its true place", organ.way_m.norm());
   text += "\n";
-  const Usual& u = usual_of(organ.name);
+  const scenes::Anatomy& usual = scenes::anatomy_of(organ.name);
   if (organ.see_through) {
-    const bool hull = begins_with_one_of(organ.name, hulls);
+    const bool hull = usual.kind == scenes::PartKind::hull;
     text += fmt::format("color = \"{}\"\nopacity = {}\n",
                         organ.bone ? "#efe6d0"
                         : hull     ? "#c98f70"
-                                   : u.color,
+                                   : usual.color,
                         organ.bone ? 0.35
                         : hull     ? 0.22
                                    : 0.15);
@@ -274,8 +250,8 @@ std::string body_text(const Organ& organ, const NewSceneOptions& options, double
   text += fmt::format(
       "material = {{ youngs_modulus_pa = {:g}, poisson_ratio = 0.45, density_kg_m3 = {:g}, friction = 0.05 "
       "}}\n",
-      u.youngs_modulus_pa, u.density_kg_m3);
-  text += fmt::format("color = \"{}\"\nlook = \"tissue\"\n", u.color);
+      usual.youngs_modulus_pa, usual.density_kg_m3);
+  text += fmt::format("color = \"{}\"\nlook = \"tissue\"\n", usual.color);
   if (robot) return text;
   const Vec3 half = 0.5 * scale * organ.box.size();
   const Vec3 lower(center.x() - 2 * half.x(), center.y() - 2 * half.y(), center.z() - 2 * half.z()),
@@ -380,7 +356,7 @@ std::string scene_text(const std::vector<Organ>& organs, const NewSceneOptions& 
   bounds.include(goal + 1.5 * size), bounds.include(goal - 1.5 * size);
   // At 5 m/s² a body of a metre is pushed for 0.2 to 1 s at a time; times go with the root of the length.
   const double length = size.maxCoeff(), time = std::sqrt(length);
-  const double mass = std::pow(scale, 3) * robot.volume_m3 * usual_of(robot.name).density_kg_m3;
+  const double mass = std::pow(scale, 3) * robot.volume_m3 * scenes::anatomy_of(robot.name).density_kg_m3;
   const std::string of_true_size = scale < 1
                                        ? fmt::format("{:g} of its true size, about its own middle", scale)
                                        : std::string("of its true size");
@@ -450,15 +426,13 @@ scenes::Scene laid_out(const NewSceneOptions& options, const std::vector<Organ>&
 
 }  // namespace
 
-Outcome new_scene(const NewSceneOptions& options) {
-  if (fs::exists(options.out))
-    throw InputError(
-        fmt::format("{}: is there already; choose another name, or remove it", options.out.string()));
-  if (options.up.back() == options.front.back())
-    throw InputError(fmt::format("--up {} and --front {} are the same axis; a body's front is across it",
-                                 options.up, options.front));
+namespace {
+
+// `where` is how the scene calls the folder: its models' names begin with that.
+Outcome scene_of_folder(const NewSceneOptions& options, const std::string& where,
+                        std::vector<std::string> notes) {
   std::vector<Organ> organs = read_organs(options);
-  std::vector<std::string> deformable, notes;
+  std::vector<std::string> deformable;
   for (Organ& organ : organs) {
     if (organ.thickness_m < least_thickness * organ.box.diagonal() && !organ.see_through && !organ.bone) {
       organ.see_through = true;
@@ -471,6 +445,7 @@ Outcome new_scene(const NewSceneOptions& options) {
     throw InputError(
         fmt::format("--robot {}: {} has no such soft body (bones, hulls and sheets are none); there are: {}",
                     options.robot, options.from.string(), fmt::join(deformable, ", ")));
+  for (Organ& organ : organs) organ.file = where + organ.file;
   if (options.only.empty()) leave_out_doubles(organs, notes);
   log::info("making cages");
   for (Organ& organ : organs)
@@ -479,7 +454,8 @@ Outcome new_scene(const NewSceneOptions& options) {
   const scenes::Scene scene = laid_out(options, organs, scale);
   write_file(options.out, scene.text);
   const std::string next =
-      fmt::format("limber run {} --data {} -o DIR", options.out.string(), options.from.string());
+      fmt::format("limber run {}{} -o DIR", options.out.string(),
+                  where.empty() ? fmt::format(" --data {}", options.from.string()) : std::string());
   Json moved_m = Json::object();
   std::string text = fmt::format("{}: {} bodies at {:g} of their size, {} only seen\n", options.out.string(),
                                  scene.bodies.size(), scale, scene.scenery.size());
@@ -499,6 +475,46 @@ Outcome new_scene(const NewSceneOptions& options) {
            {"notes", notes},
            {"next", next}},
           text};
+}
+
+// Models are made beside the scene, which is then of those.
+Outcome scene_of_parts(NewSceneOptions options) {
+  const NewSceneOptions usual;
+  if (options.scale != usual.scale || options.up != usual.up || options.front != usual.front)
+    throw InputError(
+        fmt::format("{}: says itself where up is and how long a unit; leave --scale, --up and --front out",
+                    options.from.string()));
+  const std::string name = options.out.stem().string() + "_models";
+  const fs::path folder = options.out.parent_path() / name;
+  PartModels made = make_part_models({options.from, options.labels, options.only}, folder);
+  options.from = folder, options.only.clear();
+  try {
+    return scene_of_folder(options, name + "/", std::move(made.notes));
+  } catch (...) {
+    std::error_code none;
+    fs::remove_all(folder, none);
+    throw;
+  }
+}
+
+}  // namespace
+
+Outcome new_scene(const NewSceneOptions& options) {
+  if (fs::exists(options.out))
+    throw InputError(
+        fmt::format("{}: is there already; choose another name, or remove it", options.out.string()));
+  if (options.up.back() == options.front.back())
+    throw InputError(fmt::format("--up {} and --front {} are the same axis; a body's front is across it",
+                                 options.up, options.front));
+  const bool scan = !fs::is_directory(options.from);
+  if (scan && !imaging::is_label_map(options.from))
+    throw InputError(fmt::format("{}: is neither a folder of models nor a label map (NIfTI or NRRD)",
+                                 options.from.string()));
+  if (!scan && !options.labels.empty())
+    throw InputError(fmt::format("--labels names the labels of a scan, and {} is a folder; leave it out",
+                                 options.from.string()));
+  if (scan || is_atlas(options.from)) return scene_of_parts(options);
+  return scene_of_folder(options, "", {});
 }
 
 }  // namespace limber::app

@@ -83,12 +83,14 @@ namespace {
 meshing::ImportedModel import_label(const PrepareOptions& options, const fs::path& file) {
   const imaging::LabelMap map = imaging::read_label_map(file);
   const int row = imaging::row_of_label(map, options.label, file.string());
+  const std::string what = fmt::format("{}: label {}", file.string(), map.labels[std::size_t(row)]);
   const imaging::LabelSurface label = imaging::surfaces_of(
       map, {row},
       {.gap = options.label_gap, .rounds = options.label_rounds, .least_island = options.least_island})[0];
-  meshing::ImportedModel model =
-      meshing::clean(label.surface, {.scale = options.scale},
-                     fmt::format("{}: label {}", file.string(), map.labels[std::size_t(row)]));
+  if (label.voxels == 0)
+    throw InputError(fmt::format("{}: all of its {} pieces, {} voxels in all, are smaller than {:g} voxels",
+                                 what, label.islands_dropped, label.voxels_dropped, options.least_island));
+  meshing::ImportedModel model = meshing::clean(label.surface, {.scale = options.scale}, what);
   if (label.islands_dropped > 0)
     model.mended.push_back(fmt::format("left out {} pieces of fewer than {:g} voxels, {} voxels in all",
                                        label.islands_dropped, options.least_island, label.voxels_dropped));

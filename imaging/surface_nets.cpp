@@ -586,11 +586,8 @@ LabelSurface Nets::surface(int row) const {
   LabelSurface result;
   result.voxels = voxels_[std::size_t(row)];
   result.islands_dropped = islands_[std::size_t(row)], result.voxels_dropped = dropped_[std::size_t(row)];
-  if (result.voxels == 0)
-    throw InputError(fmt::format(
-        "label {}: all of its {} pieces, {} voxels in all, are smaller than {:g} voxels",
-        map_.labels[std::size_t(row)], result.islands_dropped, result.voxels_dropped, options_.least_island));
-  result.surface = OneLabel(*this, row).surface();
+  result.surface = {Points(0, 3), Triangles(0, 3)};
+  if (result.voxels > 0) result.surface = OneLabel(*this, row).surface();
   return result;
 }
 

@@ -13,7 +13,8 @@ struct SurfaceNetOptions {
 };
 
 struct LabelSurface {
-  SurfaceMesh surface;              // closed, each edge of two triangles, each vertex one fan; metres
+  SurfaceMesh surface;  // closed, each edge of two triangles, each vertex one fan; metres; empty: no piece is
+                        // left
   std::int64_t voxels = 0;          // of the label, without what was left out
   int islands_dropped = 0;          // pieces smaller than least_island
   std::int64_t voxels_dropped = 0;  // in those
@@ -22,8 +23,8 @@ struct LabelSurface {
 // One surface for each row of map.labels that is asked for, in that order. All are made of the same smoothed
 // boundaries, whichever are asked for, so those of neighbours do not overlap.
 // Gibson, Constrained elastic surface nets, 1998; Frisken, SurfaceNets for multi-label segmentations, 2022.
-// Throws InputError for options out of range, a row that is not there, a label of which no piece is left, and
-// one with more than 2^30 vertices.
+// Throws InputError for options out of range, a row that is not there, and a label with more than 2^30
+// vertices.
 std::vector<LabelSurface> surfaces_of(const LabelMap&, const std::vector<int>& rows,
                                       const SurfaceNetOptions& = {});
 

@@ -202,7 +202,10 @@ TEST(SurfaceNets, IslandsAreLeftOutAndTold) {
   EXPECT_EQ(large.voxels_dropped, 8);
   EXPECT_EQ(large.voxels + 8, all.voxels);
   EXPECT_LT(bounding_box(large.surface.positions).upper.x(), 0.012);
-  EXPECT_THROW(surfaces_of(map, {1}, {.least_island = 1e6}), InputError);
+  const LabelSurface none = surfaces_of(map, {1}, {.least_island = 1e6})[0];
+  EXPECT_EQ(none.voxels, 0);
+  EXPECT_EQ(none.voxels_dropped, all.voxels);
+  EXPECT_EQ(none.surface.triangles.rows(), 0);
   EXPECT_THROW(surfaces_of(map, {2}), InputError);
   EXPECT_THROW(surfaces_of(map, {1}, {.gap = 0.7}), InputError);
   EXPECT_THROW(surfaces_of(map, {1}, {.rounds = -1}), InputError);
