@@ -772,6 +772,23 @@ int run_command_line(int argc, const char* const* argv) {
   add_global(new_command, global);
   new_command.callback([&] { chosen = [&] { return new_scene(new_options); }; });
 
+  ScenePrepareOptions scene_prepare_options;
+  CLI::App& scene_prepare_command = *scene_command.add_subcommand(
+      "prepare", "the bodies of a scene in its work folder, as plan and run would make them first");
+  add_scene(scene_prepare_command, scene_prepare_options.scene);
+  scene_prepare_command
+      .add_option("-o,--out", scene_prepare_options.out, "work folder; it is made where it is missing")
+      ->required()
+      ->type_name("DIR");
+  scene_prepare_command
+      .add_option("--body", scene_prepare_options.bodies,
+                  "these alone, as one of several machines that share the folder; default: all, and scenery")
+      ->type_name("NAME[,NAME…]")
+      ->delimiter(',')
+      ->allow_extra_args(false);
+  add_global(scene_prepare_command, global), add_threads(scene_prepare_command, global);
+  scene_prepare_command.callback([&] { chosen = [&] { return prepare_scene(scene_prepare_options); }; });
+
   SceneCheckOptions check_options;
   CLI::App& check_command = *scene_command.add_subcommand(
       "check", "loads a scene and its models, and says what can be said before it is planned");

@@ -144,6 +144,15 @@ struct SceneCheckOptions {
 // What can be said of a scene before it is planned; exit code 2 with all that is wrong where it cannot be.
 Outcome check_scene(const SceneCheckOptions&);
 
+struct ScenePrepareOptions {
+  SceneOptions scene;
+  fs::path out;
+  std::vector<std::string> bodies;  // these alone; empty: all, and what the scene has beside them
+};
+// The bodies of a scene in its work folder, as plan and run would make them first: of several machines each
+// may make some of them.
+Outcome prepare_scene(const ScenePrepareOptions&);
+
 inline const std::vector<std::string> motion_formats{"gltf", "pc2", "usd", "vtu"};
 struct ExportOptions {
   fs::path folder;

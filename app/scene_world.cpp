@@ -195,21 +195,30 @@ std::optional<fs::path> find_goal_cage(const scenes::Scene& scene, std::vector<f
   return std::nullopt;
 }
 
-std::vector<PreparedBody> prepare_bodies(const scenes::Scene& scene, const std::vector<fs::path>& data,
-                                         const fs::path& work_folder, const fs::path& store_folder) {
-  std::optional<BodyStore> store;
-  if (!store_folder.empty()) store.emplace(store_folder);
-  for (const scenes::BodySpec& body : scene.bodies) {
-    throw_if_stopped();
-    const BodySource source = source_of(scene, body, data);
-    if (!source.warning.empty()) log::warn("{}", source.warning);
-    prepare_body(source, settings_of(body), body_folder(work_folder, body), store ? &*store : nullptr);
-  }
+Json prepare_body_of(const scenes::Scene& scene, const scenes::BodySpec& body,
+                     const std::vector<fs::path>& data, const fs::path& work_folder, BodyStore* store) {
+  throw_if_stopped();
+  const BodySource source = source_of(scene, body, data);
+  if (!source.warning.empty()) log::warn("{}", source.warning);
+  return prepare_body(source, settings_of(body), body_folder(work_folder, body), store);
+}
+
+void prepare_beside(const scenes::Scene& scene, const std::vector<fs::path>& data,
+                    const fs::path& work_folder) {
   keep_goal_cage(scene, data, work_folder);
   for (const scenes::BodySpec& body : scene.scenery) {
     throw_if_stopped();
     prepare_scenery(scene, body, data, work_folder);
   }
+}
+
+std::vector<PreparedBody> prepare_bodies(const scenes::Scene& scene, const std::vector<fs::path>& data,
+                                         const fs::path& work_folder, const fs::path& store_folder) {
+  std::optional<BodyStore> store;
+  if (!store_folder.empty()) store.emplace(store_folder);
+  for (const scenes::BodySpec& body : scene.bodies)
+    prepare_body_of(scene, body, data, work_folder, store ? &*store : nullptr);
+  prepare_beside(scene, data, work_folder);
   return read_bodies(scene, work_folder);
 }
 

@@ -174,5 +174,29 @@ TEST_F(SceneCheck_slow, AModelWhoseNameIsNoUtf8IsPrepared) {
   EXPECT_NE(set.err.find("no UTF-8"), std::string::npos) << set.err;
 }
 
+// Bodies made apart, in any order, are those that a plan makes, and it takes them.
+TEST_F(SceneCheck, BodiesArePreparedApart) {
+  const auto prepare = [&](std::vector<std::string> more) {
+    std::vector<std::string> words{"scene", "prepare", scene(), "-o", out(), "--json"};
+    words.insert(words.end(), more.begin(), more.end());
+    return limber_program(words);
+  };
+  const Result other = prepare({"--body", "robto"});
+  EXPECT_EQ(other.code, exit_bad_input);
+  EXPECT_NE(other.err.find("did you mean robot?"), std::string::npos) << other.err;
+  EXPECT_FALSE(fs::exists(out()));
+
+  const Json last = prepare({"--body", "block"}).json();
+  ASSERT_EQ(last.at("bodies").size(), 1u);
+  EXPECT_FALSE(fs::exists(out() + "/bodies/robot"));
+  const auto block = contents(out() + "/bodies/block");
+  EXPECT_EQ(prepare({}).json().at("bodies").size(), 2u);
+  EXPECT_EQ(contents(out() + "/bodies/block"), block);
+  const auto apart = contents(out() + "/bodies");
+  const Result planned = limber_program({"plan", scene(), "-o", out(), "--iterations", "1"});
+  EXPECT_NE(planned.err.find("bodies/robot: up to date"), std::string::npos) << planned.err;
+  EXPECT_EQ(contents(out() + "/bodies"), apart);
+}
+
 }  // namespace
 }  // namespace limber::app
