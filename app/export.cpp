@@ -71,6 +71,8 @@ std::vector<std::string> export_body(const PreparedBody& body, const std::vector
       write_obj(name("surface.obj"), body.surface);
     } else if (format == "vtk") {
       write_legacy_vtk(name("cage.vtk"), body.cage);
+    } else if (format == "vtk-interior") {
+      write_legacy_vtk(name("cage-interior.vtk"), with_interior_vertices(body.cage));
     } else if (format == "inp") {
       write_inp(name("cage.inp"), body.cage, body.shell_from_tet);
     } else if (format == "urdf") {
@@ -98,9 +100,10 @@ std::vector<std::string> export_body(const PreparedBody& body, const std::vector
 
 void remove_exports(const fs::path& folder) {
   std::error_code ignored;
-  for (const char* file : {"cage.vtu", "surface.vtu", "cage.node", "cage.ele", "cage.veg", "surface.interp",
-                           "surface.obj", "cage.vtk", "cage.inp", "mass.json", "body.urdf", "body.sdf",
-                           "body.xml", "flex.xml", "body.usda", "body-omni.usda", "body.scn"})
+  for (const char* file :
+       {"cage.vtu", "surface.vtu", "cage.node", "cage.ele", "cage.veg", "surface.interp", "surface.obj",
+        "cage.vtk", "cage-interior.vtk", "cage.inp", "mass.json", "body.urdf", "body.sdf", "body.xml",
+        "flex.xml", "body.usda", "body-omni.usda", "body.scn"})
     fs::remove(folder / file, ignored);
   static const std::regex hull(R"(hull_[0-9]{3,}\.obj)");
   std::vector<fs::path> hulls;

@@ -8,8 +8,8 @@
 
 namespace limber::app {
 
-inline const std::vector<std::string> export_formats{"vtu", "node", "interp", "vtk",      "inp", "urdf",
-                                                     "sdf", "mjcf", "usd",    "usd-omni", "sofa"};
+inline const std::vector<std::string> export_formats{"vtu",  "node", "interp", "vtk", "vtk-interior", "inp",
+                                                     "urdf", "sdf",  "mjcf",   "usd", "usd-omni",     "sofa"};
 
 // Writes those files of each format into the folder, and returns their names, each once. Masses are of
 // density_kg_m3.

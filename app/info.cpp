@@ -37,6 +37,7 @@ Json info_of_cage(const TetMesh& cage) {
   const meshing::TetQuality quality = meshing::measure_quality(cage);
   return {{"nodes", cage.positions.rows()},
           {"tets", cage.tets.rows()},
+          {"tets_without_interior_vertex", tets_without_interior_vertex(cage.tets).size()},
           {"volume", volume(cage)},
           {"min_dihedral_deg", quality.min_dihedral_deg},
           {"max_dihedral_deg", quality.max_dihedral_deg},

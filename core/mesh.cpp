@@ -130,6 +130,36 @@ Triangles boundary_triangles(const Tets& tets) {
   return triangles;
 }
 
+std::vector<int> tets_without_interior_vertex(const Tets& tets) {
+  std::vector<bool> outside(std::size_t(tets.rows() == 0 ? 0 : tets.maxCoeff() + 1), false);
+  for (const int v : vertices_of(boundary_triangles(tets))) outside[std::size_t(v)] = true;
+  std::vector<int> found;
+  for (int t = 0; t < tets.rows(); ++t) {
+    const auto at = [&](int corner) { return outside[std::size_t(tets(t, corner))]; };
+    if (at(0) && at(1) && at(2) && at(3)) found.push_back(t);
+  }
+  return found;
+}
+
+TetMesh with_interior_vertices(TetMesh mesh) {
+  const std::vector<int> cut = tets_without_interior_vertex(mesh.tets);
+  Eigen::Index vertex = mesh.positions.rows(), tet = mesh.tets.rows();
+  mesh.positions.conservativeResize(vertex + Eigen::Index(cut.size()), 3);
+  mesh.tets.conservativeResize(tet + 3 * Eigen::Index(cut.size()), 4);
+  for (const int t : cut) {
+    const Eigen::RowVector4i corners = mesh.tets.row(t);
+    mesh.positions.row(vertex).setZero();
+    for (int c = 0; c < 4; ++c) mesh.positions.row(vertex) += mesh.positions.row(corners[c]) / 4;
+    for (int c = 0; c < 4; ++c) {
+      const Eigen::Index row = c == 0 ? t : tet++;
+      mesh.tets.row(row) = corners;
+      mesh.tets(row, c) = int(vertex);
+    }
+    ++vertex;
+  }
+  return mesh;
+}
+
 std::vector<int> vertices_of(const Triangles& triangles) {
   std::vector<int> vertices(triangles.data(), triangles.data() + triangles.size());
   std::sort(vertices.begin(), vertices.end());

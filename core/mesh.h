@@ -58,6 +58,13 @@ Triangles boundary_triangles(const Tets&);
 // The distinct vertices of some triangles, ascending.
 std::vector<int> vertices_of(const Triangles&);
 
+// The tets all of whose vertices are on the boundary, ascending. Engines that have a field of zero there
+// (Drake's pressure) feel nothing in them.
+std::vector<int> tets_without_interior_vertex(const Tets&);
+// The same volume, without such tets: each becomes four, round a vertex in its middle, the first in its place
+// and the others after all tets.
+TetMesh with_interior_vertices(TetMesh);
+
 // Unit vertex normals, (V × 3): the sum of the area vectors of the triangles round each vertex; zero where
 // there are none.
 Points vertex_normals(const Points&, const Triangles&);

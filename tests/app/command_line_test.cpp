@@ -376,13 +376,13 @@ TEST_F(Program_slow, ExportsAreWrittenAlsoOfABodyThatIsUpToDateAndGoWithIt) {
   const std::string model = (folder / "tetrahedron.obj").string();
   std::ofstream(model) << "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n";
   ASSERT_EQ(limber_program({"prepare", model, "-o", out(), "--tets", "100"}).code, exit_done);
-  const Result exported = limber_program({"prepare", model, "-o", out(), "--tets", "100", "--export",
-                                          "vtu,node,interp,vtk,inp,urdf,sdf,mjcf,usd,usd-omni,sofa",
-                                          "--density", "500", "--json"});
+  const Result exported = limber_program(
+      {"prepare", model, "-o", out(), "--tets", "100", "--export",
+       "vtu,node,interp,vtk,vtk-interior,inp,urdf,sdf,mjcf,usd,usd-omni,sofa", "--density", "500", "--json"});
   ASSERT_EQ(exported.code, exit_done) << exported.err;
   EXPECT_NE(exported.err.find("up to date"), std::string::npos) << exported.err;
   const Json files = exported.json().at("also_written");
-  EXPECT_EQ(files.size(), 18);  // one of them the only hull
+  EXPECT_EQ(files.size(), 19);  // one of them the only hull
   const Json mass = Json::parse(read_file(fs::path(out()) / "mass.json"));
   EXPECT_NEAR(mass.at("whole").at("mass_kg").get<double>(), 500. / 6, 1e-9);
   for (const Json& name : files) EXPECT_TRUE(fs::exists(fs::path(out()) / name)) << name;
