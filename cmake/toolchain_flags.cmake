@@ -5,6 +5,9 @@ add_compile_options(-Wno-maybe-uninitialized -Wno-array-bounds -Wno-stringop-ove
 if(LIMBER_FUZZ)
   add_compile_options(-fsanitize=fuzzer-no-link -Wno-error -Wno-unknown-warning-option)
 endif()
+# Python and other programs load what we build; none of its functions is to be replaced from outside, so they may be inlined.
+set(CMAKE_POSITION_INDEPENDENT_CODE ON)
+add_compile_options(-fno-semantic-interposition)
 include_directories(${PROJECT_SOURCE_DIR})
 if(LIMBER_SANITIZE)
   add_compile_options(-fsanitize=${LIMBER_SANITIZE} -fno-omit-frame-pointer -fno-sanitize-recover=all)
