@@ -273,6 +273,102 @@ Json facts_of_making(const MadeBody& made, const PrepareSettings& settings) {
   return facts;
 }
 
+WholeBody make_body(const BodySource& source, const PrepareSettings& settings,
+                    const std::function<void(const char*)>& end_stage) {
+  Progress progress("prepare", 7);
+  progress.update(0, "import");
+  WholeBody body;
+  body.model = source.load();
+  SurfaceMesh& surface = body.model.surface;
+  validate(surface, source.model);
+  const Eigen::Index own_vertices = surface.positions.rows();
+  surface = surface_that_bends(surface, settings);
+  if (const Eigen::Index more = surface.positions.rows() - own_vertices; more > 0)
+    body.model.mended.push_back(
+        fmt::format("cut long edges at {} places, so that its {} triangles bend as the cage does", more,
+                    surface.triangles.rows()));
+  end_stage("import");
+  throw_if_stopped();
+
+  MadeBody& made = body.made;
+  if (has_shells(settings)) {
+    progress.update(1, "decompose");
+    made.decomposition = make_shells(surface, settings);
+    end_stage("decompose");
+    throw_if_stopped();
+  }
+
+  if (has_cage(settings)) {
+    progress.update(2, "cage");
+    made.cage = make_cage(surface, made.decomposition.shells, settings, source.made_cage());
+    validate(made.cage.mesh, source.model + ": cage");
+    end_stage("cage");
+    progress.update(3, "certify");
+    throw_if_stopped();
+
+    body.certificate = meshing::certify(surface, made.cage.mesh);
+    end_stage("certify");
+    throw_if_stopped();
+  }
+
+  if (is_whole(settings)) {
+    progress.update(4, "bind");
+    body.binding = ffd::bind(surface, made.cage.mesh);
+    end_stage("bind");
+    throw_if_stopped();
+
+    progress.update(5, "contact");
+    made.contact = meshing::make_contact_shape(surface, made.cage.mesh, {}, &made.contact_report);
+    end_stage("contact");
+  }
+  return body;
+}
+
+Json report_of(const WholeBody& body, const BodySource& source, const PrepareSettings& settings) {
+  const meshing::Certificate& certificate = body.certificate;
+  std::vector<std::string> warnings = body.model.warnings;
+  for (const auto* more : {&body.made.cage.notes, &body.made.contact_report.warnings})
+    warnings.insert(warnings.end(), more->begin(), more->end());
+  if (certificate.vertices_outside > 0)
+    warnings.push_back(fmt::format("{} vertices lie outside the cage", certificate.vertices_outside));
+  if (certificate.triangles_crossing > 0)
+    warnings.push_back(
+        fmt::format("{} triangles cross the boundary of the cage", certificate.triangles_crossing));
+
+  Json report{
+      {"version", version}, {"model", source.model}, {"input", input_of(source.identity, settings)}};
+  report.update(meshing::to_json(body.model));
+  report["warnings"] = warnings;
+  report.update(facts_of_body(body.model.surface, body.made.decomposition.shells, body.made.cage.mesh,
+                              body.binding, body.made.contact, certificate));
+  const Json making = facts_of_making(body.made, settings);
+  for (const auto& [table, figures] : making.items()) report[table].update(figures);
+  if (!has_shells(settings)) report.erase("shells");
+  if (!has_cage(settings)) report.erase("cage"), report.erase("certificate");
+  if (!is_whole(settings)) report.erase("binding"), report.erase("contact");
+  return report;
+}
+
+Json write_body(const WholeBody& body, const BodySource& source, const PrepareSettings& settings,
+                const fs::path& folder) {
+  const SurfaceMesh& surface = body.model.surface;
+  const meshing::Cage& cage = body.made.cage;
+  remove_abandoned(folder);
+  clear_body(folder);
+  write_ply(folder / "surface.ply", surface);
+  if (has_shells(settings)) write_obj(folder / "shells.obj", body.made.decomposition.shells);
+  if (has_cage(settings)) write_msh(folder / "cage.msh", cage.mesh, cage.shell_from_tet);
+  if (is_whole(settings)) {
+    ffd::write_binding(folder / "binding.npz", body.binding, surface, cage.mesh);
+    write_contact_shape(folder / "contact.npz", body.made.contact, surface, cage.mesh);
+  }
+  Json report = report_of(body, source, settings);
+  for (const std::string& name : files_of(settings)) report["files"][name] = hash_of_file(folder / name);
+  take_costs_out(report);
+  write_json(folder / "report.json", report);
+  return report;
+}
+
 Json prepare_body(const BodySource& source, const PrepareSettings& settings, const fs::path& folder,
                   const BodyStore* store) {
   const Json input = input_of(source.identity, settings);
@@ -300,96 +396,19 @@ Json prepare_body(const BodySource& source, const PrepareSettings& settings, con
   tell(false);
   if (!lock && fs::is_directory(folder)) lock.emplace(folder, FolderLock::alone);
   Costs costs;
-  Progress progress("prepare", 7);
-  progress.update(0, "import");
-  meshing::ImportedModel model = source.load();
-  validate(model.surface, source.model);
-  const Eigen::Index own_vertices = model.surface.positions.rows();
-  model.surface = surface_that_bends(model.surface, settings);
-  if (const Eigen::Index more = model.surface.positions.rows() - own_vertices; more > 0)
-    model.mended.push_back(
-        fmt::format("cut long edges at {} places, so that its {} triangles bend as the cage does", more,
-                    model.surface.triangles.rows()));
-  costs.end_stage("import");
-  throw_if_stopped();
-
-  MadeBody made;
-  if (has_shells(settings)) {
-    progress.update(1, "decompose");
-    made.decomposition = make_shells(model.surface, settings);
-    costs.end_stage("decompose");
-    throw_if_stopped();
-  }
-
-  meshing::Certificate certificate;
-  if (has_cage(settings)) {
-    progress.update(2, "cage");
-    made.cage = make_cage(model.surface, made.decomposition.shells, settings, source.made_cage());
-    validate(made.cage.mesh, source.model + ": cage");
-    costs.end_stage("cage");
-    progress.update(3, "certify");
-    throw_if_stopped();
-
-    certificate = meshing::certify(model.surface, made.cage.mesh);
-    costs.end_stage("certify");
-    throw_if_stopped();
-  }
-
-  ffd::Binding binding;
-  if (is_whole(settings)) {
-    progress.update(4, "bind");
-    binding = ffd::bind(model.surface, made.cage.mesh);
-    costs.end_stage("bind");
-    throw_if_stopped();
-
-    progress.update(5, "contact");
-    made.contact = meshing::make_contact_shape(model.surface, made.cage.mesh, {}, &made.contact_report);
-    costs.end_stage("contact");
-  }
-  progress.update(6, "write");
-  const meshing::Cage& cage = made.cage;
-
+  const WholeBody body =
+      make_body(source, settings, [&](const char* stage) { costs.end_stage(stage); });
   make_folder(folder);  // not before: a model that is refused leaves all as it was
   if (!lock) lock.emplace(folder, FolderLock::alone);
-  remove_abandoned(folder);
-  clear_body(folder);
-  write_ply(folder / "surface.ply", model.surface);
-  if (has_shells(settings)) write_obj(folder / "shells.obj", made.decomposition.shells);
-  if (has_cage(settings)) write_msh(folder / "cage.msh", cage.mesh, cage.shell_from_tet);
-  if (is_whole(settings)) {
-    ffd::write_binding(folder / "binding.npz", binding, model.surface, cage.mesh);
-    write_contact_shape(folder / "contact.npz", made.contact, model.surface, cage.mesh);
-  }
+  Json report = write_body(body, source, settings, folder);
   costs.end_stage("write");
-
-  std::vector<std::string> warnings = model.warnings;
-  warnings.insert(warnings.end(), cage.notes.begin(), cage.notes.end());
-  warnings.insert(warnings.end(), made.contact_report.warnings.begin(), made.contact_report.warnings.end());
-  if (certificate.vertices_outside > 0)
-    warnings.push_back(fmt::format("{} vertices lie outside the cage", certificate.vertices_outside));
-  if (certificate.triangles_crossing > 0)
-    warnings.push_back(
-        fmt::format("{} triangles cross the boundary of the cage", certificate.triangles_crossing));
-
-  Json report{{"version", version}, {"model", source.model}, {"input", input}};
-  report.update(meshing::to_json(model));
-  report["warnings"] = warnings;
-  report.update(
-      facts_of_body(model.surface, made.decomposition.shells, cage.mesh, binding, made.contact, certificate));
-  const Json making = facts_of_making(made, settings);
-  for (const auto& [table, figures] : making.items()) report[table].update(figures);
-  if (!has_shells(settings)) report.erase("shells");
-  if (!has_cage(settings)) report.erase("cage"), report.erase("certificate");
-  if (!is_whole(settings)) report.erase("binding"), report.erase("contact");
   report["cpu_seconds"] = costs.cpu_s;
   report["peak_memory_mb_after"] = costs.peak_mb;
   report["peak_memory_mb"] = std::round(peak_memory_mb());
-  for (const std::string& name : files_of(settings)) report["files"][name] = hash_of_file(folder / name);
-  Json written = report;
-  if (store) take_costs_out(written);
-  write_json(folder / "report.json", written);
+  if (!store) write_json(folder / "report.json", report);
   if (store) store->keep(key, folder);
-  for (const std::string& warning : warnings) log::warn("{}: {}", source.model, warning);
+  for (const Json& warning : report.at("warnings"))
+    log::warn("{}: {}", source.model, warning.get<std::string>());
   return report;
 }
 

@@ -73,6 +73,24 @@ meshing::Cage make_cage(const SurfaceMesh&, const std::vector<ConvexShell>&, con
 // What a report tells of their making: tables within "shells", "cage" and "contact".
 Json facts_of_making(const MadeBody&, const PrepareSettings&);
 
+// All that is made of a model, in memory.
+struct WholeBody {
+  meshing::ImportedModel model;  // its long edges cut
+  MadeBody made;
+  meshing::Certificate certificate;
+  ffd::Binding binding;
+};
+// `end_stage` hears "import", "decompose", "cage", "certify", "bind", "contact" as each ends. Throws
+// InputError where the model is none.
+WholeBody make_body(const BodySource&, const PrepareSettings&,
+                    const std::function<void(const char*)>& end_stage);
+// What a report tells of it, but for costs and files.
+Json report_of(const WholeBody&, const BodySource&, const PrepareSettings&);
+
+// Its files, and last its report, which is returned: of no costs. Nobody else writes into the folder, which is
+// there.
+Json write_body(const WholeBody&, const BodySource&, const PrepareSettings&, const fs::path& folder);
+
 // Whether the folder holds what `input` makes, whole.
 bool body_is_up_to_date(const fs::path& folder, const Json& input);
 // Removes all that limber writes of a body, first its report.

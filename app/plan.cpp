@@ -327,6 +327,42 @@ Outcome plan(const PlanOptions& options) {
   return plan(options, scene);
 }
 
+Found find_plan(const scenes::Scene& scene, const FemSystem& system, const PlanOptions& options,
+                std::optional<plan::Plan> earlier, const Json& earlier_summary) {
+  const plan::Settings settings = settings_of(scene, options);
+  const bool several = options.portfolio > 1;
+  Found found;
+  std::optional<SearchLog> search_log;
+  if (options.stats) search_log.emplace(*options.stats, earlier ? earlier->statistics.iterations : 0);
+  plan::PortfolioReport searches;
+  found.plan = several
+                   ? plan::portfolio(system, settings, options.portfolio, &searches)
+                   : plan::plan(system, settings, std::move(earlier), [&](const plan::Moment& moment) {
+                       if (search_log) search_log->add(moment);
+                     });
+  if (search_log) search_log->finish();
+
+  plan::Plan& plan = found.plan;
+  const plan::ShortcutSettings shortcuts = shortcuts_of(scene, options, earlier_summary);
+  for (const char* later : {"shortcut", "improve", "refine"})
+    if (earlier_summary.contains(later)) found.extra[later] = earlier_summary.at(later);
+  if (several) {
+    found.extra["portfolio"] = plan::json_of(searches);
+    found.extra_text += text_of_portfolio(searches, plan);
+  }
+  if (plan.solved() && shortcuts.rounds > shortcuts.rounds_done) {
+    found.extra["shortcut"] = plan::json_of(plan::shorten(system, plan, shortcuts));
+    found.extra_text += text_of_shortcut(found.extra.at("shortcut"));
+  }
+  if (plan.solved() && options.improve) {
+    const plan::AnytimeReport report =
+        plan::improve(system, plan, {.cost = shortcuts.cost, .shortcut_rounds = shortcuts.rounds});
+    found.extra["improve"] = plan::json_of(report);
+    found.extra_text += text_of_improvements(report);
+  }
+  return found;
+}
+
 Outcome plan(const PlanOptions& options, const scenes::Scene& scene) {
   make_folder(options.out);
   remove_abandoned(options.out);
@@ -335,10 +371,8 @@ Outcome plan(const PlanOptions& options, const scenes::Scene& scene) {
   const fem::World world = build_world(scene, bodies);
   const Beginning beginning = beginning_of(options.from, options.frame, options.out, scene, world);
   const FemSystem system(world, bodies, goal_rules_of(scene), beginning.start);
-  const plan::Settings settings = settings_of(scene, options);
   const fs::path file = options.out / "plan.npz";
-  const bool several = options.portfolio > 1;
-  if (several && (options.resume || options.stats))
+  if (options.portfolio > 1 && (options.resume || options.stats))
     throw InputError(fmt::format("--portfolio is of several searches, {} of one; leave one of the two out",
                                  options.resume ? "--resume" : "--stats"));
 
@@ -358,46 +392,21 @@ Outcome plan(const PlanOptions& options, const scenes::Scene& scene) {
                       file.string()));
     log::info("{}: going on after {} iterations", file.string(), earlier->statistics.iterations);
   }
-  std::optional<SearchLog> search_log;
-  if (options.stats) search_log.emplace(*options.stats, earlier ? earlier->statistics.iterations : 0);
-  plan::PortfolioReport searches;
-  plan::Plan plan = several
-                        ? plan::portfolio(system, settings, options.portfolio, &searches)
-                        : plan::plan(system, settings, std::move(earlier), [&](const plan::Moment& moment) {
-                            if (search_log) search_log->add(moment);
-                          });
-  if (search_log) search_log->finish();
-
-  const plan::ShortcutSettings shortcuts = shortcuts_of(scene, options, earlier_summary);
-  Json extra;
-  std::string extra_text;
+  Found found = find_plan(scene, system, options, std::move(earlier), earlier_summary);
+  plan::Plan& plan = found.plan;
   if (beginning.start) {
-    extra["from"] = beginning.from;
-    extra_text += fmt::format("  from         frame {} of {}\n", beginning.from.at("frame").get<int>(),
-                              options.from.string());
-  }
-  for (const char* later : {"shortcut", "improve", "refine"})
-    if (earlier_summary.contains(later)) extra[later] = earlier_summary.at(later);
-  if (several) {
-    extra["portfolio"] = plan::json_of(searches);
-    extra_text += text_of_portfolio(searches, plan);
-  }
-  if (plan.solved() && shortcuts.rounds > shortcuts.rounds_done) {
-    extra["shortcut"] = plan::json_of(plan::shorten(system, plan, shortcuts));
-    extra_text += text_of_shortcut(extra.at("shortcut"));
-  }
-  if (plan.solved() && options.improve) {
-    const plan::AnytimeReport report =
-        plan::improve(system, plan, {.cost = shortcuts.cost, .shortcut_rounds = shortcuts.rounds});
-    extra["improve"] = plan::json_of(report);
-    extra_text += text_of_improvements(report);
+    found.extra["from"] = beginning.from;
+    found.extra_text = fmt::format("  from         frame {} of {}\n", beginning.from.at("frame").get<int>(),
+                                   options.from.string()) +
+                       found.extra_text;
   }
   // Whatever comes of a search, of shortcuts or of better paths is in the tree.
   if (stop_signal() != 0 && plan.tree.size() == nodes_kept) {
     log::info("{}: is as it was; go on with --resume", file.string());
     throw_if_stopped();
   }
-  const Outcome outcome = keep_plan(options.out, scene, bodies, world, system, plan, extra, extra_text);
+  const Outcome outcome =
+      keep_plan(options.out, scene, bodies, world, system, plan, found.extra, found.extra_text);
   if (stop_signal() != 0) {
     log::info("{}: the plan so far is kept; go on with --resume", file.string());
     throw_if_stopped();

@@ -82,6 +82,16 @@ std::vector<PreparedBody> read_caged_bodies_of(const PlanFolder&, const fs::path
 // their world.
 std::vector<PreparedBody> read_bodies_of(const PlanFolder&, const fs::path& folder);
 
+// What `limber plan` finds before it keeps it: a search, or several, and what makes their path better. `extra`
+// and `extra_text` as of keep_plan. `earlier` and its summary: the plan that this one goes on from.
+struct Found {
+  plan::Plan plan;
+  Json extra;
+  std::string extra_text;
+};
+Found find_plan(const scenes::Scene&, const FemSystem&, const PlanOptions&,
+                std::optional<plan::Plan> earlier = std::nullopt, const Json& earlier_summary = {});
+
 scenes::Scene read_scene(const PlanOptions&);
 plan::Settings settings_of(const scenes::Scene&, const PlanOptions&);
 Outcome plan(const PlanOptions&, const scenes::Scene&);

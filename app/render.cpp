@@ -12,6 +12,7 @@
 #include "core/error.h"
 #include "core/events.h"
 #include "core/hash.h"
+#include "core/job.h"
 #include "core/lock.h"
 #include "core/log.h"
 #include "core/progress.h"
@@ -57,7 +58,9 @@ std::vector<Failure> paint_all(const Shot& shot, const std::vector<int>& frames,
   std::exception_ptr fatal;
   std::mutex mutex;
   Progress progress("render", std::int64_t(frames.size()));
+  Job* const job = current_job();
   const auto work = [&] {
+    const WorkingFor working(job);
     try {
       Shot::Painter painter(shot);
       while (stop_signal() == 0) {

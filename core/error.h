@@ -8,28 +8,9 @@
 #include <string>
 #include <vector>
 
+#include "limber/error.h"
+
 namespace limber {
-
-// Something the user gave is wrong. The text says what, where (file, line, element), and what to try.
-struct InputError : std::runtime_error {
-  using std::runtime_error::runtime_error;
-};
-
-// The disk refused: full, read-only, no permission, vanished.
-struct DiskError : std::runtime_error {
-  using std::runtime_error::runtime_error;
-};
-
-// SIGINT or SIGTERM arrived; what was finished is kept.
-struct Interrupted : std::runtime_error {
-  explicit Interrupted(int signal_number);
-  int signal_number;
-};
-
-// A defect of ours.
-struct InternalError : std::logic_error {
-  using std::logic_error::logic_error;
-};
 
 namespace detail {
 [[noreturn]] void check_failed(const char* condition, const char* file, int line, const char* value_names,

@@ -1,6 +1,7 @@
 #include "core/events.h"
 
 #include <spdlog/sinks/base_sink.h>
+#include <spdlog/spdlog.h>
 
 #include <cerrno>
 #include <cstdio>
@@ -9,6 +10,7 @@
 #include <mutex>
 
 #include "core/error.h"
+#include "core/job.h"
 #include "core/json_text.h"
 #include "core/log.h"
 #include "core/progress.h"
@@ -45,6 +47,7 @@ void set_up(const std::string& where) {
 bool wanted() { return file != nullptr; }
 
 void tell(const Json& event) {
+  if (current_job()) return;  // whose watcher is told otherwise
   const std::lock_guard lock(mutex);
   if (!file) return;
   const std::string line = text_of(event) + "\n";

@@ -12,6 +12,7 @@
 
 #include "core/error.h"
 #include "core/events.h"
+#include "core/job.h"
 
 namespace limber {
 
@@ -19,7 +20,12 @@ namespace {
 
 bool enabled = true;
 std::atomic<int> arrived_signal{0};
-std::atomic<int> with_nothing_to_keep{0};
+
+std::atomic<int>& count_of_nothing_to_keep() {
+  static std::atomic<int> of_the_program{0};
+  Job* const job = current_job();
+  return job ? job->with_nothing_to_keep : of_the_program;
+}
 
 double seconds_now() {
   return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
@@ -44,16 +50,19 @@ Progress::Progress(std::string label, std::int64_t total)
 }
 
 Progress::~Progress() {
+  if (current_job()) return;
   if (drawn_at_ >= 0 && on_terminal()) fmt::print(stderr, "\r\x1b[K");
   events::tell({{"event", "stage_end"}, {"stage", label_}, {"seconds", seconds_now() - started_}});
 }
 
 void Progress::update(std::int64_t done, const std::string& note, double share) {
-  if (!on_terminal() && !events::wanted()) return;
+  Job* const job = current_job();
+  if (!job && !on_terminal() && !events::wanted()) return;
   const double now = seconds_now();
   if (drawn_at_ >= 0 && now - drawn_at_ < 0.1 && done < total_) return;
   const bool another_second = std::floor(now) != std::floor(drawn_at_);
   drawn_at_ = now;
+  if (job) return job->progress(label_, done, total_, note);
   if (another_second)
     events::tell(
         {{"event", "progress"}, {"stage", label_}, {"done", done}, {"total", total_}, {"note", note}});
@@ -85,15 +94,18 @@ void install_stop_signals() {
   sigaction(SIGTERM, &action, nullptr);
 }
 
-int stop_signal() { return arrived_signal.load(std::memory_order_relaxed); }
+int stop_signal() {
+  if (Job* const job = current_job()) return job->stopped() ? SIGINT : 0;
+  return arrived_signal.load(std::memory_order_relaxed);
+}
 void request_stop(int number) { arrived_signal = number; }
 void throw_if_stopped() {
   if (const int number = stop_signal()) throw Interrupted(number);
 }
 
-NothingToKeep::NothingToKeep() { ++with_nothing_to_keep; }
-NothingToKeep::~NothingToKeep() { --with_nothing_to_keep; }
-bool nothing_to_keep() { return with_nothing_to_keep > 0; }
+NothingToKeep::NothingToKeep() { ++count_of_nothing_to_keep(); }
+NothingToKeep::~NothingToKeep() { --count_of_nothing_to_keep(); }
+bool nothing_to_keep() { return count_of_nothing_to_keep() > 0; }
 
 double cpu_seconds() {
   rusage usage{}, children{};

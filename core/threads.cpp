@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "core/error.h"
+#include "core/job.h"
 
 namespace limber {
 
@@ -27,19 +28,25 @@ void set_thread_count(int threads) {
   count() = threads == 0 ? tbb::info::default_concurrency() : threads;
 }
 
-int thread_count() { return count(); }
+int thread_count() {
+  const Job* const job = current_job();
+  return job ? job->threads() : count();
+}
 
 void parallel_for(int n, const std::function<void(int)>& body) {
-  if (count() == 1) {
+  const int threads = thread_count();
+  if (threads == 1) {
     for (int i = 0; i < n; ++i) body(i);
     return;
   }
+  Job* const job = current_job();
 #ifdef __SANITIZE_THREAD__
   // ThreadSanitizer does not see how TBB's library, which it has not built, hands work over.
   std::atomic<int> next{0};
   std::exception_ptr failure;
   std::mutex mutex;
   const auto work = [&] {
+    const WorkingFor working(job);
     for (int i; (i = next++) < n;) try {
         body(i);
       } catch (...) {
@@ -49,13 +56,16 @@ void parallel_for(int n, const std::function<void(int)>& body) {
       }
   };
   std::vector<std::jthread> workers;
-  for (int t = 1; t < std::min(count(), n); ++t) workers.emplace_back(work);
+  for (int t = 1; t < std::min(threads, n); ++t) workers.emplace_back(work);
   work();
   workers.clear();
   if (failure) std::rethrow_exception(failure);
 #else
-  const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, std::size_t(count()));
-  tbb::parallel_for(0, n, [&](int i) { body(i); });
+  const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, std::size_t(threads));
+  tbb::parallel_for(0, n, [&](int i) {
+    const WorkingFor working(job);
+    body(i);
+  });
 #endif
 }
 

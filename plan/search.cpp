@@ -13,6 +13,7 @@
 
 #include "core/error.h"
 #include "core/hash.h"
+#include "core/job.h"
 #include "core/progress.h"
 #include "core/threads.h"
 #include "plan/chooser.h"
@@ -109,7 +110,10 @@ class Search {
       // Threads of our own: they wait for one another, which tasks of a pool must not, and ThreadSanitizer
       // sees them begin and end.
       std::vector<std::jthread> others;
-      for (int t = 1; t < threads_; ++t) others.emplace_back([this] { work(); });
+      for (int t = 1; t < threads_; ++t) others.emplace_back([this, job = current_job()] {
+          const WorkingFor working(job);
+          work();
+        });
       work();
     }
     if (failure_) std::rethrow_exception(failure_);
@@ -601,7 +605,7 @@ std::string explain(const Plan& plan) {
           s.time_limit_s, statistics.iterations, s.max_iterations);
       break;
     case Ending::stopped:
-      text += fmt::format("A signal ended the search after {} of {} iterations; resume it to go on.",
+      text += fmt::format("It was stopped after {} of {} iterations; resume it to go on.",
                           statistics.iterations, s.max_iterations);
       break;
   }

@@ -1,7 +1,8 @@
 #include "scenes/library.h"
 
+#include <dlfcn.h>
 #include <fmt/ranges.h>
-#include <unistd.h>
+#include <link.h>
 
 #include <algorithm>
 #include <cstdlib>
@@ -27,10 +28,16 @@ bool is_folder(const fs::path& path) {
   return fs::is_directory(path, ignored);
 }
 
-fs::path program_folder() {
+// Of the program, or of the library that a program has loaded.
+fs::path folder_of_this_code() {
+  Dl_info info;
+  link_map* map = nullptr;
+  const void* here = reinterpret_cast<const void*>(&folder_of_this_code);
+  if (dladdr1(here, &info, reinterpret_cast<void**>(&map), RTLD_DL_LINKMAP) == 0) return {};
+  const bool in_program = map->l_name[0] == '\0';  // whose own name is as it was called
   std::error_code failed;
-  const fs::path program = fs::read_symlink("/proc/self/exe", failed);
-  return failed ? fs::path() : program.parent_path();
+  const fs::path file = fs::canonical(in_program ? "/proc/self/exe" : map->l_name, failed);
+  return failed ? fs::path() : file.parent_path();
 }
 
 }  // namespace
@@ -43,7 +50,9 @@ std::vector<fs::path> scene_folders() {
     if (colon > 0) candidates.emplace_back(listed.substr(0, colon));
     listed.erase(0, colon + 1);
   }
-  candidates.push_back(program_folder() / ".." / "share" / "limber" / "scenes");
+  // bin/limber, lib/x86_64-linux-gnu/liblimber.so
+  for (fs::path above = folder_of_this_code(); above.has_relative_path(); above = above.parent_path())
+    candidates.push_back(above / "share" / "limber" / "scenes");
   candidates.emplace_back(LIMBER_SCENES_SOURCE);
   std::vector<fs::path> folders;
   for (const fs::path& folder : candidates)

@@ -10,8 +10,8 @@
 namespace limber::scenes {
 
 // The folders of scenes that come with limber, in the order in which they are searched: those in
-// LIMBER_SCENES (separated by colons), share/limber/scenes beside the program's bin folder, the source tree
-// it was built from. Only those that exist.
+// LIMBER_SCENES (separated by colons), share/limber/scenes beside the folder of the program or library, or
+// above it, the source tree it was built from. Only those that exist.
 std::vector<fs::path> scene_folders();
 
 struct KnownScene {

@@ -14,6 +14,7 @@
 #include <new>
 
 #include "core/error.h"
+#include "core/job.h"
 #include "core/progress.h"
 
 namespace limber::meshing::detail {
@@ -74,6 +75,7 @@ void limit_memory() {
   setrlimit(RLIMIT_CPU, &cpu);
   int code = exit_returned;
   std::string bytes;
+  const WorkingFor nobody(nullptr);  // who watches lives in the parent, with locks that may be held there
   try {
     bytes = work();
   } catch (const std::bad_alloc&) {

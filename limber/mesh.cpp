@@ -1,0 +1,262 @@
+#include "limber/mesh.h"
+
+#include "app/model_content.h"
+#include "app/prepare.h"
+#include "core/error.h"
+#include "core/hash.h"
+#include "core/json_text.h"
+#include "core/lock.h"
+#include "core/mesh_files.h"
+#include "limber/detail/arrays.h"
+#include "limber/detail/body.h"
+#include "limber/detail/working_for.h"
+
+namespace limber {
+
+using detail::mesh_of;
+using detail::surface_of;
+using detail::working_for;
+
+namespace {
+
+void require_mesh(const Mesh& mesh, const std::string& what) { validate(surface_of(mesh), what); }
+
+void require_mode(const std::string& mode) {
+  for (const char* known : {"lattice", "fast", "paper", "conform"})
+    if (mode == known) return;
+  throw InputError(
+      fmt::format("mode is \"{}\"; it must be one of \"lattice\", \"fast\", \"paper\", \"conform\"", mode));
+}
+
+app::PrepareSettings settings_of(const PrepareOptions& o) {
+  require_mode(o.mode);
+  return {.shells = o.shells,
+          .concavity = o.concavity,
+          .threshold = o.threshold,
+          .inflate = o.inflate,
+          .exact = o.exact,
+          .tets = o.tets,
+          .mode = o.mode,
+          .corners = o.max_hull_vertices,
+          .only = {}};
+}
+
+Cage cage_of(const TetMesh& mesh, const std::vector<int>& hull_from_tet) {
+  return {detail::vertices_of(mesh.positions), detail::rows_of<std::array<int, 4>>(mesh.tets), hull_from_tet};
+}
+
+Certificate certificate_of(const meshing::Certificate& c) {
+  return {c.holds(),
+          c.vertices_outside,
+          c.triangles_crossing,
+          c.nonmanifold_edges,
+          c.nonmanifold_vertices,
+          c.inverted_tets,
+          c.min_dihedral_deg,
+          c.max_dihedral_deg};
+}
+
+Binding binding_of(const ffd::Binding& b) {
+  return {{b.tet_from_vertex.data(), b.tet_from_vertex.data() + b.tet_from_vertex.size()},
+          detail::rows_of<std::array<double, 4>>(b.weights),
+          b.outside,
+          b.max_outside_distance_m};
+}
+
+ImportedMesh imported(const meshing::ImportedModel& model) {
+  return {mesh_of(model.surface), model.mended, model.warnings};
+}
+
+Body body_of(const app::BodySource& source, const PrepareOptions& options) {
+  auto impl = std::make_shared<Body::Impl>();
+  const app::PrepareSettings settings = settings_of(options);
+  app::WholeBody whole = app::make_body(source, settings, [](const char*) {});
+  impl->surface = mesh_of(whole.model.surface);
+  for (const ConvexShell& shell : whole.made.decomposition.shells) impl->hulls.push_back(mesh_of(shell));
+  impl->cage = cage_of(whole.made.cage.mesh, whole.made.cage.shell_from_tet);
+  impl->cage.volume_ratio = whole.made.cage.volume_ratio;
+  impl->cage.notes = whole.made.cage.notes;
+  impl->certificate = certificate_of(whole.certificate);
+  impl->binding = binding_of(whole.binding);
+  impl->report = app::report_of(whole, source, settings);
+  impl->bound = whole.binding;
+  impl->rest = whole.made.cage.mesh;
+  impl->made = {std::move(whole), source, settings};
+  return Body(impl);
+}
+
+}  // namespace
+
+std::vector<ConvexShell> detail::shells_of(const std::vector<Mesh>& hulls) {
+  std::vector<ConvexShell> shells;
+  for (const Mesh& hull : hulls)
+    shells.push_back({points_of(hull.vertices), matrix_of<Triangles>(hull.faces)});
+  return shells;
+}
+
+ImportedMesh load_mesh(const std::filesystem::path& file, const ImportOptions& options,
+                       const Context& context) {
+  return working_for(context, [&] {
+    return imported(meshing::import_model(file, {.scale = options.scale, .y_up = options.y_up}));
+  });
+}
+
+ImportedMesh clean(const Mesh& mesh, const Context& context) {
+  return working_for(context, [&] { return imported(meshing::clean(surface_of(mesh))); });
+}
+
+Decomposition decompose(const Mesh& mesh, const DecomposeOptions& options, const Context& context) {
+  return working_for(context, [&] {
+    require_mesh(mesh, "mesh");
+    const meshing::Decomposition made = app::make_shells(surface_of(mesh), {.shells = options.max_convex_hull,
+                                                                            .concavity = options.concavity,
+                                                                            .threshold = options.threshold,
+                                                                            .inflate = options.inflate,
+                                                                            .exact = options.exact,
+                                                                            .corners = options.max_hull_vertices,
+                                                                            .only = {}});
+    Decomposition d;
+    for (const ConvexShell& shell : made.shells) d.hulls.push_back(mesh_of(shell));
+    d.neighbours = made.neighbours;
+    d.stopped_by = made.stopped_by;
+    d.mean_overshoot = made.mean_overshoot, d.max_overshoot = made.max_overshoot;
+    d.vertices_uncovered = made.vertices_uncovered, d.triangles_uncovered = made.triangles_uncovered;
+    return d;
+  });
+}
+
+Cage build_cage(const Mesh& mesh, const std::vector<Mesh>& hulls, const CageOptions& options,
+                const Context& context) {
+  return working_for(context, [&] {
+    require_mode(options.mode);
+    require_mesh(mesh, "mesh");
+    const std::vector<ConvexShell> shells = detail::shells_of(hulls);
+    for (std::size_t h = 0; h < shells.size(); ++h) validate(shells[h], fmt::format("hull {}", h));
+    const meshing::Cage made = app::make_cage(
+        surface_of(mesh), shells, {.tets = options.tets, .mode = options.mode, .only = {}}, std::nullopt);
+    Cage cage = cage_of(made.mesh, made.shell_from_tet);
+    cage.volume_ratio = made.volume_ratio;
+    cage.notes = made.notes;
+    return cage;
+  });
+}
+
+Certificate certify(const Mesh& mesh, const Cage& cage, const Context& context) {
+  return working_for(context, [&] {
+    const SurfaceMesh surface = surface_of(mesh);
+    const TetMesh tets = detail::tet_mesh_of(cage);
+    validate(surface, "mesh");
+    validate(tets, "cage");
+    return certificate_of(meshing::certify(surface, tets));
+  });
+}
+
+Binding bind(const Mesh& mesh, const Cage& cage, const Context& context) {
+  return working_for(context,
+                     [&] { return binding_of(ffd::bind(surface_of(mesh), detail::tet_mesh_of(cage))); });
+}
+
+Vertices deform(const Binding& binding, const Tetrahedra& tets, const Vertices& nodes) {
+  if (binding.weights.size() != binding.tet_from_vertex.size())
+    throw InputError(fmt::format("binding: {} rows of weights and {} tets; there must be as many",
+                                 binding.weights.size(), binding.tet_from_vertex.size()));
+  Vertices moved(binding.weights.size());
+  for (std::size_t v = 0; v < moved.size(); ++v) {
+    const int t = binding.tet_from_vertex[v];
+    if (t < 0 || std::size_t(t) >= tets.size())
+      throw InputError(fmt::format("binding: vertex {} is bound to tet {}, and there are {}", v, t, tets.size()));
+    for (std::size_t c = 0; c < 4; ++c) {
+      const int n = tets[std::size_t(t)][c];
+      if (n < 0 || std::size_t(n) >= nodes.size())
+        throw InputError(fmt::format("tet {} has the node {}, and there are {}", t, n, nodes.size()));
+      for (std::size_t axis = 0; axis < 3; ++axis)
+        moved[v][axis] += binding.weights[v][c] * nodes[std::size_t(n)][axis];
+    }
+  }
+  return moved;
+}
+
+Body::Body(std::shared_ptr<const Impl> impl) : impl_(std::move(impl)) {}
+const Mesh& Body::surface() const { return impl_->surface; }
+const std::vector<Mesh>& Body::hulls() const { return impl_->hulls; }
+const Cage& Body::cage() const { return impl_->cage; }
+const Certificate& Body::certificate() const { return impl_->certificate; }
+const Binding& Body::binding() const { return impl_->binding; }
+std::string Body::report_json() const { return text_of(impl_->report, 2); }
+
+Vertices Body::deform(const Vertices& nodes) const {
+  if (nodes.size() != impl_->cage.nodes.size())
+    throw InputError(
+        fmt::format("{} nodes are given, and the cage has {}", nodes.size(), impl_->cage.nodes.size()));
+  Points moved;
+  if (impl_->phong)
+    ffd::deform_phong(impl_->bound, impl_->rest, impl_->gradients, detail::points_of(nodes), moved);
+  else
+    ffd::deform(impl_->bound, impl_->rest.tets, detail::points_of(nodes), moved);
+  return detail::vertices_of(moved);
+}
+
+void Body::save(const std::filesystem::path& folder) const {
+  make_folder(folder);
+  if (!impl_->made && fs::equivalent(folder, impl_->folder)) return;
+  const FolderLock lock(folder, FolderLock::alone);
+  if (impl_->made) {
+    app::write_body(impl_->made->whole, impl_->made->source, impl_->made->settings, folder);
+    return;
+  }
+  app::clear_body(folder);
+  for (const auto& [name, any] : impl_->report.at("files").items())
+    write_file(folder / name, read_file(impl_->folder / name));
+  write_file(folder / "report.json", read_file(impl_->folder / "report.json"));
+}
+
+Body detail::body_of(const app::PreparedBody& prepared, const std::filesystem::path& folder) {
+  auto impl = std::make_shared<Body::Impl>();
+  impl->surface = mesh_of(prepared.surface);
+  for (const ConvexShell& shell : read_obj_shells(folder / "shells.obj")) impl->hulls.push_back(mesh_of(shell));
+  impl->cage = cage_of(prepared.cage, prepared.shell_from_tet);
+  const Json &report = prepared.report, &certificate = report.at("certificate");
+  impl->cage.volume_ratio = report.at("cage").at("volume_ratio").get<double>();
+  impl->certificate = {certificate.at("holds").get<bool>(),
+                       certificate.at("vertices_outside").get<std::int64_t>(),
+                       certificate.at("triangles_crossing").get<std::int64_t>(),
+                       certificate.at("nonmanifold_edges").get<int>(),
+                       certificate.at("nonmanifold_vertices").get<int>(),
+                       0,
+                       report.at("cage").at("min_dihedral_deg").get<double>(),
+                       report.at("cage").at("max_dihedral_deg").get<double>()};
+  impl->binding = binding_of(prepared.binding);
+  impl->report = report;
+  impl->folder = folder;
+  impl->bound = prepared.binding;
+  impl->rest = prepared.cage;
+  impl->gradients = prepared.gradients;
+  impl->phong = prepared.deformation == scenes::Deformation::phong;
+  return Body(impl);
+}
+
+Body Body::load(const std::filesystem::path& folder) {
+  return detail::body_of(app::read_body(folder), folder);
+}
+
+Body prepare(const Mesh& mesh, const PrepareOptions& options, const Context& context) {
+  return working_for(context, [&] {
+    const SurfaceMesh surface = surface_of(mesh);
+    app::BodySource source;
+    source.model = "mesh";
+    source.identity = {{"mesh_hash", hex(hash_of(surface))}};
+    source.load = [surface] { return meshing::clean(surface); };
+    return body_of(source, options);
+  });
+}
+
+Body prepare(const std::filesystem::path& model, const PrepareOptions& options, const ImportOptions& import,
+             const Context& context) {
+  return working_for(context, [&] {
+    app::PrepareOptions command;
+    command.model = model, command.scale = import.scale, command.y_up = import.y_up;
+    return body_of(app::source_of(command, model), options);
+  });
+}
+
+}  // namespace limber

@@ -1,0 +1,140 @@
+// From a scene to its motion: bodies, world, rollouts, plan. docs/library.md.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <limits>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "limber/mesh.h"
+
+namespace limber {
+
+struct SceneOptions {
+  std::string preset = {};                       // of the planner, "paper" or "fast"; empty: the scene's
+  std::vector<std::string> sets = {};            // "planner.seed=7": edits made before it is read
+  std::vector<std::filesystem::path> data = {};  // folders in which model files are looked for first
+};
+
+// A scene file that was read; never changes, cheap to copy.
+class LIMBER_API Scene {
+ public:
+  const std::string& name() const;
+  const std::string& text() const;  // TOML, as it was read
+  std::vector<std::string> bodies() const;
+  const std::string& robot() const;
+
+  struct Impl;
+  explicit Scene(std::shared_ptr<const Impl>);
+  const Impl& impl() const { return *impl_; }
+
+ private:
+  std::shared_ptr<const Impl> impl_;
+};
+// A file, a folder that holds scene.toml, or the name of a scene that comes with limber. Throws InputError
+// with file, line and column.
+LIMBER_API Scene read_scene(const std::string& file_or_name, const SceneOptions& = {});
+LIMBER_API std::vector<std::string> scene_names();
+
+// Several states of a world. Node n of state s is at positions[3 (s · nodes + n)] and the two after it.
+struct States {
+  int count = 0, nodes = 0;
+  std::vector<std::int64_t> steps;           // (count) time = step × World's dt_s
+  std::vector<float> positions, velocities;  // (count × nodes × 3), metres, metres a second
+  std::vector<std::uint8_t> sound;           // (count) 0: the dynamics diverged there; else 1
+};
+
+// One push of the robot, held for `steps`. docs/planning.md.
+struct Push {
+  enum class Kind : std::int32_t { none, body, control_point, interpolation, hold };
+  Kind kind = Kind::none;
+  std::array<float, 3> force_n{};   // body, control_point: on the whole robot
+  std::int32_t node = -1;           // control_point: of the robot, from 0
+  float radius_m = 0;               // control_point
+  std::array<float, 3> target_m{};  // interpolation, hold: of the centre of mass
+  float max_force_n = 0;            // interpolation, hold
+  std::int32_t steps = 0;           // > 0
+};
+
+struct SolveOptions {
+  std::optional<std::int64_t> seed = {}, iterations = {};  // nothing: the scene's
+  double time_limit_s = std::numeric_limits<double>::infinity();
+  std::optional<int> shortcut_rounds = {};
+  std::string cost = "duration";  // or "effort", "strain", "volume": what shortcuts make less of
+  bool improve = false;           // go on after the first solution
+};
+
+class Plan;
+
+// A scene's bodies and the world they share, ready to be stepped; never changes, cheap to copy, and several
+// threads may use it.
+class LIMBER_API Problem {
+ public:
+  // Prepares bodies that are not up to date in the work folder; without one, in a temporary folder that goes
+  // with the last copy.
+  explicit Problem(const Scene&, const std::filesystem::path& work_folder = {}, const Context& = {});
+
+  const Scene& scene() const;
+  const std::vector<Body>& bodies() const;  // in the order of Scene::bodies()
+  double dt_s() const;
+  int nodes() const;  // of all that moves
+  struct Range {
+    int first = 0, count = 0;  // nodes; count 0: does not move
+  };
+  Range nodes_of(int body) const;
+  States start(int copies = 1) const;
+  // Each state pushed by the push of its number, on all threads. A result depends on its state and push
+  // alone. Throws InputError where numbers do not fit.
+  States rollout(const States&, const std::vector<Push>&, const Context& = {}) const;
+  std::vector<std::array<double, 3>> robot_centers(const States&) const;  // of mass, metres
+
+  // As `limber plan`: the same scene and options, the same bytes. Where a watcher says stop, what was found
+  // so far. Throws InputError where the scene has no goal, or an option is out of range.
+  Plan solve(const SolveOptions& = {}, const Context& = {}) const;
+  // The scene left to itself, as `limber simulate`.
+  Plan simulate(double duration_s, const Context& = {}) const;
+
+  struct Impl;
+  const Impl& impl() const { return *impl_; }
+  explicit Problem(std::shared_ptr<const Impl>);
+
+ private:
+  std::shared_ptr<const Impl> impl_;
+};
+
+// A motion that was planned or simulated; never changes, cheap to copy.
+class LIMBER_API Plan {
+ public:
+  // Of a work folder. Throws InputError where it holds none, or another's bodies.
+  static Plan load(const std::filesystem::path& folder);
+  bool solved() const;
+  std::string explanation() const;  // a sentence or two: reached or not, which limit ended it, what to try
+  std::int64_t iterations() const;
+  int nodes_in_tree() const;
+  double duration_s() const;
+  double frames_per_second() const;
+  int frame_count() const;
+  // The tree's and the path's: what `limber plan` prints as "hashes".
+  std::string tree_hash() const, trajectory_hash() const;
+  States frames() const;             // all of them
+  std::vector<Push> pushes() const;  // from the start
+  // The fine surface of a body, in the order of Scene::bodies(), at a frame.
+  Vertices surface(int body, int frame) const;
+  // What the command tells, as the text of a JSON object: docs/files.md.
+  std::string summary_json(const Context& = {}) const;
+  // plan.npz and all that `limber plan` leaves in a work folder, bodies included.
+  void save(const std::filesystem::path& folder, const Context& = {}) const;
+  const Problem& problem() const;
+
+  struct Impl;
+  explicit Plan(std::shared_ptr<const Impl>);
+  const Impl& impl() const { return *impl_; }
+
+ private:
+  std::shared_ptr<const Impl> impl_;
+};
+
+}  // namespace limber

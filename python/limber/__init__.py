@@ -1,0 +1,371 @@
+"""Plans the motion of soft things among soft things, and films it.
+
+    import limber
+    hulls = limber.decompose(vertices, faces, max_convex_hull=44)   # iterable of (vertices, faces)
+    body = limber.prepare("bunny.obj", tets=1000)                   # hulls, cage, certificate, binding
+    plan = limber.plan("barriers1", preset="fast", seed=1)
+    plan.save("out"); limber.render("out"); limber.verify("out")
+
+Arrays come in as anything numpy takes, and go out as float64, float32 and int32 that cannot be written to: what
+they show is shared, not copied. Long calls leave the GIL alone, hear Ctrl-C, and tell `progress(stage, done,
+total, note)` where one is given. What depends on a seed depends on nothing else: not on `threads`.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from html import escape as _escape
+from typing import Any, Callable, Dict, List, NamedTuple, Optional, Sequence, Tuple, Union
+
+import numpy as np
+
+from . import _limber
+from ._limber import (Binding, Body, Cage, Certificate, DiskError, InputError, InternalError, __version__,
+                      push_dtype, scene_names)
+
+__all__ = [
+    "Binding", "Body", "Cage", "Certificate", "Decomposition", "DiskError", "Film", "InputError", "InternalError",
+    "Mesh", "Plan", "Promise", "Scene", "States", "World", "bind", "build_cage", "certify", "decompose", "export",
+    "load_body", "load_mesh", "load_plan", "plan", "prepare", "push_dtype", "pushes", "render", "report",
+    "scene_names", "simulate", "verify", "__version__",
+]
+
+Path = Union[str, "os.PathLike[str]"]
+Progress = Callable[[str, int, int, str], Any]
+Hull = Tuple[np.ndarray, np.ndarray]
+
+
+class Mesh(NamedTuple):
+    vertices: np.ndarray  # (V, 3) float64, metres
+    faces: np.ndarray     # (F, 3) int32, counter-clockwise seen from outside
+    mended: List[str]     # what was done, as sentences
+    warnings: List[str]   # what looks wrong
+
+
+def load_mesh(file: Path, *, scale: float = 1, y_up: bool = False, progress: Optional[Progress] = None) -> Mesh:
+    """A model's surface, welded and oriented; OBJ, PLY, STL, OFF and what assimp reads."""
+    return Mesh(*_limber.load_mesh(file, scale=scale, y_up=y_up, progress=progress))
+
+
+class Decomposition(Sequence[Hull]):
+    """Convex hulls that cover a model: a sequence of (vertices, faces)."""
+
+    def __init__(self, told: Dict[str, Any]):
+        self.hulls: List[Hull] = told["hulls"]
+        self.neighbours: np.ndarray = told["neighbours"]          # (n, 2): hulls that share a cut
+        self.stopped_by: str = told["stopped_by"]                 # "count", "concavity", "gain", "exact"
+        self.mean_overshoot: float = told["mean_overshoot"]       # over the model's diagonal
+        self.max_overshoot: float = told["max_overshoot"]
+        self.vertices_uncovered: int = told["vertices_uncovered"]    # exact
+        self.triangles_uncovered: int = told["triangles_uncovered"]  # exact
+
+    def __len__(self) -> int:
+        return len(self.hulls)
+
+    def __getitem__(self, i):  # type: ignore[no-untyped-def, override]
+        return self.hulls[i]
+
+    def __repr__(self) -> str:
+        return (f"<limber.Decomposition: {len(self)} hulls, overshoot mean {100 * self.mean_overshoot:.3f} %, "
+                f"largest {100 * self.max_overshoot:.3f} % of the diagonal>")
+
+
+def decompose(vertices: Any, faces: Any, *, max_convex_hull: int = 32, threshold: float = 0, concavity: float = 0,
+              max_hull_vertices: int = 64, inflate: float = 0, exact: bool = False,
+              progress: Optional[Progress] = None, threads: int = 0) -> Decomposition:
+    """A model as a union of few convex hulls. `threshold` is CoACD's concavity; 0: only the count rules."""
+    return Decomposition(_limber.decompose(
+        vertices, faces, max_convex_hull=max_convex_hull, threshold=threshold, concavity=concavity,
+        max_hull_vertices=max_hull_vertices, inflate=inflate, exact=exact, progress=progress, threads=threads))
+
+
+def build_cage(vertices: Any, faces: Any, hulls: Sequence[Hull] = (), *, tets: int = 1000, mode: str = "lattice",
+               progress: Optional[Progress] = None, threads: int = 0) -> Cage:
+    """A coarse tetrahedral mesh that encloses the surface. Modes: lattice, fast, paper (needs hulls), conform."""
+    return _limber.build_cage(vertices, faces, list(hulls), tets=tets, mode=mode, progress=progress, threads=threads)
+
+
+def certify(vertices: Any, faces: Any, cage: Cage) -> Certificate:
+    """Whether the cage encloses the surface: proved with exact arithmetic, from the two alone."""
+    return _limber.certify(vertices, faces, cage)
+
+
+def bind(vertices: Any, faces: Any, cage: Cage) -> Binding:
+    """Barycentric weights of the surface in the cage."""
+    return _limber.bind(vertices, faces, cage)
+
+
+def prepare(model: Any, faces: Any = None, *, shells: int = 32, concavity: float = 0, threshold: float = 0,
+            inflate: float = 0, max_hull_vertices: int = 64, exact: bool = False, tets: int = 1000,
+            mode: str = "lattice", scale: float = 1, y_up: bool = False, progress: Optional[Progress] = None,
+            threads: int = 0) -> Body:
+    """Hulls, cage, certificate and binding of a model: prepare("bunny.obj") or prepare(vertices, faces).
+
+    The surface may get vertices: edges longer than the cage's tets are cut, so that it bends as the cage does.
+    """
+    if faces is None and not isinstance(model, (str, os.PathLike)):
+        raise InputError("prepare takes a file, or vertices and faces")
+    return _limber.prepare(model, faces, shells=shells, concavity=concavity, threshold=threshold, inflate=inflate,
+                           max_hull_vertices=max_hull_vertices, exact=exact, tets=tets, mode=mode, scale=scale,
+                           y_up=y_up, progress=progress, threads=threads)
+
+
+def load_body(folder: Path) -> Body:
+    """What Body.save, or `limber prepare`, has written."""
+    return Body.load(folder)
+
+
+# ---- Scenes and motions
+
+class Scene:
+    """A scene file, or the name of a scene that comes with limber.
+
+    `set` edits it before it is read, by the keys of the scene file: {"planner.max_force_n": 30}.
+    """
+
+    def __init__(self, file_or_name: Path, *, preset: str = "", set: Optional[Dict[str, Any]] = None,
+                 data: Sequence[Path] = ()):
+        sets = [f"{key}={_toml(value)}" for key, value in (set or {}).items()]
+        self._scene = _limber.Scene(os.fspath(file_or_name), preset=preset, sets=sets, data=list(data))
+        self.name: str = self._scene.name
+        self.text: str = self._scene.text
+        self.bodies: List[str] = self._scene.bodies
+        self.robot: str = self._scene.robot
+
+    def __repr__(self) -> str:
+        return f"<limber.Scene {self.name}: {', '.join(self.bodies)}>"
+
+
+def _toml(value: Any) -> str:
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, str):
+        return value
+    if isinstance(value, (int, float, np.number)):
+        return repr(value.item() if isinstance(value, np.number) else value)
+    return "[" + ", ".join(json.dumps(v) if isinstance(v, str) else _toml(v) for v in value) + "]"
+
+
+class States(NamedTuple):
+    """States of a world, one a row; time = steps × World.dt_s."""
+    positions: np.ndarray   # (B, N, 3) float32, metres
+    velocities: np.ndarray  # (B, N, 3) float32, metres a second
+    steps: np.ndarray       # (B,) int64
+    sound: np.ndarray       # (B,) bool; False: the dynamics diverged on the way there
+
+
+_kinds = ("none", "body", "control_point", "interpolation", "hold")
+
+
+def pushes(count: int, kind: str = "body", *, steps: Any, force_n: Any = 0, node: Any = -1, radius_m: Any = 0,
+           target_m: Any = 0, max_force_n: Any = 0) -> np.ndarray:
+    """`count` pushes of the robot, as rows of push_dtype; each argument is one for all, or one a push.
+
+    "body": force_n on the whole robot. "control_point": the same near `node` alone, within radius_m.
+    "interpolation", "hold": towards target_m with at most max_force_n. Held for `steps` time steps.
+    """
+    if kind not in _kinds:
+        raise InputError(f"kind is {kind!r}; it must be one of {', '.join(_kinds)}")
+    made = np.zeros(count, push_dtype)
+    made["kind"] = _kinds.index(kind)
+    made["steps"], made["force_n"], made["node"] = steps, force_n, node
+    made["radius_m"], made["target_m"], made["max_force_n"] = radius_m, target_m, max_force_n
+    return made
+
+
+class World:
+    """A scene's bodies, ready to be stepped. Without a work folder bodies are prepared in a temporary one."""
+
+    def __init__(self, scene: Union[Scene, Path], work_folder: Path = "", *, progress: Optional[Progress] = None,
+                 threads: int = 0):
+        self.scene = scene if isinstance(scene, Scene) else Scene(scene)
+        self._world = _limber.World(self.scene._scene, work_folder, progress=progress, threads=threads)
+
+    @property
+    def bodies(self) -> Dict[str, Body]:
+        return dict(zip(self.scene.bodies, self._world.bodies))
+
+    @property
+    def dt_s(self) -> float:
+        return self._world.dt_s
+
+    @property
+    def nodes(self) -> int:
+        """Of all bodies that move: rows of States.positions."""
+        return self._world.nodes
+
+    def nodes_of(self, body: str) -> slice:
+        """The rows of a body among States.positions; empty for one that does not move."""
+        first, count = self._world.nodes_of(_index(body, self.scene.bodies))
+        return slice(first, first + count)
+
+    def start(self, copies: int = 1) -> States:
+        return States(*self._world.start(copies))
+
+    def rollout(self, states: States, pushes: np.ndarray, *, threads: int = 0) -> States:
+        """Where each state is led by the push of its row. A result depends on its state and push alone."""
+        return States(*self._world.rollout(states.positions, states.velocities, states.steps, pushes,
+                                           threads=threads))
+
+    def robot_centers(self, states: States) -> np.ndarray:
+        """(B, 3) centres of mass of the robot, metres."""
+        return self._world.robot_centers(states.positions, states.velocities, states.steps)
+
+    def plan(self, *, seed: Optional[int] = None, iterations: Optional[int] = None,
+             time_limit: float = float("inf"), shortcut: Optional[int] = None, cost: str = "duration",
+             improve: bool = False, progress: Optional[Progress] = None, threads: int = 0) -> Plan:
+        """As `limber plan` with the same options: the same bytes. None: the scene's."""
+        return Plan(self._world.plan(seed=seed, iterations=iterations, time_limit_s=time_limit,
+                                     shortcut_rounds=shortcut, cost=cost, improve=improve, progress=progress,
+                                     threads=threads), self)
+
+    def simulate(self, duration: float = 5, *, progress: Optional[Progress] = None, threads: int = 0) -> Plan:
+        """The scene left to itself, as `limber simulate`; seconds."""
+        return Plan(self._world.simulate(duration, progress=progress, threads=threads), self)
+
+
+def _index(name: str, names: Sequence[str]) -> int:
+    if name not in names:
+        raise InputError(f"there is no body {name!r}; there are {', '.join(names)}")
+    return names.index(name)
+
+
+class Plan:
+    """A motion that was planned or simulated."""
+
+    def __init__(self, plan: "_limber.Plan", world: Optional[World] = None):
+        self._plan = plan
+        self._bodies: List[str] = plan.world.scene.bodies
+        self.solved: bool = plan.solved
+        self.why: str = plan.explanation
+        self.iterations: int = plan.iterations
+        self.duration_s: float = plan.duration_s
+        self.frames_per_second: float = plan.frames_per_second
+        self.tree_hash: str = plan.tree_hash
+        self.trajectory_hash: str = plan.trajectory_hash
+        self._states: Optional[States] = None
+
+    @property
+    def states(self) -> States:
+        """One a frame."""
+        if self._states is None:
+            self._states = States(*self._plan.states())
+        return self._states
+
+    @property
+    def frames(self) -> np.ndarray:
+        """(f, N, 3) positions of the nodes of all bodies that move."""
+        return self.states.positions
+
+    @property
+    def pushes(self) -> np.ndarray:
+        """From the start, rows of push_dtype."""
+        return self._plan.pushes
+
+    def surface(self, body: str, frame: int) -> np.ndarray:
+        """(V, 3) of the fine surface; a negative frame counts from the last."""
+        count = self._plan.frame_count
+        return self._plan.surface(_index(body, self._bodies), frame + count if frame < 0 else frame)
+
+    def faces(self, body: str) -> np.ndarray:
+        """(F, 3) of the fine surface, rows of surface()."""
+        return self._plan.world.bodies[_index(body, self._bodies)].faces
+
+    @property
+    def summary(self) -> Dict[str, Any]:
+        """What `limber plan --json` prints."""
+        return json.loads(self._plan.summary_json())
+
+    def save(self, folder: Path) -> None:
+        """plan.npz and all that `limber plan -o` leaves in a work folder, bodies included."""
+        self._plan.save(folder)
+
+    def __len__(self) -> int:
+        return self._plan.frame_count
+
+    def __repr__(self) -> str:
+        return f"<limber.Plan: {len(self)} frames, {self.duration_s:.2f} s. {self.why}>"
+
+    def _repr_html_(self) -> str:
+        rows = {"result": self.why, "motion": f"{self.duration_s:.2f} s in {len(self)} frames",
+                "iterations": str(self.iterations), "tree": self.tree_hash, "trajectory": self.trajectory_hash}
+        return "<table>" + "".join(
+            f"<tr><th style='text-align:left'>{_escape(name)}</th><td style='text-align:left'>{_escape(text)}</td></tr>"
+            for name, text in rows.items()) + "</table>"
+
+
+def plan(scene: Union[Scene, Path], out: Optional[Path] = None, *, preset: str = "",
+         set: Optional[Dict[str, Any]] = None, data: Sequence[Path] = (), seed: Optional[int] = None,
+         iterations: Optional[int] = None, time_limit: float = float("inf"), shortcut: Optional[int] = None,
+         cost: str = "duration", improve: bool = False, progress: Optional[Progress] = None,
+         threads: int = 0) -> Plan:
+    """Plans a scene; with `out` in a work folder, where its bodies are kept and the plan is saved."""
+    if isinstance(scene, Scene):
+        if preset or set or data:
+            raise InputError("preset, set and data are of the scene; give them to Scene(…)")
+    else:
+        scene = Scene(scene, preset=preset, set=set, data=data)
+    world = World(scene, "" if out is None else out, progress=progress, threads=threads)
+    found = world.plan(seed=seed, iterations=iterations, time_limit=time_limit, shortcut=shortcut, cost=cost,
+                       improve=improve, progress=progress, threads=threads)
+    if out is not None:
+        found.save(out)
+    return found
+
+
+def simulate(scene: Union[Scene, Path], out: Optional[Path] = None, *, duration: float = 5,
+             progress: Optional[Progress] = None, threads: int = 0) -> Plan:
+    """The scene left to itself, no search; seconds."""
+    world = World(scene, "" if out is None else out, progress=progress, threads=threads)
+    found = world.simulate(duration, progress=progress, threads=threads)
+    if out is not None:
+        found.save(out)
+    return found
+
+
+def load_plan(folder: Path) -> Plan:
+    """What Plan.save, or `limber plan`, has written."""
+    return Plan(_limber.Plan.load(folder))
+
+
+# ---- Work folders
+
+class Promise(NamedTuple):
+    name: str
+    kept: bool
+    value: str
+
+
+def verify(folder: Path, *, scene: str = "", progress: Optional[Progress] = None, threads: int = 0) -> List[Promise]:
+    """Every promise that limber makes of a work folder, or of a body's, checked anew from its files."""
+    return [Promise(*row) for row in _limber.verify(folder, scene=scene, progress=progress, threads=threads)]
+
+
+class Film(NamedTuple):
+    video: Optional[str]  # None where not every frame is there
+    frames_painted: int
+    frames_failed: int
+
+
+def render(folder: Path, *, size: Optional[Tuple[int, int]] = None, frames: str = "", camera: str = "main",
+           name: str = "", set: Optional[Dict[str, Any]] = None, video: Path = "", resume: bool = False,
+           progress: Optional[Progress] = None, threads: int = 0) -> Film:
+    """Frames, and the film of them, without a display."""
+    width, height = size or (0, 0)
+    film, painted, failed = _limber.render(
+        folder, width=width, height=height, frames=frames, camera=camera, name=name,
+        sets=[f"{key}={_toml(value)}" for key, value in (set or {}).items()], video=video, resume=resume,
+        progress=progress, threads=threads)
+    return Film(str(film) if str(film) not in ("", ".") else None, painted, failed)
+
+
+def export(folder: Path, formats: Sequence[str] = ("gltf",), *, out: Path = "",
+           progress: Optional[Progress] = None, threads: int = 0) -> List[str]:
+    """The motion for other programs: of "gltf", "pc2", "usd", "vtu". The file of each that is to be opened."""
+    return [str(file) for file in _limber.export(folder, list(formats), out=out, progress=progress, threads=threads)]
+
+
+def report(folder: Path, file: Path = "", *, progress: Optional[Progress] = None, threads: int = 0) -> str:
+    """One HTML page about a work folder."""
+    return str(_limber.report(folder, file=file, progress=progress, threads=threads))

@@ -1,0 +1,219 @@
+"""The Python module beside the command: the same hashes; arrays that are shared and cannot be spoilt."""
+import json
+import multiprocessing
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+import unittest
+import warnings
+
+import numpy as np
+
+import limber
+
+PROGRAM = os.environ["LIMBER_PROGRAM"]
+WORK = tempfile.TemporaryDirectory()
+
+CUBE = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1]], float)
+FACES = np.array([[0, 2, 1], [0, 3, 2], [4, 5, 6], [4, 6, 7], [0, 1, 5], [0, 5, 4],
+                  [1, 2, 6], [1, 6, 5], [2, 3, 7], [2, 7, 6], [3, 0, 4], [3, 4, 7]])
+
+
+def command(*words):
+    return json.loads(subprocess.run([PROGRAM, *words, "--json", "--quiet"], check=True, capture_output=True).stdout)
+
+
+def world_of(scene, **scene_options):
+    """In a folder that all tests share, so that bodies are prepared once."""
+    return limber.World(limber.Scene(scene, **scene_options), os.path.join(WORK.name, scene))
+
+
+def in_child(queue):
+    world = world_of("barriers1")
+    ends = world.rollout(world.start(4), limber.pushes(4, force_n=(1, 0, 0), steps=5))
+    queue.put(float(ends.positions.sum()))
+
+
+class Meshes(unittest.TestCase):
+    def test_hulls_are_pairs_as_coacd_gives_them(self):
+        hulls = limber.decompose(CUBE, FACES, max_convex_hull=4)
+        self.assertEqual(len(hulls), 1)
+        for vertices, faces in hulls:
+            self.assertEqual((vertices.dtype, faces.dtype), (np.float64, np.int32))
+            self.assertEqual(vertices.shape, (8, 3))
+            np.testing.assert_allclose(np.abs(vertices - 0.5).max(axis=1), 0.5, atol=1e-5)  # covers it, and hardly more
+        self.assertEqual(hulls.triangles_uncovered, 0)
+
+    def test_a_body_moves_with_its_cage(self):
+        body = limber.prepare(CUBE, FACES, tets=100)
+        self.assertTrue(body.certificate.holds)
+        affine = np.array([[2, 1, 0], [0, 1, 0.5], [-1, 0, 1]])
+        np.testing.assert_allclose(body.deform(body.cage.vertices @ affine + 3), body.vertices @ affine + 3, atol=1e-12)
+        np.testing.assert_allclose(
+            np.einsum("vc,vcx->vx", body.binding.weights, body.cage.vertices[body.cage.tets[body.binding.tet_from_vertex]]),
+            body.vertices, atol=1e-12)
+        with tempfile.TemporaryDirectory() as folder:
+            body.save(folder)
+            np.testing.assert_array_equal(limber.load_body(folder).cage.vertices, body.cage.vertices)
+            self.assertTrue(all(promise.kept for promise in limber.verify(folder)))
+
+    def test_arrays_are_views_that_cannot_be_written_to_and_outlive_their_body(self):
+        body = limber.prepare(CUBE, FACES, tets=100)
+        vertices = body.cage.vertices
+        self.assertFalse(vertices.flags.writeable)
+        self.assertFalse(vertices.flags.owndata)
+        self.assertTrue(np.shares_memory(vertices, body.cage.vertices))
+        with self.assertRaises(ValueError):
+            vertices[0] = 0
+        kept = vertices.copy()
+        del body
+        np.testing.assert_array_equal(vertices, kept)
+
+    def test_what_is_wrong_is_named(self):
+        wrong = FACES.copy()
+        wrong[3, 1] = 17
+        for given, word in [((CUBE, wrong), "17"), ((CUBE[:, :2], FACES), r"\(8, 2\)"), ((CUBE, FACES * 0.5), "float64"),
+                            ((CUBE * np.nan, FACES), "finite"), ((CUBE, FACES + 2**40), "too large"),
+                            ((CUBE, [[0, 1], [2]]), ""), (("a", "b"), "")]:
+            with self.subTest(word), self.assertRaisesRegex(limber.InputError, word):
+                limber.decompose(*given)
+        with self.assertRaisesRegex(ValueError, "lattice"):  # InputError is one
+            limber.build_cage(CUBE, FACES, mode="lettuce")
+        with self.assertRaisesRegex(limber.InputError, "nothing.obj: cannot be read"):
+            limber.prepare("nothing.obj")
+        with self.assertRaises(limber.InputError):
+            limber.prepare(CUBE)
+        with self.assertRaises(TypeError):
+            limber.decompose(CUBE, FACES, 4)  # options are keywords
+        with self.assertRaises(OSError):
+            limber.prepare(CUBE, FACES, tets=100).save("/proc/limber")
+
+
+class Scenes(unittest.TestCase):
+    def setUp(self):
+        self.folder = tempfile.TemporaryDirectory()
+        self.addCleanup(self.folder.cleanup)
+
+    def path(self, name):
+        return os.path.join(self.folder.name, name)
+
+    def test_a_plan_is_the_commands(self):
+        told = command("plan", "barriers1", "--preset", "fast", "--seed", "3", "-o", self.path("command"))
+        for threads in (1, 2):
+            plan = limber.plan("barriers1", self.path(f"{threads}"), preset="fast", seed=3, threads=threads)
+            self.assertEqual((plan.tree_hash, plan.trajectory_hash), (told["tree_hash"], told["trajectory_hash"]))
+        self.assertEqual(plan.summary["frames"], told["frames"])
+        self.assertEqual(plan.frames.shape, (told["frames"], plan._plan.world.nodes, 3))
+        self.assertTrue(all(promise.kept for promise in limber.verify(self.path("2"))))
+        again = limber.load_plan(self.path("2"))
+        self.assertEqual(again.trajectory_hash, told["trajectory_hash"])
+        np.testing.assert_array_equal(again.surface("robot", -1), plan.surface("robot", len(plan) - 1))
+        self.assertIn(told["trajectory_hash"], again._repr_html_())
+        film = limber.render(self.path("2"), size=(64, 36), frames="0-1")
+        self.assertEqual((film.frames_painted, film.frames_failed), (2, 0))
+        self.assertTrue(limber.export(self.path("2"), ["gltf"])[0].endswith(".glb"))
+
+    def test_the_path_is_what_its_pushes_do(self):
+        world = world_of("barriers1", preset="fast")
+        plan = world.plan(seed=3)
+        state = world.start()
+        for i in range(len(plan.pushes)):
+            state = world.rollout(state, plan.pushes[i:i + 1])
+        ends = plan.states
+        self.assertEqual(int(state.steps[0]), int(round(plan.duration_s / world.dt_s)))
+        self.assertLess(abs(int(ends.steps[-1]) - int(state.steps[0])), 1 / (plan.frames_per_second * world.dt_s))
+        if ends.steps[-1] == state.steps[0]:
+            np.testing.assert_array_equal(ends.positions[-1], state.positions[0])
+
+    def test_rollouts_in_a_batch_are_those_alone(self):
+        world = world_of("barriers1")
+        robot = world.nodes_of("robot")
+        self.assertGreater(robot.stop, robot.start)
+        forces = np.random.default_rng(7).normal(size=(40, 3)).astype(np.float32)
+        pushes = limber.pushes(40, force_n=forces, steps=np.arange(20, 60))
+        ends = world.rollout(world.start(40), pushes, threads=2)
+        self.assertTrue(ends.sound.all())
+        for i in (0, 17, 39):
+            alone = world.rollout(world.start(), pushes[i:i + 1])
+            np.testing.assert_array_equal(alone.positions[0], ends.positions[i])
+        with self.assertRaisesRegex(limber.InputError, "40 pushes for 1 states"):
+            world.rollout(world.start(), pushes)
+        with self.assertRaisesRegex(limber.InputError, "push_dtype"):
+            world.rollout(world.start(40), forces)
+        with self.assertRaisesRegex(limber.InputError, "kind"):
+            limber.pushes(1, "shove", steps=1)
+        with self.assertRaisesRegex(limber.InputError, "no body 'bunny'"):
+            world.nodes_of("bunny")
+
+    def test_progress_is_told_and_what_it_raises_ends_the_call(self):
+        stages = set()
+        limber.prepare(CUBE, FACES, tets=100, progress=lambda stage, done, total, note: stages.add(stage))
+        self.assertIn("prepare", stages)
+        world = world_of("barriers1")
+
+        def enough(*_):
+            raise KeyError("enough")
+        with self.assertRaisesRegex(KeyError, "enough"):
+            world.plan(iterations=10**8, progress=enough)
+
+    def test_ctrl_c_is_heard_and_nothing_is_left_behind(self):
+        world = world_of("barriers1")
+        timer = threading.Timer(0.5, lambda: os.kill(os.getpid(), signal.SIGINT))
+        timer.start()
+        with self.assertRaises(KeyboardInterrupt):
+            world.plan(seed=1, iterations=10**8)
+        timer.join()
+        self.assertEqual(world.rollout(world.start(), limber.pushes(1, steps=1)).steps[0], 1)
+
+    def test_other_threads_run_meanwhile(self):
+        world = world_of("barriers1")
+        counted, done = [0], threading.Event()
+
+        def count():
+            while not done.is_set():
+                counted[0] += 1
+        counter = threading.Thread(target=count)
+        counter.start()
+        world.rollout(world.start(64), limber.pushes(64, steps=200), threads=1)
+        done.set()
+        counter.join()
+        self.assertGreater(counted[0], 100)
+
+    def test_a_forked_process_goes_on(self):
+        world = world_of("barriers1")
+        ends = world.rollout(world.start(4), limber.pushes(4, force_n=(1, 0, 0), steps=5), threads=2)
+        context = multiprocessing.get_context("fork")
+        queue = context.Queue()
+        child = context.Process(target=in_child, args=(queue,))
+        child.start()
+        self.assertEqual(queue.get(timeout=120), float(ends.positions.sum()))
+        child.join()
+
+    def test_warnings_are_pythons(self):
+        with open(self.path("away.toml"), "w") as file:  # a model that is not here, and what takes its place
+            file.write(limber.Scene("bunny_gate").text)
+        with warnings.catch_warnings(record=True) as caught, unittest.mock.patch.dict(os.environ, LIMBER_MODELS="/nowhere"):
+            warnings.simplefilter("always")
+            try:
+                limber.World(self.path("away.toml"))
+            except limber.InputError as error:  # or nothing does
+                self.assertIn("bunny", str(error))
+                return
+        self.assertTrue(caught)
+
+    def test_scenes_are_read_and_refused(self):
+        self.assertIn("barriers1", limber.scene_names())
+        scene = limber.Scene("barriers1", set={"planner.seed": 9, "planner.preset": "fast"})
+        self.assertEqual(scene.robot, "robot")
+        for words in ({"file_or_name": "barriers9"}, {"file_or_name": "barriers1", "set": {"planner.speed": 1}},
+                      {"file_or_name": "barriers1", "preset": "slow"}):
+            with self.assertRaises(limber.InputError):
+                limber.Scene(**words)
+
+
+if __name__ == "__main__":
+    unittest.main()
