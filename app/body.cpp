@@ -335,8 +335,7 @@ Json report_of(const WholeBody& body, const BodySource& source, const PrepareSet
     warnings.push_back(
         fmt::format("{} triangles cross the boundary of the cage", certificate.triangles_crossing));
 
-  Json report{
-      {"version", version}, {"model", source.model}, {"input", input_of(source.identity, settings)}};
+  Json report{{"version", version}, {"model", source.model}, {"input", input_of(source.identity, settings)}};
   report.update(meshing::to_json(body.model));
   report["warnings"] = warnings;
   report.update(facts_of_body(body.model.surface, body.made.decomposition.shells, body.made.cage.mesh,
@@ -396,8 +395,7 @@ Json prepare_body(const BodySource& source, const PrepareSettings& settings, con
   tell(false);
   if (!lock && fs::is_directory(folder)) lock.emplace(folder, FolderLock::alone);
   Costs costs;
-  const WholeBody body =
-      make_body(source, settings, [&](const char* stage) { costs.end_stage(stage); });
+  const WholeBody body = make_body(source, settings, [&](const char* stage) { costs.end_stage(stage); });
   make_folder(folder);  // not before: a model that is refused leaves all as it was
   if (!lock) lock.emplace(folder, FolderLock::alone);
   Json report = write_body(body, source, settings, folder);

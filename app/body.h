@@ -87,8 +87,8 @@ WholeBody make_body(const BodySource&, const PrepareSettings&,
 // What a report tells of it, but for costs and files.
 Json report_of(const WholeBody&, const BodySource&, const PrepareSettings&);
 
-// Its files, and last its report, which is returned: of no costs. Nobody else writes into the folder, which is
-// there.
+// Its files, and last its report, which is returned: of no costs. Nobody else writes into the folder, which
+// is there.
 Json write_body(const WholeBody&, const BodySource&, const PrepareSettings&, const fs::path& folder);
 
 // Whether the folder holds what `input` makes, whole.

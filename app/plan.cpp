@@ -335,11 +335,10 @@ Found find_plan(const scenes::Scene& scene, const FemSystem& system, const PlanO
   std::optional<SearchLog> search_log;
   if (options.stats) search_log.emplace(*options.stats, earlier ? earlier->statistics.iterations : 0);
   plan::PortfolioReport searches;
-  found.plan = several
-                   ? plan::portfolio(system, settings, options.portfolio, &searches)
-                   : plan::plan(system, settings, std::move(earlier), [&](const plan::Moment& moment) {
-                       if (search_log) search_log->add(moment);
-                     });
+  found.plan = several ? plan::portfolio(system, settings, options.portfolio, &searches)
+                       : plan::plan(system, settings, std::move(earlier), [&](const plan::Moment& moment) {
+                           if (search_log) search_log->add(moment);
+                         });
   if (search_log) search_log->finish();
 
   plan::Plan& plan = found.plan;

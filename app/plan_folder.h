@@ -82,8 +82,8 @@ std::vector<PreparedBody> read_caged_bodies_of(const PlanFolder&, const fs::path
 // their world.
 std::vector<PreparedBody> read_bodies_of(const PlanFolder&, const fs::path& folder);
 
-// What `limber plan` finds before it keeps it: a search, or several, and what makes their path better. `extra`
-// and `extra_text` as of keep_plan. `earlier` and its summary: the plan that this one goes on from.
+// What `limber plan` finds before it keeps it: a search, or several, and what makes their path better.
+// `extra` and `extra_text` as of keep_plan. `earlier` and its summary: the plan that this one goes on from.
 struct Found {
   plan::Plan plan;
   Json extra;

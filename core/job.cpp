@@ -19,8 +19,8 @@ Job::Job(const Context& context)
     : watcher_(context.watcher),
       threads_(context.threads == 0 ? tbb::info::default_concurrency() : context.threads) {
   if (context.threads < 0)
-    throw InputError(fmt::format("threads is {}; it must be 0 (as many as the machine has) or more",
-                                 context.threads));
+    throw InputError(
+        fmt::format("threads is {}; it must be 0 (as many as the machine has) or more", context.threads));
 }
 
 void Job::progress(const std::string& stage, std::int64_t done, std::int64_t total, const std::string& note) {

@@ -6,6 +6,7 @@
 #include "core/hash.h"
 #include "core/json_text.h"
 #include "core/lock.h"
+#include "core/log.h"
 #include "core/mesh_files.h"
 #include "limber/detail/arrays.h"
 #include "limber/detail/body.h"
@@ -79,6 +80,8 @@ Body body_of(const app::BodySource& source, const PrepareOptions& options) {
   impl->certificate = certificate_of(whole.certificate);
   impl->binding = binding_of(whole.binding);
   impl->report = app::report_of(whole, source, settings);
+  for (const Json& warning : impl->report.at("warnings"))
+    log::warn("{}: {}", source.model, warning.get<std::string>());
   impl->bound = whole.binding;
   impl->rest = whole.made.cage.mesh;
   impl->made = {std::move(whole), source, settings};

@@ -110,7 +110,8 @@ class Search {
       // Threads of our own: they wait for one another, which tasks of a pool must not, and ThreadSanitizer
       // sees them begin and end.
       std::vector<std::jthread> others;
-      for (int t = 1; t < threads_; ++t) others.emplace_back([this, job = current_job()] {
+      for (int t = 1; t < threads_; ++t)
+        others.emplace_back([this, job = current_job()] {
           const WorkingFor working(job);
           work();
         });
