@@ -268,7 +268,7 @@ TEST(Search, ASignalKeepsWhatIsFinished) {
     const Plan stopped = plan(toy, toy_settings());
     request_stop(0);
     EXPECT_EQ(stopped.ending, Ending::stopped);
-    EXPECT_NE(explain(stopped).find("signal"), std::string::npos);
+    EXPECT_NE(explain(stopped).find("was stopped"), std::string::npos);
     ASSERT_GT(stopped.statistics.iterations, 0);
     ASSERT_LE(stopped.statistics.iterations, 60);
     EXPECT_EQ(limber::hash_of(stopped.trajectory.end),
