@@ -48,6 +48,11 @@ class Library : public testing::Test {
     std::ofstream(path("small.toml")) << app::small_scene;
     return read_scene(path("small.toml"));
   }
+  // Its bodies are prepared once for all tests.
+  Problem small_problem() const {
+    static const TemporaryFolder work;
+    return Problem(small(), work.path());
+  }
 };
 
 using Library_slow = Library;  // stays out of the sanitizer runs
@@ -165,7 +170,7 @@ TEST_F(Library_slow, WorkFoldersStayAndTemporaryOnesGo) {
 }
 
 TEST_F(Library_slow, AFrameIsDrawnWhereTheCageCarriesIt) {
-  const Problem problem(small());
+  const Problem problem = small_problem();
   const Plan plan = problem.solve({.seed = 5});
   const States frames = plan.frames();
   ASSERT_EQ(problem.scene().bodies()[0], "robot");
@@ -181,7 +186,7 @@ TEST_F(Library_slow, AFrameIsDrawnWhereTheCageCarriesIt) {
 }
 
 TEST_F(Library_slow, RolloutsDependOnTheirOwnStateAndPushAlone) {
-  const Problem problem(small());
+  const Problem problem = small_problem();
   const auto push = [](int i, int steps) {
     return Push{.kind = i % 3 == 0 ? Push::Kind::body : Push::Kind::control_point,
                 .force_n = {0.5f * float(i), 0, 1},
@@ -209,7 +214,7 @@ TEST_F(Library_slow, RolloutsDependOnTheirOwnStateAndPushAlone) {
 }
 
 TEST_F(Library_slow, RolloutsOfWhatDoesNotFitAreRefused) {
-  const Problem problem(small());
+  const Problem problem = small_problem();
   const States start = problem.start(2);
   EXPECT_THAT(complaint([&] { problem.rollout(start, {{.steps = 1}}); }), HasSubstr("1 pushes for 2 states"));
   EXPECT_THAT(complaint([&] {
@@ -255,8 +260,7 @@ class Listener final : public Watcher {
 };
 
 TEST_F(Library_slow, TwoPlansSideBySideAndOneIsStopped) {
-  const Scene scene = small();
-  const Problem problem(scene);
+  const Problem problem = small_problem();
   const std::string whole = problem.solve({.seed = 5}).tree_hash();
   Listener patient, hasty(3);
   std::optional<Plan> one, other;
@@ -279,7 +283,7 @@ TEST_F(Library_slow, AStoppedCallThrowsAndLeavesNothing) {
   Listener hasty(0);
   EXPECT_THROW(prepare(cube(), {}, {.watcher = &hasty}), Interrupted);
   EXPECT_THROW(Problem(small(), path("work"), {.watcher = &hasty}), Interrupted);
-  const Problem problem(small());
+  const Problem problem = small_problem();
   EXPECT_THROW(problem.rollout(problem.start(), {{.steps = 1000}}, {.watcher = &hasty}), Interrupted);
 }
 

@@ -106,9 +106,9 @@ class Scenes(unittest.TestCase):
         return os.path.join(self.folder.name, name)
 
     def test_a_plan_is_the_commands(self):
-        told = command("plan", "barriers1", "--preset", "fast", "--seed", "3", "-o", self.path("command"))
+        told = command("plan", "barriers1", "--preset", "fast", "--seed", "1", "-o", self.path("command"))
         for threads in (1, 2):
-            plan = limber.plan("barriers1", self.path(f"{threads}"), preset="fast", seed=3, threads=threads)
+            plan = limber.plan("barriers1", self.path(f"{threads}"), preset="fast", seed=1, threads=threads)
             self.assertEqual((plan.tree_hash, plan.trajectory_hash), (told["tree_hash"], told["trajectory_hash"]))
         self.assertEqual(plan.summary["frames"], told["frames"])
         self.assertEqual(plan.frames.shape, (told["frames"], plan._plan.world.nodes, 3))
@@ -123,7 +123,7 @@ class Scenes(unittest.TestCase):
 
     def test_the_path_is_what_its_pushes_do(self):
         world = world_of("barriers1", preset="fast")
-        plan = world.plan(seed=3)
+        plan = world.plan(seed=1)
         state = world.start()
         for i in range(len(plan.pushes)):
             state = world.rollout(state, plan.pushes[i:i + 1])
