@@ -1,32 +1,35 @@
 #!/usr/bin/env python3
-"""Rollout steps a second from Python beside those of the planner's own search, of one scene in one run: rollouts.py [SCENE].
+"""Rollouts from Python beside the same from C++ by the planner's own propagator: rollouts.py PROGRAM [SCENE].
 
-The search's are those that it asked for, over the time of the search; those from Python repeat its very pushes, in
-batches of 256 from the start. PYTHONPATH=build/python.
+PROGRAM is build/bench/rollouts_bench; PYTHONPATH=build/python. Both start 256 pushes from states along a planned path, where bodies touch.
 """
+import subprocess
 import sys
+import tempfile
 import time
 
 import numpy as np
 
 import limber
 
-scene = sys.argv[1] if len(sys.argv) > 1 else "barriers1"
-world = limber.World(limber.Scene(scene, preset="paper"))
-batch = 256
-print(f"{scene}: {world.nodes} nodes, step {1e3 * world.dt_s:.3g} ms")
+program, scene = sys.argv[1], sys.argv[2] if len(sys.argv) > 2 else "barriers1"
+count, rounds = 256, 5
+folder = tempfile.TemporaryDirectory()
+world = limber.World(limber.Scene(scene, preset="fast"), folder.name)
+frames = world.plan(seed=1).states
+i = np.arange(count)
+states = limber.States(*(numbers[i % len(frames.steps)] for numbers in frames))
+pushes = limber.pushes(count, force_n=np.stack([7 * i % 61 - 30, 13 * i % 61 - 30, 0 * i], axis=1), steps=20 + 7 * i % 80)
+steps = int(pushes["steps"].sum())
+print(f"{scene}: {world.nodes} nodes, {count} rollouts, {steps} steps")
 for threads in (1, 2):
-    plan = world.plan(seed=1, iterations=400, threads=threads)
-    done = plan.summary["statistics"]
-    search = done["rollout_steps"] / done["wall_s"]
-    steps = np.random.default_rng(1).integers(int(0.2 / world.dt_s), int(1 / world.dt_s), batch)
-    force = np.random.default_rng(2).normal(size=(batch, 3)).astype(np.float32) * 30
-    pushes = limber.pushes(batch, force_n=force, steps=steps)
-    start = world.start(batch)
-    world.rollout(start, pushes, threads=threads)
-    rates = []
-    for _ in range(5):
+    python = []
+    for _ in range(rounds):
         began = time.perf_counter()
-        world.rollout(start, pushes, threads=threads)
-        rates.append(steps.sum() / (time.perf_counter() - began))
-    print(f"{threads} threads: search {search:.0f} steps/s, Python {np.median(rates):.0f} ({np.median(rates) / search:.2f} ×)")
+        ends = world.rollout(states, pushes, threads=threads)
+        python.append(time.perf_counter() - began)
+    told = subprocess.run([program, scene, folder.name, str(threads)], check=True, capture_output=True, text=True).stdout.split()
+    same = abs(float(told[1]) - float(world.robot_centers(ends).sum())) < 1e-6
+    python_s, cpp_s = np.median(python), float(told[0])
+    print(f"{threads} threads: C++ {steps / cpp_s:.0f} steps/s, Python {steps / python_s:.0f} ({cpp_s / python_s:.2f} ×), "
+          f"{'the same ends' if same else 'OTHER ENDS'}")
