@@ -324,6 +324,15 @@ Outcome plan(const PlanOptions& options) {
   require_other_folder(options.from, options.out);
   make_folder(options.out);
   const FolderLock lock(options.out, FolderLock::alone);
+  if (options.from.empty() && !options.resume && !options.stats && plan_is_up_to_date(options, scene)) {
+    const fs::path file = options.out / "plan.npz";
+    const PlanFolder kept = read_plan_folder(options.out);
+    // What a film shows otherwise is told by the text alone.
+    if (kept.scene.text == scene.text && kept.scene.sets == scene.sets) {
+      log::info("{}: up to date", file.string());
+      return {kept.plan.solved() ? exit_done : exit_no_plan, kept.summary, text_of(kept.summary, "", file)};
+    }
+  }
   return plan(options, scene);
 }
 

@@ -16,9 +16,10 @@ void plan(const std::string& name, const limber::Context& context) {
   std::printf("%s\ntree %s, trajectory %s\n", plan.explanation().c_str(), plan.tree_hash().c_str(),
               plan.trajectory_hash().c_str());
 
-  const limber::States ends = problem.rollout(
-      problem.start(8),
-      std::vector<limber::Push>(8, {.kind = limber::Push::Kind::body, .force_n = {10, 0, 0}, .steps = 50}));
+  std::vector<limber::Push> pushes;
+  for (int i = 0; i < 8; ++i)
+    pushes.push_back({.kind = limber::Push::Kind::body, .force_n = {10.f * float(i), 0, 0}, .steps = 50});
+  const limber::States ends = problem.rollout(problem.start(8), pushes, context);
   for (const auto& [x, y, z] : problem.robot_centers(ends)) std::printf("%.6f %.6f %.6f\n", x, y, z);
 }
 

@@ -9,7 +9,7 @@ print(plan.why)
 print(f"tree {plan.tree_hash}, trajectory {plan.trajectory_hash}")
 
 world = limber.World(limber.Scene(scene, preset="fast"), folder)
-ends = world.rollout(world.start(8), limber.pushes(8, force_n=(10, 0, 0), steps=50))
+ends = world.rollout(world.start(8), limber.pushes(8, force_n=[(10 * i, 0, 0) for i in range(8)], steps=50))
 print(world.robot_centers(ends))
 
 print(limber.render(folder, size=(320, 180)).video)
