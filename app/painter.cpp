@@ -249,7 +249,7 @@ struct Shot::Painter::View {
 
   void show(int frame) {
     const scenes::ColorBy by = shot.scene_.film.color_by;
-    const State& state = shot.plan_.trajectory.frames[std::size_t(frame)];
+    const State state = shot.state_at(frame);
     std::vector<double> values;
     if (by != scenes::ColorBy::body) values = node_values(shot.world_, state, by);
     for (std::size_t b = 0; b < meshes.size(); ++b) {
@@ -317,28 +317,34 @@ render::Image8 Shot::Painter::annotated(render::Image8 image, int frame) const {
   return image;
 }
 
+render::Image8 Shot::Painter::without_words(int frame, render::Passes* wanted) {
+  const render::Camera camera = shot_.camera_of(frame);
+  const auto drawn = [&](View& view) {
+    view.show(frame);
+    return view.renderer.draw_shown(camera, &view == views_[0].get() ? wanted : nullptr);
+  };
+  render::Image8 image = drawn(*views_[0]);
+  if (views_.size() > 1) image = beside(image, drawn(*views_[1]));
+  return image;
+}
+
 Picture Shot::Painter::paint(int frame) {
   const render::Camera camera = shot_.camera_of(frame);
   const Output& output = shot_.output_;
-  views_[0]->show(frame);
   const bool transparent = shot_.scene_.film.transparent;
-  render::Renderer& renderer = views_[0]->renderer;
   render::Passes passes;
   render::Passes* const wanted = output.passes.empty() ? nullptr : &passes;
-  const auto linear = [&] { return renderer.draw(camera, wanted); };
+  const auto linear = [&] {
+    views_[0]->show(frame);
+    return views_[0]->renderer.draw(camera, wanted);
+  };
   Picture picture;
   if (output.bits == 16)
     picture.frame = transparent ? render::tone_mapped_alpha_16(linear()) : render::tone_mapped_16(linear());
   else if (transparent)
     picture.frame = render::tone_mapped_alpha(linear());
-  else {
-    render::Image8 image = renderer.draw_shown(camera, wanted);
-    if (views_.size() > 1) {
-      views_[1]->show(frame);
-      image = beside(image, views_[1]->renderer.draw_shown(camera));
-    }
-    picture.frame = annotated(std::move(image), frame);
-  }
+  else
+    picture.frame = annotated(without_words(frame, wanted), frame);
   for (const std::string& name : output.passes) {
     const bool depth = name == "depth";
     const double low = depth ? shot_.near_m_ : shot_.low_, high = depth ? shot_.far_m_ : shot_.high_;

@@ -120,6 +120,17 @@ scenes::Scene filmed_as(const scenes::Scene& planned, const std::vector<std::str
   return scenes::read_scene(planned.text, planned.name, all, planned.script);
 }
 
+std::string told(const Json& time) {
+  const double slowest = time["speed"][0], quickest = time["speed"][1], left_out_s = time["left_out_s"];
+  std::string text = fmt::format("{:.1f} s of film show {:.2f} s of the motion, at {}× its speed",
+                                 time["seconds"].get<double>(), time["motion_s"].get<double>(),
+                                 slowest == quickest ? fmt::format("{:.3g}", slowest)
+                                                     : fmt::format("{:.2g} to {:.2g}", slowest, quickest));
+  if (left_out_s > 0)
+    text += fmt::format("; the last {:.2f} s, in which nothing is seen to move, are left out", left_out_s);
+  return text + "\n";
+}
+
 std::string suffix_of(const RenderOptions& options) {
   const std::string name = !options.name.empty()      ? options.name
                            : options.camera == "main" ? ""
@@ -188,13 +199,15 @@ Outcome render(const RenderOptions& options) {
               {"failed", failures.size()},
               {"size", {size.first, size.second}},
               {"camera", options.camera},
+              {"time", shot.time_told()},
               {"trajectory_hash", hex(plan::hash_of(planned.plan.trajectory))},
               {"cpu_s", cpu_s},
               {"folder", folder.string()}};
   std::string text =
       fmt::format("{} of {} frames in {}: {} painted, {} kept, {} failed; {:.2f} CPU s\n", wanted.size(),
                   frame_count, folder.string(), missing.size() - failures.size(),
-                  wanted.size() - missing.size(), failures.size(), cpu_s);
+                  wanted.size() - missing.size(), failures.size(), cpu_s) +
+      told(result["time"]);
 
   std::vector<fs::path> paths;
   for (int f = 0; f < frame_count; ++f) paths.push_back(files.of(f));
@@ -206,7 +219,7 @@ Outcome render(const RenderOptions& options) {
     std::vector<std::string> captions;
     for (const int f : render::spread_over(frame_count, film.sheet_columns * film.sheet_rows)) {
       shown.push_back(files.of(f));
-      captions.push_back(fmt::format("{:.2f} s", double(f) / planned.plan.trajectory.frames_per_second));
+      captions.push_back(fmt::format("{:.2f} s", shot.time_s(f)));
     }
     render::write_png(sheet, render::contact_sheet(shown, captions, {.columns = film.sheet_columns}));
     render::make_film(paths, film.frames_per_second, video);

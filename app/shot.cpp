@@ -11,6 +11,7 @@
 #include "app/node_values.h"
 #include "core/error.h"
 #include "core/hash.h"
+#include "core/threads.h"
 #include "core/version.h"
 #include "fem/control_forces.h"
 #include "fem/observe.h"
@@ -24,6 +25,10 @@ constexpr int generation =
     4;  // of pictures: raised when the same film comes out otherwise, so that it is painted anew
 constexpr double longest_arrow = 2;  // times that of the strongest push, which is as long as the robot
 constexpr int most_edges_of_tree = 4000;
+constexpr double at_rest = 0.003;      // of the robot's size: what moves no farther is not seen to move
+constexpr double after_rest_s = 0.5;   // of the film
+constexpr double ease_s = 0.5;         // of the film at its usual speed: so long before contact it slows down
+constexpr double full_contact = 0.05;  // of the strongest: from there on the robot is in contact
 
 // From over the photographer's left shoulder, so that what faces the camera is lit, and shadows fall to the
 // right and away.
@@ -136,6 +141,9 @@ Shot::Shot(const scenes::Scene& scene, const std::string& camera, const plan::Pl
     ground_m = std::min(ground_m, bounding_box(mesh.positions).lower.z());
   look_.ground_height_m = ground_m;
   look_.transparent_background = scene.film.transparent;
+  find_controls();
+  if (scene.film.pace == scenes::Pace::contact || !output.passes.empty()) find_touches();
+  lay_out_time();
   look_.stage = box_of_motion();
   for (const SurfaceMesh& mesh : scenery) look_.stage.include(bounding_box(mesh.positions));
   lay_out_camera(double(look_.width) / look_.height);
@@ -172,7 +180,88 @@ void Shot::check() const {
                     film.transparent ? "film.transparent" : "--bits 16"));
 }
 
-int Shot::frames() const { return int(plan_.trajectory.frames.size()); }
+int Shot::frames() const { return int(moments_.size()); }
+
+double Shot::time_s(int frame) const { return moment_of(frame) / plan_.trajectory.frames_per_second; }
+
+Json Shot::time_told() const {
+  const scenes::FilmSpec& film = scene_.film;
+  double least = std::numeric_limits<double>::infinity(), most = 0;
+  for (const Moment& moment : moments_)
+    least = std::min(least, moment.pace * film.speed), most = std::max(most, moment.pace * film.speed);
+  return {{"seconds", double(frames()) / film.frames_per_second},
+          {"motion_s", time_s(frames() - 1)},
+          {"left_out_s", double(stored() - 1) / plan_.trajectory.frames_per_second - time_s(frames() - 1)},
+          {"speed", {least, most}}};
+}
+
+void Shot::find_controls() {
+  int stored_frame = 0;
+  std::int64_t step = 0;
+  for (const Control& control : plan_.trajectory.controls) {
+    pushes_.push_back({stored_frame, control});
+    step += control.steps;
+    while (stored_frame < stored() && plan_.trajectory.frames[std::size_t(stored_frame)].step < step)
+      ++stored_frame;
+  }
+}
+
+Control Shot::control_at(int stored_frame) const {
+  const auto push = std::find_if(pushes_.rbegin(), pushes_.rend(),
+                                 [&](const Push& p) { return p.first_stored <= stored_frame; });
+  return push != pushes_.rend() ? push->control : Control{};
+}
+
+void Shot::find_touches() {
+  touches_.resize(std::size_t(stored()));
+  parallel_for(stored(), [&](int f) {
+    touches_[std::size_t(f)] =
+        fem::contact_forces(world_, plan_.trajectory.frames[std::size_t(f)], control_at(f));
+  });
+}
+
+// How much each is one of contact: 1 from a share of the strongest on.
+std::vector<double> Shot::contact_shares() const {
+  std::vector<double> forces(touches_.size(), 0);  // on the robot, lengths summed
+  for (std::size_t f = 0; f < forces.size(); ++f)
+    for (const fem::ContactForce& touch : touches_[f])
+      if (touches_robot(touch)) forces[f] += touch.force_n.norm();
+  const double strongest = *std::max_element(forces.begin(), forces.end());
+  for (double& force : forces) force = strongest > 0 ? std::min(1.0, force / (full_contact * strongest)) : 0;
+  return forces;
+}
+
+void Shot::lay_out_time() {
+  const scenes::FilmSpec& film = scene_.film;
+  const std::vector<State>& all = plan_.trajectory.frames;
+  int last = stored() - 1;
+  if (film.end == scenes::FilmEnd::rest) {
+    const SurfaceMesh& robot = bodies_[std::size_t(world_.robot)].surface;
+    const double tolerance_m = at_rest * bounding_box(robot.positions).size().maxCoeff();
+    last = std::min(last, first_at_rest(all, tolerance_m) + int(after_rest_s * film.frames_per_second));
+  }
+  std::vector<double> contact(std::size_t(last) + 1, 0);
+  PaceRange range{1, 1};
+  std::optional<double> length;
+  if (film.pace == scenes::Pace::contact) {
+    const std::vector<double> shares = contact_shares();
+    contact.assign(shares.begin(), shares.begin() + last + 1);
+    contact = eased(contact, int(ease_s * film.frames_per_second));
+    const bool touched = *std::max_element(contact.begin(), contact.end()) > 0;
+    if (touched || film.length_s) range = {film.slowest, film.quickest};  // else there is nothing to dwell on
+    if (film.length_s) {
+      const double usual_s = double(last) / film.frames_per_second, shortest_s = usual_s / film.quickest,
+                   longest_s = usual_s / film.slowest;
+      if (*film.length_s < shortest_s || *film.length_s > longest_s)
+        throw InputError(fmt::format(
+            "film.length_s = {:g}: with film.pace_range = [{:g}, {:g}] this motion can take {:.3g} "
+            "to {:.3g} s; choose a length among these, or widen film.pace_range",
+            *film.length_s, film.slowest, film.quickest, shortest_s, longest_s));
+      length = *film.length_s * film.frames_per_second;
+    }
+  }
+  moments_ = paced(contact, range, length);
+}
 
 Box Shot::box_of_motion() const {
   Box box;
@@ -219,8 +308,7 @@ void Shot::lay_out_camera(double aspect) {
   if (camera_->follow >= 0) {
     followed_m_.resize(frames(), 3);
     for (int f = 0; f < frames(); ++f)
-      followed_m_.row(f) =
-          fem::center_of_mass_m(world_, plan_.trajectory.frames[std::size_t(f)], camera_->follow).transpose();
+      followed_m_.row(f) = fem::center_of_mass_m(world_, state_at(f), camera_->follow).transpose();
     constexpr double room = 0.75;  // about the body, in its own diagonals
     const Vec3 reach = Vec3::Constant(
         room * bounding_box(bodies_[std::size_t(camera_->follow)].surface.positions).diagonal());
@@ -248,10 +336,15 @@ render::Camera Shot::camera_of(int frame) const {
 std::string Shot::clock_at(int frame) const {
   const scenes::FilmSpec& film = scene_.film;
   if (!film.clock) return {};
-  const int decimals = film.speed < 0.5 ? 2 : 1;
-  std::string words = fmt::format("{:.{}f} s", double(frame) / plan_.trajectory.frames_per_second, decimals);
-  if (film.speed < 1) words += fmt::format(" · {:.3g}× slow motion", 1 / film.speed);
-  if (film.speed > 1) words += fmt::format(" · {:.3g}× time lapse", film.speed);
+  const double speed = film.speed * moments_[std::size_t(frame)].pace;
+  std::string words = fmt::format("{:.{}f} s", time_s(frame), film.speed < 0.5 ? 2 : 1);
+  // Where the speed changes, its figure goes in steps: one that is read while it runs says nothing.
+  const bool steady = film.pace == scenes::Pace::steady;
+  const auto told = [&](double times) {
+    return steady ? times : times < 2 ? 0.5 * std::round(2 * times) : std::round(times);
+  };
+  if (speed < 1 && told(1 / speed) > 1) words += fmt::format(" · {:.3g}× slow motion", told(1 / speed));
+  if (speed > 1 && told(speed) > 1) words += fmt::format(" · {:.3g}× time lapse", told(speed));
   return words;
 }
 
@@ -260,32 +353,21 @@ double Shot::pixels_a_metre(const render::Camera& camera) const {
          (camera.target - camera.eye).norm();
 }
 
-// The corner where they hide least of the bodies over the film; of equals the first.
-void Shot::place_words() {
+std::array<int, 4> Shot::hidden_by(const std::array<Eigen::Vector4d, 4>& boxes) const {
   constexpr int most_frames = 24, across = 16, down = 4;
-  const scenes::FilmSpec& film = scene_.film;
-  words_.on_dark = look_.ground_srgb.mean() < 0.4;
-  if (film.scale_bar) scale_m_ = round_length_m(0.2 * look_.width / pixels_a_metre(camera_of(0)));
-  const std::string clock = clock_at(frames() - 1);
-  if (film.caption.empty() && clock.empty()) return;
-  // Places within the words of each corner, where two views are side by side those in their own one.
-  const int width = look_.width * (film.side_by_side ? 2 : 1);
-  std::array<std::vector<Eigen::Vector2d>, render::corners.size()> places_of;
-  for (std::size_t c = 0; c < places_of.size(); ++c) {
-    const Eigen::Vector4d box =
-        render::place_of_caption(width, look_.height, film.caption, clock, render::corners[c]);
+  std::array<std::vector<Eigen::Vector2d>, 4> places_of;
+  for (std::size_t c = 0; c < boxes.size(); ++c)
     for (int x = 0; x < across; ++x)
-      for (int y = 0; y < down; ++y)
-        places_of[c].emplace_back(std::fmod(box[0] + (box[2] - box[0]) * (x + 0.5) / across, look_.width),
-                                  box[1] + (box[3] - box[1]) * (y + 0.5) / down);
-  }
-  std::array<int, render::corners.size()> hidden{};
+      for (int y = 0; y < down; ++y)  // where two views are side by side, in their own one
+        places_of[c].emplace_back(
+            std::fmod(boxes[c][0] + (boxes[c][2] - boxes[c][0]) * (x + 0.5) / across, look_.width),
+            boxes[c][1] + (boxes[c][3] - boxes[c][1]) * (y + 0.5) / down);
+  std::array<int, 4> hidden{};
   Points outermost;
   for (std::size_t b = 0; b < bodies_.size(); ++b) {
     const ffd::Binding part = outermost_part(bodies_[b]);
     for (const int frame : render::spread_over(frames(), most_frames)) {
-      deform(bodies_[b], part,
-             fem::body_positions(world_, plan_.trajectory.frames[std::size_t(frame)], int(b)), outermost);
+      deform(bodies_[b], part, fem::body_positions(world_, state_at(frame), int(b)), outermost);
       const render::Camera camera = camera_of(frame);
       std::vector<Eigen::Vector2d> seen;
       for (Eigen::Index p = 0; p < outermost.rows(); ++p) {
@@ -298,6 +380,23 @@ void Shot::place_words() {
                                        [&](const Eigen::Vector2d& place) { return holds(hull, place); }));
     }
   }
+  return hidden;
+}
+
+// The corner where they hide least of the bodies over the film; of equals the first.
+void Shot::place_words() {
+  const scenes::FilmSpec& film = scene_.film;
+  words_.on_dark = look_.ground_srgb.mean() < 0.4;
+  if (film.scale_bar) scale_m_ = round_length_m(0.2 * look_.width / pixels_a_metre(camera_of(0)));
+  std::string clock = clock_at(frames() - 1);  // the longest, of equals the last
+  for (int f = 0; f < frames(); ++f)
+    if (std::string one = clock_at(f); one.size() > clock.size()) clock = std::move(one);
+  if (film.caption.empty() && clock.empty()) return;
+  const int width = look_.width * (film.side_by_side ? 2 : 1);
+  std::array<Eigen::Vector4d, 4> boxes;
+  for (std::size_t c = 0; c < boxes.size(); ++c)
+    boxes[c] = render::place_of_caption(width, look_.height, film.caption, clock, render::corners[c]);
+  const std::array<int, 4> hidden = hidden_by(boxes);
   words_.corner =
       render::corners[std::size_t(std::min_element(hidden.begin(), hidden.end()) - hidden.begin())];
 }
@@ -324,7 +423,20 @@ Json Shot::key_of_passes() const {
   Json key{{"depth_m", {near_m_, far_m_}}, {"objects", objects}};
   if (scene_.film.color_by != scenes::ColorBy::body)
     key["scalar"] = {{"of", caption_of(scene_.film.color_by)}, {"range", {low_, high_}}};
+  for (int f = 0; f < frames(); ++f) key["contacts"].push_back(contacts_in_picture(f));
   return key;
+}
+
+// Of the stored frame that is shown, or was last.
+Json Shot::contacts_in_picture(int frame) const {
+  const render::Camera camera = camera_of(frame);
+  Json contacts = Json::array();
+  for (const fem::ContactForce& touch : touches_[std::size_t(moment_of(frame))]) {
+    if (!touches_robot(touch)) continue;
+    const Vec3 pixel = render::pixel_from_world(camera, touch.place_m, look_.width, look_.height);
+    contacts.push_back({pixel.x(), pixel.y(), pixel.z(), touch.force_n.norm()});
+  }
+  return contacts;
 }
 
 void Shot::measure_colors() {
@@ -342,13 +454,6 @@ void Shot::measure_colors() {
 }
 
 void Shot::measure_forces() {
-  int frame = 0;
-  std::int64_t step = 0;
-  for (const Control& control : plan_.trajectory.controls) {
-    pushes_.push_back({frame, control});
-    step += control.steps;
-    while (frame < frames() && plan_.trajectory.frames[std::size_t(frame)].step < step) ++frame;
-  }
   double strongest = 0;
   for (const Control& control : plan_.trajectory.controls)
     strongest = std::max(strongest, double(largest_force(control)));
@@ -361,14 +466,32 @@ void Shot::measure_forces() {
   arrow_radius_m_ = 0.02 * robot;
 }
 
-bool Shot::acts(const fem::Force& force, int frame) const {
+bool Shot::acts(const fem::Force& force, int stored_frame) const {
   const std::vector<State>& all = plan_.trajectory.frames;
-  const std::int64_t step = all[std::size_t(frame)].step,
-                     next = frame + 1 < frames() ? all[std::size_t(frame) + 1].step : step + 1;
+  const std::int64_t step = all[std::size_t(stored_frame)].step,
+                     next = stored_frame + 1 < stored() ? all[std::size_t(stored_frame) + 1].step : step + 1;
   return force.first_step < next && force.end_step > step;
 }
 
 Points Shot::arrows_at(int frame) const {
+  const double moment = moment_of(frame);
+  const int before = int(moment);
+  Points ends = arrows_at_stored(before);
+  const double share = moment - before;
+  if (share == 0) return ends;
+  const Points later = arrows_at_stored(before + 1);
+  for (Eigen::Index row = 0; row < ends.rows(); row += 2) {
+    const Vec3 from = ends.row(row), to = later.row(row), force = ends.row(row + 1) - ends.row(row),
+               force_later = later.row(row + 1) - later.row(row);
+    // One that begins or ends grows where it stands.
+    const Vec3 foot = force_later.isZero() ? from : force.isZero() ? to : Vec3(from + share * (to - from));
+    ends.row(row) = foot.transpose();
+    ends.row(row + 1) = (foot + force + share * (force_later - force)).transpose();
+  }
+  return ends;
+}
+
+Points Shot::arrows_at_stored(int frame) const {
   const State& state = plan_.trajectory.frames[std::size_t(frame)];
   const Vec3 robot = fem::center_of_mass_m(world_, state, world_.robot);
   const int bodies = int(world_.bodies.size());
@@ -386,9 +509,7 @@ Points Shot::arrows_at(int frame) const {
   };
   Points ends(2 * (1 + bodies + Eigen::Index(world_.forces.size())), 3);
   ends.rowwise() = robot.transpose();
-  const auto push =
-      std::find_if(pushes_.rbegin(), pushes_.rend(), [&](const Push& p) { return p.first_frame <= frame; });
-  const Control control = push != pushes_.rend() ? push->control : Control{};
+  const Control control = control_at(frame);
   if (control.manipulation != Manipulation::none) {
     const bool at_point = control.manipulation == Manipulation::control_point;
     Vec3 force_n = control.force_n.cast<double>();
@@ -450,14 +571,16 @@ std::uint64_t Shot::hash_of_look() const {
   hasher.value(film.frames_per_second).value(frames()).value(output_.bits);
   if (!output_.occlusion) hasher.value(0);
   hasher.value(arrow_m_per_n_).matrix(way_m_).matrix(tree_m_);
-  for (const auto& [first_frame, control] : pushes_)
-    hasher.value(first_frame)
+  for (const auto& [first_stored, control] : pushes_) {
+    if (!film.forces) break;
+    hasher.value(first_stored)
         .value(int(control.manipulation))
         .matrix(control.force_n)
         .value(control.node)
         .value(control.radius_m)
         .matrix(control.target_m)
         .value(control.max_force_n);
+  }
   for (const fem::Force& force : world_.forces) {
     if (!film.forces) break;
     hasher.value(force.body).value(force.first_step).value(force.end_step).matrix(force.force_n);
@@ -487,10 +610,12 @@ std::string Shot::hash_of(int frame) const {
   Hasher hasher;
   hasher.value(look_hash_)
       .value(frame)
-      .value(limber::hash_of(plan_.trajectory.frames[std::size_t(frame)]))
+      .value(limber::hash_of(state_at(frame)))
       .matrix(camera.eye)
       .matrix(camera.target)
       .matrix(camera.up);
+  if (scene_.film.pace != scenes::Pace::steady)
+    hasher.value(moment_of(frame)).value(moments_[std::size_t(frame)].pace);
   return hex(hasher.value(camera.fov_deg).digest());
 }
 

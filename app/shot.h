@@ -1,14 +1,17 @@
 // What one camera sees of a planned motion: from the number of a frame to a picture, by any worker alike.
 #pragma once
 
+#include <array>
 #include <map>
 #include <memory>
 #include <string>
 #include <variant>
 #include <vector>
 
+#include "app/film_time.h"
 #include "app/plan_folder.h"
 #include "app/scene_world.h"
+#include "fem/observe.h"
 #include "render/annotate.h"
 #include "render/camera.h"
 #include "render/image.h"
@@ -42,7 +45,12 @@ class Shot {
        const Output& = {});
 
   int frames() const;
-  // {"depth_m": [near, far], "objects": ["", NAME…], "scalar": {…}}: what the levels of the passes mean.
+  // Of the motion, when a frame of the film shows it.
+  double time_s(int frame) const;
+  // {"seconds": …, "motion_s": …, "left_out_s": …, "speed": [least, most]}: how the film tells the motion.
+  Json time_told() const;
+  // {"depth_m": [near, far], "objects": ["", NAME…], "scalar": {…}, "contacts": […]}: what the levels of the
+  // passes mean, and where in the pictures the robot is touched. docs/files.md.
   Json key_of_passes() const;
   // Of all that the picture depends on.
   std::string hash_of(int frame) const;
@@ -56,6 +64,7 @@ class Shot {
 
    private:
     struct View;
+    render::Image8 without_words(int frame, render::Passes*);
     render::Image8 annotated(render::Image8, int frame) const;
     const Shot& shot_;
     std::vector<std::unique_ptr<View>> views_;  // from left to right
@@ -63,9 +72,24 @@ class Shot {
 
  private:
   struct Push {
-    int first_frame;  // of the frames that it lasts
+    int first_stored;  // of the frames that it lasts
     Control control;
   };
+  // Frames are those of the film but where they are called stored: of the plan.
+  int stored() const { return int(plan_.trajectory.frames.size()); }
+  State state_at(int frame) const {
+    return app::state_at(plan_.trajectory.frames, world_.dt_s, moment_of(frame));
+  }
+  double moment_of(int frame) const { return moments_[std::size_t(frame)].at; }
+  void lay_out_time();
+  void find_controls();
+  // At a stored frame.
+  Control control_at(int stored) const;
+  void find_touches();
+  bool touches_robot(const fem::ContactForce& touch) const {
+    return (touch.body == world_.robot) != (touch.other == world_.robot);
+  }
+  std::vector<double> contact_shares() const;  // a stored frame
   render::Camera camera_of(int frame) const;
   Box box_of_motion() const;
   // What the camera is to hold: of the subject, or of all bodies (−1) and the bounds where they are drawn.
@@ -73,6 +97,10 @@ class Shot {
   void lay_out_camera(double aspect);
   void check() const;
   void place_words();
+  // How many of some places in each box, one a corner (pixels: left, top, right, bottom), are on bodies, over
+  // the film.
+  std::array<int, 4> hidden_by(const std::array<Eigen::Vector4d, 4>& boxes) const;
+  Json contacts_in_picture(int frame) const;
   std::string clock_at(int frame) const;
   double pixels_a_metre(const render::Camera&) const;  // at the distance of what it looks at
   void measure_depths();
@@ -82,7 +110,8 @@ class Shot {
   // Arrows of a frame, rows 2i and 2i + 1 their ends; always the same number, those of no force without
   // length: the control's push, what each body does to the robot and last the walls, each force of the world.
   Points arrows_at(int frame) const;
-  bool acts(const fem::Force&, int frame) const;  // in some step of those from this frame to the next
+  Points arrows_at_stored(int stored) const;
+  bool acts(const fem::Force&, int stored) const;  // in some step of those from this frame to the next
   std::uint64_t hash_of_look() const;
 
   const scenes::Scene& scene_;
@@ -100,8 +129,10 @@ class Shot {
   double low_ = 0, high_ = 1;            // of the bar of colours
   double near_m_ = 0, far_m_ = 1;        // depths of all that is ever seen
   double strongest_push_n_ = 0, arrow_m_per_n_ = 0, arrow_radius_m_ = 0;
+  std::vector<Moment> moments_;  // a frame
   std::vector<Push> pushes_;
-  Points way_m_, tree_m_;  // ends of lines
+  std::vector<std::vector<fem::ContactForce>> touches_;  // a stored frame; empty where nothing asks for them
+  Points way_m_, tree_m_;                                // ends of lines
   std::uint64_t look_hash_ = 0;
 };
 

@@ -57,6 +57,7 @@ scenes::Scene of_one_moment(scenes::Scene scene) {
   scenes::FilmSpec& film = scene.film;
   film.color_by = scenes::ColorBy::body;
   film.forces = film.path = film.tree = false;
+  film.pace = scenes::Pace::steady, film.length_s.reset();
   return scene;
 }
 

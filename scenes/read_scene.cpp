@@ -861,6 +861,13 @@ FilmSpec read_film(const Node& table) {
     complain(child(table, "speed"), fmt::format("film.frames_per_second over film.speed are {:g} states a "
                                                 "second of motion, more than 10,000; raise speed",
                                                 film.frames_per_second / film.speed));
+  film.pace = named<Pace>(text(table, "pace"), {{"steady", Pace::steady}, {"contact", Pace::contact}});
+  film.slowest = vector2(table, "pace_range")[0], film.quickest = vector2(table, "pace_range")[1];
+  if (table.find("length_s")) film.length_s = number(table, "length_s");
+  if (film.length_s && film.pace == Pace::steady)
+    complain(child(table, "length_s"),
+             "film.length_s needs film.pace = \"contact\"; a steady film is as long as speed makes it");
+  film.end = named<FilmEnd>(text(table, "end"), {{"path", FilmEnd::path}, {"rest", FilmEnd::rest}});
   film.look = named<FilmLook>(text(table, "look"), {{"studio", FilmLook::studio},
                                                     {"dark", FilmLook::dark},
                                                     {"clinical", FilmLook::clinical},

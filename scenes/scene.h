@@ -105,6 +105,9 @@ constexpr double usual_max_stretch = 2, any_stretch = 1000;
 // What a body's surface is of, and the light it is filmed in: docs/rendering.md.
 enum class BodyLook { plain, rubber, tissue, bone, fabric, skin };
 enum class FilmLook { studio, dark, clinical, paper };
+// How time goes in films, and when they end: docs/rendering.md, "Time".
+enum class Pace { steady, contact };
+enum class FilmEnd { path, rest };
 
 struct BodySpec {
   std::string name;  // letters, digits, _ and -: it names a folder
@@ -224,6 +227,10 @@ struct FilmSpec {
   int width_px = 0, height_px = 0;
   int frames_per_second = 0;
   double speed = 1;  // a second of film shows so many of the motion
+  Pace pace = Pace::steady;
+  double slowest = 1, quickest = 1;  // of the pace contact, times speed
+  std::optional<double> length_s;    // of the pace contact
+  FilmEnd end = FilmEnd::path;
   FilmLook look = FilmLook::studio;
   std::optional<Vec3> background_srgb;  // nothing: the look's
   bool bounds_lines = true;             // draw the edges of the bounds as pale lines

@@ -1,0 +1,146 @@
+// What a film tells of a motion, and when: pace, end.
+#include <gmock/gmock.h>
+
+#include <cmath>
+
+#include "app/plan_folder.h"
+#include "render/png_file.h"
+#include "tests/app/program.h"
+
+namespace limber::app {
+namespace {
+
+using testing::HasSubstr;
+
+// A soft cube falls sideways against the wall x = 2, which nobody sees, and comes to rest on it.
+constexpr const char* falling = R"(name = "falling"
+[world]
+bounds_m = [[0, 0, 0], [2, 2, 2]]
+gravity_m_s2 = [9.81, 0, 0]
+[[bodies]]
+name = "cube"
+role = "robot"
+model = { box = { size_m = [0.6, 0.6, 0.6], triangle_m = 0.1 } }
+cage = { cells = [2, 2, 2] }
+material = { youngs_modulus_pa = 5e4, density_kg_m3 = 100, damping_ratio = 0.6 }
+pose = { position_m = [0.7, 1, 1] }
+[goal]
+center_of_mass_m = [1, 1, 1]
+radius_m = 0.3
+[planner]
+max_force_n = 100
+[film]
+size_px = [96, 64]
+frames_per_second = 20
+bounds_lines = false
+)";
+
+class Story_slow : public Program {
+ protected:
+  void SetUp() override {
+    const Result simulated = limber_program({"simulate", scene(falling), "-o", out(), "--duration", "3"});
+    ASSERT_EQ(simulated.code, exit_done) << simulated.err;
+    planned = read_plan_folder(out());
+  }
+  struct Film {
+    Json json;
+    std::vector<render::Image8> frames;
+  };
+  Film film(const std::vector<std::string>& sets, const std::vector<std::string>& more = {}) const {
+    std::vector<std::string> words{"render", out(), "--as", "try", "--json"};
+    for (const std::string& set : sets) words.insert(words.end(), {"--set", set});
+    words.insert(words.end(), more.begin(), more.end());
+    const Result result = limber_program(words);
+    EXPECT_EQ(result.code, exit_done) << result.err;
+    Film made{result.json(), {}};
+    for (int f = 0; f < made.json.at("frames"); ++f)
+      made.frames.push_back(render::read_png(frame(fmt::format("{:04}.png", f))));
+    return made;
+  }
+  fs::path frame(const std::string& name) const { return fs::path(out()) / "frames-try" / name; }
+  std::string refusal(const std::vector<std::string>& words) const {
+    const Result result = limber_program(words);
+    EXPECT_EQ(result.code, exit_bad_input);
+    return result.err;
+  }
+  PlanFolder planned;
+};
+
+int changed_pixels(const render::Image8& a, const render::Image8& b) {
+  int changed = 0;
+  for (std::size_t i = 0; i + 2 < a.rgb.size(); i += 3)
+    changed += !std::equal(&a.rgb[i], &a.rgb[i] + 3, &b.rgb[i]);
+  return changed;
+}
+
+TEST_F(Story_slow, FilmsAreSlowWhereTheRobotIsTouchedAndQuickWhereItIsNot) {
+  const Film steady = film({}), paced = film({"film.pace=contact", "film.pace_range=[0.2, 2]"});
+  EXPECT_EQ(steady.json.at("time").at("speed"), Json({1, 1}));
+  EXPECT_NEAR(paced.json.at("time").at("speed").at(0), 0.2, 0.01);
+  EXPECT_GT(paced.json.at("time").at("speed").at(1), 1);
+  EXPECT_EQ(paced.json.at("time").at("motion_s"), steady.json.at("time").at("motion_s"));
+  // It falls for a sixth of the time, and lies on the wall for the rest.
+  EXPECT_GT(paced.frames.size(), 2 * steady.frames.size());
+  EXPECT_EQ(paced.frames.front(), steady.frames.front());
+  EXPECT_EQ(paced.frames.back(), steady.frames.back());
+  EXPECT_EQ(changed_pixels(paced.frames.back(), paced.frames[paced.frames.size() - 2]), 0);
+
+  const Film asked = film({"film.pace=contact", "film.pace_range=[0.2, 2]", "film.length_s=8"});
+  EXPECT_EQ(asked.frames.size(), 161u);
+  EXPECT_EQ(asked.frames.back(), steady.frames.back());
+  EXPECT_THAT(
+      refusal({"render", out(), "--set", "film.pace=contact", "--set", "film.length_s=1"}),
+      HasSubstr("film.length_s = 1: with film.pace_range = [0.25, 1.5] this motion can take 2 to 12 s"));
+  EXPECT_THAT(refusal({"render", out(), "--set", "film.length_s=1"}), HasSubstr("film.pace = \"contact\""));
+}
+
+TEST_F(Story_slow, AFilmMayEndHalfASecondAfterTheLastMotion) {
+  const Film whole = film({}), ended = film({"film.end=rest"});
+  ASSERT_LT(ended.frames.size(), whole.frames.size());
+  for (std::size_t f = 0; f < ended.frames.size(); ++f) EXPECT_EQ(ended.frames[f], whole.frames[f]) << f;
+  EXPECT_GT(ended.json.at("time").at("left_out_s"), 0.5);
+  // A frame before half a second before the end something moves, and afterwards nothing does.
+  const std::vector<State>& states = planned.plan.trajectory.frames;
+  const auto farthest = [&](std::size_t frame) {
+    double most = 0;
+    for (std::size_t i = 0; i < states.back().positions.size(); ++i)
+      most = std::max(most, std::abs(double(states[frame].positions[i] - states.back().positions[i])));
+    return most;
+  };
+  const std::size_t at_rest = ended.frames.size() - 1 - 10;
+  EXPECT_GT(farthest(at_rest - 1), 0.003 * 0.6 / std::sqrt(3));
+  for (std::size_t f = at_rest; f < states.size(); ++f) EXPECT_LE(farthest(f), 0.003 * 0.6);
+  for (const Film& film : {whole, ended})
+    EXPECT_NEAR(film.json.at("time").at("motion_s").get<double>() +
+                    film.json.at("time").at("left_out_s").get<double>(),
+                3, 1e-9);
+}
+
+// passes.json tells where in each picture the robot is touched: on the cube's right, where the wall is.
+TEST_F(Story_slow, PassesTellWhereTheRobotIsTouched) {
+  film({"film.pace=contact"}, {"--passes", "object,depth"});
+  const Json key = read_json(frame("passes.json"));
+  const int frames = int(key.at("contacts").size());
+  ASSERT_GT(frames, 60);
+  EXPECT_EQ(key.at("contacts").at(0), Json::array());
+  EXPECT_FALSE(key.at("contacts").at(std::size_t(frames) - 1).empty());
+  const double near = key.at("depth_m").at(0), far = key.at("depth_m").at(1);
+  for (int f = 0; f < frames; ++f) {
+    if (key.at("contacts").at(std::size_t(f)).empty()) continue;
+    const render::Raster16 object = render::read_png_16(frame(fmt::format("{:04}.object.png", f)));
+    int right = 0;
+    for (int y = 0; y < object.height; ++y)
+      for (int x = 0; x < object.width; ++x)
+        if (object.levels[std::size_t(y) * std::size_t(object.width) + std::size_t(x)])
+          right = std::max(right, x + 1);
+    for (const Json& contact : key.at("contacts").at(std::size_t(f))) {
+      EXPECT_NEAR(contact.at(0), right, 6) << f;
+      EXPECT_GT(contact.at(2), near);
+      EXPECT_LT(contact.at(2), far);
+      EXPECT_GT(contact.at(3), 0);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace limber::app
