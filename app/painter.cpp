@@ -16,6 +16,8 @@ namespace limber::app {
 
 namespace {
 
+const Vec3 pane_color(0.62, 0.74, 0.86);
+constexpr double pane_opacity = 0.28, rim_opacity = 0.75;
 const Vec3 push_color(0.93, 0.52, 0.10), contact_color(0.16, 0.42, 0.62);
 const render::LineLook cage_lines{.color_srgb = {0.12, 0.14, 0.18}, .width_px = 1.2, .opacity = 0.55};
 const render::LineLook way_lines{.color_srgb = {0.85, 0.35, 0.05}, .width_px = 3, .opacity = 0.9};
@@ -113,6 +115,7 @@ struct Shot::Painter::View {
     if (film.bounds_lines) renderer.add_lines(render::edges_of(shot.scene_.bounds_m), {});
     if (shot.way_m_.rows() > 0) renderer.add_lines(shot.way_m_, way_lines);
     if (shot.tree_m_.rows() > 0) renderer.add_lines(shot.tree_m_, tree_lines);
+    for (const PaneOf& pane : shot.panes_) add_pane(pane);
     if (film.forces)
       for (std::size_t i = 0; i <= shot.bodies_.size() + shot.world_.forces.size(); ++i) {
         const bool is_push = i == 0 || i > shot.bodies_.size();
@@ -121,6 +124,38 @@ struct Shot::Painter::View {
             render::arrow_triangles(), render::arrow(nowhere, nowhere + Vec3::UnitX(), shot.arrow_radius_m_),
             {.name = "arrow", .color_srgb = is_push ? push_color : contact_color, .roughness = 0.6}));
       }
+  }
+
+  // Behind the body where it is now.
+  Pane pane_of(const PaneOf& of) const {
+    const double size = size_of(shot.bodies_[std::size_t(of.body)].surface);
+    // A little farther than the wall, beyond which surfaces may be by a hair.
+    Box bounds = shot.scene_.bounds_m;
+    bounds.lower.array() -= 0.004 * size, bounds.upper.array() += 0.004 * size;
+    return pane_behind(boxes[std::size_t(of.body)], bounds, of.wall, 0.08 * size, 0.012 * size);
+  }
+
+  void add_pane(const PaneOf& of) {
+    const auto add = [&](const Triangles& triangles, const Points& positions, double opacity) {
+      return renderer.add_mesh(triangles, positions,
+                               {.name = "pane",
+                                .color_srgb = pane_color,
+                                .roughness = 0.3,
+                                .opacity = opacity,
+                                .casts_shadow = false});
+    };
+    const Pane pane = pane_of(of);
+    panes.push_back(
+        {add(pane_triangles(), pane.glass, pane_opacity), add(rim_triangles(), pane.rim, rim_opacity)});
+  }
+
+  void show_pane(std::size_t p, double share) {
+    renderer.set_opacity(panes[p].glass, pane_opacity * share);
+    renderer.set_opacity(panes[p].rim, rim_opacity * share);
+    if (share == 0) return;
+    const Pane pane = pane_of(shot.panes_[p]);
+    renderer.set_positions(panes[p].glass, pane.glass);
+    renderer.set_positions(panes[p].rim, pane.rim);
   }
 
   bool has_caster(std::size_t b) const {
@@ -137,6 +172,7 @@ struct Shot::Painter::View {
                            : renderer.add_mesh(prepared.surface.triangles, prepared.surface.positions, look));
     rest_normals.push_back(vertex_normals(prepared.surface.positions, prepared.surface.triangles));
     hulls.push_back(prepared.cage.positions);
+    boxes.push_back(bounding_box(prepared.surface.positions));
     crevices.push_back(open_in_crevices(b));
     if (!cages && !shot.scene_.film.cages) return;
     cage_edges.push_back(edges_of(hull));
@@ -236,12 +272,14 @@ struct Shot::Painter::View {
     const Points& hull = hulls[b];
     if (!cage_lines_of.empty()) renderer.set_lines(cage_lines_of[b], ends_of(cage_edges[b], hull));
     if (cages) {
+      boxes[b] = bounding_box(hull);
       renderer.set_positions(meshes[b], hull);
       return;
     }
     surface.resize(prepared.surface.positions.rows(), 3);
     normals.resize(surface.rows(), 3);
     deform(prepared, hull, surface);
+    boxes[b] = bounding_box(surface);
     ffd::deform_normals(prepared.binding, prepared.cage, hull, rest_normals[b], normals);
     renderer.set_positions(meshes[b], surface, normals);
     if (casters[b].mesh >= 0) renderer.set_positions(casters[b].mesh, casters[b].stand_in.positions(surface));
@@ -265,6 +303,7 @@ struct Shot::Painter::View {
       move_body(b);
     }
     occlude();
+    for (std::size_t p = 0; p < panes.size(); ++p) show_pane(p, shot.shown(shot.panes_[p].shown, frame));
     if (arrows.empty()) return;
     const Points ends = shot.arrows_at(frame);
     for (std::size_t i = 0; i < arrows.size(); ++i) {
@@ -282,6 +321,11 @@ struct Shot::Painter::View {
   bool cages;
   render::Renderer renderer;
   std::vector<int> meshes, cage_lines_of, arrows;
+  struct PaneMeshes {
+    int glass, rim;
+  };
+  std::vector<PaneMeshes> panes;
+  std::vector<Box> boxes;                   // a body, as it is now
   std::vector<Caster> casters;              // a body
   std::vector<Points> hulls, rest_normals;  // a body; the cage's nodes as they are now
   std::vector<Eigen::ArrayXd> crevices;     // a body; empty: none

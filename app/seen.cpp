@@ -4,6 +4,7 @@
 #include <map>
 
 #include "app/motion_files.h"
+#include "app/pane.h"
 #include "core/progress.h"
 #include "core/threads.h"
 #include "fem/observe.h"
@@ -15,7 +16,7 @@ namespace {
 // Whom a body presses: another body, or a wall of the bounds.
 struct Side {
   int body, other;  // other −1: a wall
-  int axis = -1, upper = 0;
+  Wall wall = {};
   auto operator<=>(const Side&) const = default;
 };
 struct Press {
@@ -33,10 +34,7 @@ Pressing pressing_in(const fem::World& world, const State& state) {
     if (contact.other >= 0) {
       side = {std::min(contact.body, contact.other), std::max(contact.body, contact.other)};
     } else {
-      const Vec3 below = world.bounds_m.lower - contact.place_m,
-                 above = contact.place_m - world.bounds_m.upper;
-      side.upper = above.maxCoeff() > below.maxCoeff();
-      (side.upper ? above : below).maxCoeff(&side.axis);
+      side.wall = wall_at(world.bounds_m, contact.place_m);
     }
     const double force = contact.force_n.norm();
     Press& press = pressing[side];
@@ -65,8 +63,9 @@ double beyond_walls(const Box& bounds, const Box& before, const Box& now) {
 }
 
 double gap_to_wall(const Box& bounds, const Side& side, const Box& surface) {
-  const double gap = side.upper ? bounds.upper[side.axis] - surface.upper[side.axis]
-                                : surface.lower[side.axis] - bounds.lower[side.axis];
+  const int axis = side.wall.axis;
+  const double gap =
+      side.wall.upper ? bounds.upper[axis] - surface.upper[axis] : surface.lower[axis] - bounds.lower[axis];
   return std::max(0.0, gap);
 }
 

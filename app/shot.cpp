@@ -9,6 +9,7 @@
 
 #include "app/look.h"
 #include "app/node_values.h"
+#include "app/seen.h"
 #include "core/error.h"
 #include "core/hash.h"
 #include "core/threads.h"
@@ -28,6 +29,7 @@ constexpr int most_edges_of_tree = 4000;
 constexpr double at_rest = 0.003;      // of the robot's size: what moves no farther is not seen to move
 constexpr double after_rest_s = 0.5;   // of the film
 constexpr double ease_s = 0.5;         // of the film at its usual speed: so long before contact it slows down
+constexpr double pane_fade_s = 0.25;   // of the film at its usual speed
 constexpr double full_contact = 0.05;  // of the strongest: from there on the robot is in contact
 
 // From over the photographer's left shoulder, so that what faces the camera is lit, and shadows fall to the
@@ -142,7 +144,8 @@ Shot::Shot(const scenes::Scene& scene, const std::string& camera, const plan::Pl
   look_.ground_height_m = ground_m;
   look_.transparent_background = scene.film.transparent;
   find_controls();
-  if (scene.film.pace == scenes::Pace::contact || !output.passes.empty()) find_touches();
+  const bool panes = scene.film.panes && world.walls;
+  if (scene.film.pace == scenes::Pace::contact || panes || !output.passes.empty()) find_touches();
   lay_out_time();
   look_.stage = box_of_motion();
   for (const SurfaceMesh& mesh : scenery) look_.stage.include(bounding_box(mesh.positions));
@@ -151,6 +154,7 @@ Shot::Shot(const scenes::Scene& scene, const std::string& camera, const plan::Pl
   if (!output.passes.empty()) measure_depths();
   if (scene.film.color_by != scenes::ColorBy::body) measure_colors();
   if (scene.film.forces) measure_forces();
+  if (panes) find_panes();
   if (scene.film.path) {
     const std::vector<State>& frames_shown = plan.trajectory.frames;
     way_m_.resize(2 * std::max<Eigen::Index>(0, Eigen::Index(frames_shown.size()) - 1), 3);
@@ -229,6 +233,36 @@ std::vector<double> Shot::contact_shares() const {
   const double strongest = *std::max_element(forces.begin(), forces.end());
   for (double& force : forces) force = strongest > 0 ? std::min(1.0, force / (full_contact * strongest)) : 0;
   return forces;
+}
+
+double Shot::shown(const std::vector<double>& of_stored, int frame) const {
+  const double moment = moment_of(frame);
+  const std::size_t before = std::size_t(moment), after = std::min(before + 1, of_stored.size() - 1);
+  return of_stored[before] + (moment - double(before)) * (of_stored[after] - of_stored[before]);
+}
+
+// Of what is not held anywhere: what is held at a wall touches it always. The floor is drawn.
+void Shot::find_panes() {
+  std::map<std::pair<int, Wall>, std::vector<double>> forces;
+  double strongest = 0;
+  for (std::size_t f = 0; f < touches_.size(); ++f)
+    for (const fem::ContactForce& touch : touches_[f]) {
+      if (touch.other >= 0) continue;
+      const std::vector<bool>& fixed = world_.bodies[std::size_t(touch.body)].fixed;
+      if (std::find(fixed.begin(), fixed.end(), true) != fixed.end()) continue;
+      const Wall wall = wall_at(world_.bounds_m, touch.place_m);
+      if (wall == Wall{2, false} && look_.ground_height_m == world_.bounds_m.lower.z()) continue;
+      std::vector<double>& force = forces[{touch.body, wall}];
+      force.resize(touches_.size());
+      force[f] += touch.force_n.norm();
+      strongest = std::max(strongest, force[f]);
+    }
+  for (const auto& [side, force] : forces) {
+    std::vector<bool> touching;
+    for (const double newtons : force) touching.push_back(newtons > pressing_share * strongest);
+    panes_.push_back(
+        {side.first, side.second, faded(touching, int(pane_fade_s * scene_.film.frames_per_second))});
+  }
 }
 
 void Shot::lay_out_time() {
@@ -614,6 +648,9 @@ std::string Shot::hash_of(int frame) const {
       .matrix(camera.eye)
       .matrix(camera.target)
       .matrix(camera.up);
+  for (const PaneOf& pane : panes_)
+    if (const double share = shown(pane.shown, frame); share > 0)
+      hasher.value(pane.body).value(pane.wall.axis).value(int(pane.wall.upper)).value(share);
   if (scene_.film.pace != scenes::Pace::steady)
     hasher.value(moment_of(frame)).value(moments_[std::size_t(frame)].pace);
   return hex(hasher.value(camera.fov_deg).digest());

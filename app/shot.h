@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "app/film_time.h"
+#include "app/pane.h"
 #include "app/plan_folder.h"
 #include "app/scene_world.h"
 #include "fem/observe.h"
@@ -86,10 +87,18 @@ class Shot {
   // At a stored frame.
   Control control_at(int stored) const;
   void find_touches();
+  void find_panes();
+  double shown(const std::vector<double>& of_stored, int frame) const;
   bool touches_robot(const fem::ContactForce& touch) const {
     return (touch.body == world_.robot) != (touch.other == world_.robot);
   }
   std::vector<double> contact_shares() const;  // a stored frame
+  // Of a body and a wall that touch at some time.
+  struct PaneOf {
+    int body;
+    Wall wall;
+    std::vector<double> shown;  // 0 … 1 a stored frame
+  };
   render::Camera camera_of(int frame) const;
   Box box_of_motion() const;
   // What the camera is to hold: of the subject, or of all bodies (−1) and the bounds where they are drawn.
@@ -131,6 +140,7 @@ class Shot {
   double strongest_push_n_ = 0, arrow_m_per_n_ = 0, arrow_radius_m_ = 0;
   std::vector<Moment> moments_;  // a frame
   std::vector<Push> pushes_;
+  std::vector<PaneOf> panes_;
   std::vector<std::vector<fem::ContactForce>> touches_;  // a stored frame; empty where nothing asks for them
   Points way_m_, tree_m_;                                // ends of lines
   std::uint64_t look_hash_ = 0;

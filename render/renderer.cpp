@@ -44,6 +44,7 @@ struct Mesh {
   Eigen::VectorXd occlusion = {};  // empty: none
 
   bool transparent() const { return look.opacity < 1; }
+  bool drawn() const { return look.seen && look.opacity > 0; }
   bool grained() const { return look.grain > 0 && !transparent(); }
   bool translucent() const { return look.translucency > 0 && !transparent(); }
   bool casts() const { return look.casts_shadow && (!look.seen || look.opacity >= 0.5); }
@@ -239,7 +240,7 @@ Renderer::Impl::Impl(const Look& l)
 Box Renderer::Impl::shown() const {
   Box box;
   for (const Mesh& mesh : meshes)
-    if (mesh.look.seen) box.include(mesh.card.box());
+    if (mesh.drawn()) box.include(mesh.card.box());
   for (const Lines& l : lines)
     if (l.ends.rows() > 0) box.include(bounding_box(l.ends));
   if (box.empty()) box.include(Vec3::Zero().eval());
@@ -255,7 +256,7 @@ Box Renderer::Impl::stage() const {
 
 bool Renderer::Impl::has_veils() const {
   return std::any_of(meshes.begin(), meshes.end(),
-                     [](const Mesh& m) { return m.look.seen && m.transparent(); });
+                     [](const Mesh& m) { return m.drawn() && m.transparent(); });
 }
 
 void Renderer::Impl::look_through(const Camera& c) {
@@ -491,7 +492,7 @@ Renderer::Impl::Rectangle Renderer::Impl::place_of_veils() const {
   const SampleGrid grid = sample_grid(look);
   Eigen::Array2d lower(1, 1), upper(-1, -1);  // of the screen, −1 … 1
   for (const Mesh& mesh : meshes)
-    if (mesh.look.seen && mesh.transparent())
+    if (mesh.drawn() && mesh.transparent())
       for_corners(mesh.card.box(), [&](const Vec3& corner) {
         const Eigen::Vector4d clip = clip_from_world * corner.homogeneous();
         if (clip.w() > 0) {
@@ -524,7 +525,7 @@ void Renderer::Impl::draw_veils() {
     glDepthMask(GL_FALSE);
     glColorMask(GL_FALSE, GL_FALSE, GL_FALSE, GL_FALSE);
     for (const Mesh& mesh : meshes) {
-      if (!mesh.look.seen || !mesh.transparent()) continue;
+      if (!mesh.drawn() || !mesh.transparent()) continue;
       stand_back_for_edges(mesh, look.multisampling ? 1 : look.supersampling);
       lists.set_uniforms(use_mesh(mesh, samples + veiled));
       mesh.card.draw();
@@ -589,7 +590,7 @@ void Renderer::Impl::draw_lines(LinePass pass) {
   };
   for (const Lines& l : lines) draw(l.ends, l.look, {});
   for (Mesh& mesh : meshes)
-    if (mesh.look.seen && mesh.look.edges) draw(mesh.card.edge_ends(), *mesh.look.edges, planes_of(mesh));
+    if (mesh.drawn() && mesh.look.edges) draw(mesh.card.edge_ends(), *mesh.look.edges, planes_of(mesh));
   glDisable(GL_BLEND);
   glDepthMask(GL_TRUE);
 }
@@ -738,6 +739,12 @@ void Renderer::set_occlusion(int number, const Eigen::VectorXd& occlusion) {
 
 void Renderer::set_scalars(int number, const Eigen::VectorXd& values) {
   impl_->mesh_with(number, values.size(), false).card.set_scalars(values);
+}
+
+void Renderer::set_opacity(int number, double opacity) {
+  MeshLook& look = impl_->mesh_with(number, 0, true).look;
+  LIMBER_CHECK(look.opacity < 1 && 0 <= opacity && opacity < 1, look.name, look.opacity, opacity);
+  look.opacity = opacity;
 }
 
 void Renderer::set_clip_planes(const std::vector<Plane>& planes) {

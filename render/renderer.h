@@ -115,6 +115,8 @@ class Renderer {
   // of sky and ground, not the key light. Empty: none.
   void set_occlusion(int mesh, const Eigen::VectorXd&);
   void set_scalars(int mesh, const Eigen::VectorXd&);  // one a vertex, for Passes
+  // Of a veil: the look's opacity from now on, 0 ≤ … < 1. At 0 the picture is as without the mesh.
+  void set_opacity(int mesh, double);
 
   // What lies where n·p + d < 0 for one of the planes is cut off all meshes and edges, not off other lines,
   // and casts no shadow. Insides seen through the cut are drawn flat and darker; meshes must be wound

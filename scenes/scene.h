@@ -240,6 +240,7 @@ struct FilmSpec {
   ColorBy color_by = ColorBy::body;
   std::optional<Eigen::Vector2d> color_range;  // nothing: over the whole motion
   bool cages = false, forces = false, path = false, tree = false, side_by_side = false;
+  bool panes = false;  // where bodies touch walls that are not drawn
   int sheet_columns = 0, sheet_rows = 0;
 };
 

@@ -862,6 +862,15 @@ constexpr Key all_keys[] = {
      "the fine surfaces on the left, the cages that are simulated on the right",
      "",
      ""},
+    {"film.panes",
+     Type::boolean,
+     {},
+     0,
+     "false",
+     "where a body that nothing holds presses a wall of the bounds, other than the floor, a faint pane "
+     "stands behind it",
+     "",
+     ""},
     {"film.sheet", Type::integers, from_to(1, 20), 2, "[4, 3]", "columns and rows of the contact sheet", "",
      ""},
 };

@@ -345,6 +345,7 @@ const std::map<std::string, std::string> elsewhere{
     {"bodies[].triangles", "of scenery: below"},
     {"motions[].body", "likewise says which bodies move: below"},
     {"cameras[].name", "names a film"},
+    {"film.panes", "where a wall is pressed: Story_slow"},
     {"film.end", "says how many frames there are, not what is on them"},
     {"goal.box_m", "instead of radius_m: below"},
     {"goal.shape.cage", "a file: below"},

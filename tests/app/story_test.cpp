@@ -1,9 +1,11 @@
-// What a film tells of a motion, and when: pace, end.
+// What a film tells of a motion, and when: pace, end, panes.
 #include <gmock/gmock.h>
 
 #include <cmath>
 
 #include "app/plan_folder.h"
+#include "app/scene_world.h"
+#include "fem/observe.h"
 #include "render/png_file.h"
 #include "tests/app/program.h"
 
@@ -41,6 +43,7 @@ class Story_slow : public Program {
     const Result simulated = limber_program({"simulate", scene(falling), "-o", out(), "--duration", "3"});
     ASSERT_EQ(simulated.code, exit_done) << simulated.err;
     planned = read_plan_folder(out());
+    bodies = read_bodies_of(planned, out());
   }
   struct Film {
     Json json;
@@ -63,7 +66,16 @@ class Story_slow : public Program {
     EXPECT_EQ(result.code, exit_bad_input);
     return result.err;
   }
+  // A stored frame: the wall presses the cube.
+  std::vector<bool> touching() const {
+    const fem::World world = world_of(planned, bodies);
+    std::vector<bool> touching;
+    for (const State& state : planned.plan.trajectory.frames)
+      touching.push_back(!fem::contact_forces(world, state).empty());
+    return touching;
+  }
   PlanFolder planned;
+  std::vector<PreparedBody> bodies;
 };
 
 int changed_pixels(const render::Image8& a, const render::Image8& b) {
@@ -114,6 +126,33 @@ TEST_F(Story_slow, AFilmMayEndHalfASecondAfterTheLastMotion) {
     EXPECT_NEAR(film.json.at("time").at("motion_s").get<double>() +
                     film.json.at("time").at("left_out_s").get<double>(),
                 3, 1e-9);
+}
+
+// Where the cube presses the wall, and five frames before and after, something is drawn beside the cube: at
+// the wall, which the camera sees from its edge, to the right.
+TEST_F(Story_slow, APaneStandsWhereAWallIsTouchedAndNowhereElse) {
+  const Film without = film({}), with = film({"film.panes=true"}, {"--passes", "object"});
+  const std::vector<bool> touched = touching();
+  ASSERT_EQ(with.frames.size(), touched.size());
+  EXPECT_FALSE(touched.front());
+  int shown = 0;
+  for (int f = 0; f < int(touched.size()); ++f) {
+    bool near = false;
+    for (int k = std::max(0, f - 5); k <= std::min(int(touched.size()) - 1, f + 5); ++k)
+      near = near || touched[std::size_t(k)];
+    const int changed = changed_pixels(with.frames[std::size_t(f)], without.frames[std::size_t(f)]);
+    EXPECT_EQ(changed > 0, near) << f;
+    shown += changed > 0;
+  }
+  EXPECT_GT(shown, 20);
+  // A veil of no pass.
+  const render::Raster16 object = render::read_png_16(frame(fmt::format("{:04}.object.png", 40)));
+  for (const std::uint16_t level : object.levels) ASSERT_TRUE(level == 0 || level == 257);
+  // The floor is drawn already.
+  const std::string down =
+      std::string(falling).replace(std::string(falling).find("[9.81, 0, 0]"), 12, "[0, 0, -9.81]");
+  ASSERT_EQ(limber_program({"simulate", scene(down), "-o", out(), "--duration", "1"}).code, exit_done);
+  EXPECT_EQ(film({}).frames, film({"film.panes=true"}).frames);
 }
 
 // passes.json tells where in each picture the robot is touched: on the cube's right, where the wall is.

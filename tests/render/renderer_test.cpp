@@ -9,6 +9,7 @@
 #include <iostream>
 #include <numbers>
 #include <numeric>
+#include <optional>
 #include <thread>
 #include <tuple>
 
@@ -482,6 +483,25 @@ TEST(Renderer, EveryLayerOfVeilsCounts) {
 
 // Three veils, a line before, between or behind them, drawn across something opaque: as if each were drawn
 // alone and the pictures laid over one another. Where no line is, nothing changes.
+TEST(Renderer, AVeilWhoseOpacityIsSetIsAsIfMadeSoAndOfNoneIsNotThere) {
+  const Camera camera = camera_from({0, -5, 0});
+  const SurfaceMesh ball = sphere_mesh(Vec3::Zero(), 0.6, 24),
+                    pane = quad_mesh({-1, -2, -1}, {1, -2, -1}, {1, -2, 1}, {-1, -2, 1});
+  const auto picture = [&](std::optional<double> made, std::optional<double> set) {
+    Renderer renderer(small_look());
+    renderer.add_mesh(ball.triangles, ball.positions, {});
+    if (made) {
+      const int mesh = renderer.add_mesh(pane.triangles, pane.positions,
+                                         {.opacity = *made, .casts_shadow = false, .edges = LineLook{}});
+      if (set) renderer.set_opacity(mesh, *set);
+    }
+    return renderer.draw_shown(camera);
+  };
+  EXPECT_EQ(picture(0.7, 0.3), picture(0.3, {}));
+  EXPECT_NE(picture(0.7, 0.3), picture(0.7, {}));
+  EXPECT_EQ(picture(0.7, 0), picture({}, {}));
+}
+
 TEST(Renderer, ALineBetweenVeilsIsVeiledByThoseBeforeItAlone) {
   const Camera camera = camera_from({0, -5, 0});
   const LineLook line_look{{0.9, 0.1, 0.1}, 8, 0.7};

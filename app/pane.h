@@ -1,0 +1,31 @@
+// Panes: where a body touches a wall of the bounds that nobody sees. Method: docs/rendering.md, "Panes".
+#pragma once
+
+#include <vector>
+
+#include "core/mesh.h"
+
+namespace limber::app {
+
+// A side of a box.
+struct Wall {
+  int axis = 0;
+  bool upper = false;
+  auto operator<=>(const Wall&) const = default;
+};
+// The side that a place is farthest beyond, or nearest to.
+Wall wall_at(const Box& bounds, const Vec3& place);
+
+// 0 … 1 a frame: 1 where something touches, over `frames` rising before and falling after.
+std::vector<double> faded(const std::vector<bool>& touching, int frames);
+
+// A rectangle with round corners in the plane of a wall, behind a body's box and larger by a margin; its rim
+// is a band within it. Always the same numbers of vertices.
+struct Pane {
+  Points glass, rim;
+};
+Pane pane_behind(const Box& body, const Box& bounds, const Wall&, double margin_m, double rim_m);
+Triangles pane_triangles();
+Triangles rim_triangles();
+
+}  // namespace limber::app
