@@ -11,6 +11,7 @@
 #include "render/caster.h"
 #include "render/color_map.h"
 #include "render/occlusion.h"
+#include "render/outline.h"
 
 namespace limber::app {
 
@@ -24,6 +25,9 @@ const render::LineLook way_lines{.color_srgb = {0.85, 0.35, 0.05}, .width_px = 3
 const render::LineLook tree_lines{.color_srgb = {0.25, 0.28, 0.36}, .width_px = 1, .opacity = 0.45};
 // Above the first, a coarse stand-in of the second casts the shadow of a surface.
 constexpr int most_triangles_that_cast = 60'000, triangles_of_caster = 20'000;
+
+constexpr double outline_step = 0.004, outline_width = 1.6 / 1080;  // of the stage's diagonal, of the height
+const Vec3 outline_color(0.10, 0.11, 0.14);
 
 constexpr int fine_cells = 300;  // of the maps that find crevices, along a body
 
@@ -363,9 +367,16 @@ render::Image8 Shot::Painter::annotated(render::Image8 image, int frame) const {
 
 render::Image8 Shot::Painter::without_words(int frame, render::Passes* wanted) {
   const render::Camera camera = shot_.camera_of(frame);
+  const bool outlines = shot_.scene_.film.outlines;
   const auto drawn = [&](View& view) {
+    render::Passes own;
     view.show(frame);
-    return view.renderer.draw_shown(camera, &view == views_[0].get() ? wanted : nullptr);
+    render::Passes* passes = wanted && &view == views_[0].get() ? wanted : outlines ? &own : nullptr;
+    render::Image8 image = view.renderer.draw_shown(camera, passes);
+    if (outlines)
+      render::draw_outlines(image, *passes, outline_step * shot_.look_.stage.diagonal(),
+                            std::max(1.0, outline_width * image.height), outline_color);
+    return image;
   };
   render::Image8 image = drawn(*views_[0]);
   if (views_.size() > 1) image = beside(image, drawn(*views_[1]));

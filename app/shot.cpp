@@ -175,13 +175,16 @@ void Shot::check() const {
   if (!output_.passes.empty() && film.side_by_side)
     throw InputError("--passes are of one picture; add --set film.side_by_side=false");
   require_letters(film);
-  const bool words = !film.caption.empty() || film.clock || film.scale_bar;
-  if ((film.transparent || output_.bits == 16) && (words || film.side_by_side))
+  std::vector<std::string> in_the_way;  // as sets that take them away
+  if (!film.caption.empty()) in_the_way.emplace_back("--set film.caption=");
+  for (const auto& [is_on, key] :
+       {std::pair(film.clock, "clock"), std::pair(film.scale_bar, "scale_bar"),
+        std::pair(film.side_by_side, "side_by_side"), std::pair(film.outlines, "outlines")})
+    if (is_on) in_the_way.push_back(fmt::format("--set film.{}=false", key));
+  if ((film.transparent || output_.bits == 16) && !in_the_way.empty())
     throw InputError(
-        fmt::format("{}: caption, clock, scale_bar and side_by_side need 8-bit pictures with a background; "
-                    "add --set film.caption= --set film.clock=false --set film.scale_bar=false --set "
-                    "film.side_by_side=false",
-                    film.transparent ? "film.transparent" : "--bits 16"));
+        fmt::format("{}: words, outlines and side_by_side need 8-bit pictures with a background; add {}",
+                    film.transparent ? "film.transparent" : "--bits 16", fmt::join(in_the_way, " ")));
 }
 
 int Shot::frames() const { return int(moments_.size()); }
@@ -601,6 +604,7 @@ std::uint64_t Shot::hash_of_look() const {
   for (const bool flag : {film.bounds_lines, film.transparent, film.clock, film.cages, film.forces, film.path,
                           film.tree, film.side_by_side, film.scale_bar})
     hasher.value(int(flag));
+  if (film.outlines) hasher.text("outlines");
   hasher.text(film.caption).value(int(film.color_by)).value(low_).value(high_).value(film.speed);
   hasher.value(film.frames_per_second).value(frames()).value(output_.bits);
   if (!output_.occlusion) hasher.value(0);

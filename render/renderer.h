@@ -45,7 +45,7 @@ struct LineLook {
 };
 
 struct MeshLook {
-  std::string name;  // for messages
+  std::string name = {};  // for messages
   Vec3 color_srgb = {0.75, 0.75, 0.75};
   double roughness = 0.45;  // 0.05 … 1
   double metallic = 0;      // 0 … 1

@@ -894,6 +894,7 @@ FilmSpec read_film(const Node& table) {
   film.tree = flag(table, "tree");
   film.side_by_side = flag(table, "side_by_side");
   film.panes = flag(table, "panes");
+  film.outlines = flag(table, "outlines");
   film.sheet_columns = sheet[0], film.sheet_rows = sheet[1];
   return film;
 }

@@ -240,7 +240,8 @@ struct FilmSpec {
   ColorBy color_by = ColorBy::body;
   std::optional<Eigen::Vector2d> color_range;  // nothing: over the whole motion
   bool cages = false, forces = false, path = false, tree = false, side_by_side = false;
-  bool panes = false;  // where bodies touch walls that are not drawn
+  bool panes = false;     // where bodies touch walls that are not drawn
+  bool outlines = false;  // silhouettes and creases as dark lines
   int sheet_columns = 0, sheet_rows = 0;
 };
 

@@ -321,6 +321,7 @@ const std::vector<Row> rows{
     {"film.pace_range", "film.pace_range=[0.5, 1]", film, "film.pace=contact"},
     {"film.length_s", "film.length_s=0.5", film, "film.pace=contact"},
     {"film.look", "film.look=dark", film},
+    {"film.outlines", "film.outlines=true", film},
     {"film.background", "film.background=\"#123456\"", film},
     {"film.bounds_lines", "film.bounds_lines=false", film},
     {"film.transparent", "film.transparent=true", film},

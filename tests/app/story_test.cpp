@@ -1,4 +1,4 @@
-// What a film tells of a motion, and when: pace, end, panes.
+// What a film tells of a motion, and when: pace, end, panes, outlines.
 #include <gmock/gmock.h>
 
 #include <cmath>
@@ -153,6 +153,23 @@ TEST_F(Story_slow, APaneStandsWhereAWallIsTouchedAndNowhereElse) {
       std::string(falling).replace(std::string(falling).find("[9.81, 0, 0]"), 12, "[0, 0, -9.81]");
   ASSERT_EQ(limber_program({"simulate", scene(down), "-o", out(), "--duration", "1"}).code, exit_done);
   EXPECT_EQ(film({}).frames, film({"film.panes=true"}).frames);
+}
+
+// Dark lines, on the cube alone.
+TEST_F(Story_slow, OutlinesAreDrawnOnBodies) {
+  const Film plain = film({}, {"--passes", "object"}), lined = film({"film.outlines=true"});
+  const render::Raster16 object = render::read_png_16(frame("0000.object.png"));
+  int darker = 0, brighter = 0;
+  for (std::size_t i = 0; i < object.levels.size(); ++i) {
+    int change = 0;
+    for (std::size_t c = 0; c < 3; ++c)
+      change += lined.frames[0].rgb[3 * i + c] - plain.frames[0].rgb[3 * i + c];
+    darker += change<0, brighter += change> 0;
+  }
+  EXPECT_GT(darker, 30);
+  EXPECT_EQ(brighter, 0);
+  EXPECT_THAT(refusal({"render", out(), "--bits", "16", "--set", "film.outlines=true"}),
+              HasSubstr("--set film.outlines=false"));
 }
 
 // passes.json tells where in each picture the robot is touched: on the cube's right, where the wall is.
