@@ -8,6 +8,7 @@
 #include "fem/observe.h"
 #include "render/annotate.h"
 #include "render/arrow.h"
+#include "render/card.h"
 #include "render/caster.h"
 #include "render/color_map.h"
 #include "render/occlusion.h"
@@ -383,6 +384,19 @@ render::Image8 Shot::Painter::without_words(int frame, render::Passes* wanted) {
   return image;
 }
 
+render::Image8 Shot::Painter::with_card(int frame, render::Passes* wanted) {
+  const scenes::CardSpec* spec = shot_.card_of(frame);
+  if (spec != card_of_ || wanted) {
+    const render::Image8 image = without_words(frame, wanted);
+    still_ = annotated(image, frame);
+    card_ = spec->plain ? render::plain_card(image.width, image.height, spec->lines,
+                                             shot_.look_.background_bottom_srgb)
+                        : render::card(image, spec->lines);
+    card_of_ = spec;
+  }
+  return render::mixed(still_, card_, shot_.card_share(frame));
+}
+
 Picture Shot::Painter::paint(int frame) {
   const render::Camera camera = shot_.camera_of(frame);
   const Output& output = shot_.output_;
@@ -398,6 +412,8 @@ Picture Shot::Painter::paint(int frame) {
     picture.frame = transparent ? render::tone_mapped_alpha_16(linear()) : render::tone_mapped_16(linear());
   else if (transparent)
     picture.frame = render::tone_mapped_alpha(linear());
+  else if (shot_.card_of(frame))
+    picture.frame = with_card(frame, wanted);
   else
     picture.frame = annotated(without_words(frame, wanted), frame);
   for (const std::string& name : output.passes) {

@@ -217,7 +217,9 @@ Outcome render(const RenderOptions& options) {
     const fs::path sheet = options.folder / ("sheet" + suffix + ".png");
     std::vector<fs::path> shown;
     std::vector<std::string> captions;
-    for (const int f : render::spread_over(frame_count, film.sheet_columns * film.sheet_rows)) {
+    for (const int of_motion :
+         render::spread_over(shot.frames_of_motion(), film.sheet_columns * film.sheet_rows)) {
+      const int f = shot.frames_before() + of_motion;
       shown.push_back(files.of(f));
       captions.push_back(fmt::format("{:.2f} s", shot.time_s(f)));
     }

@@ -26,10 +26,11 @@ constexpr int generation =
     4;  // of pictures: raised when the same film comes out otherwise, so that it is painted anew
 constexpr double longest_arrow = 2;  // times that of the strongest push, which is as long as the robot
 constexpr int most_edges_of_tree = 4000;
-constexpr double at_rest = 0.003;      // of the robot's size: what moves no farther is not seen to move
-constexpr double after_rest_s = 0.5;   // of the film
-constexpr double ease_s = 0.5;         // of the film at its usual speed: so long before contact it slows down
-constexpr double pane_fade_s = 0.25;   // of the film at its usual speed
+constexpr double at_rest = 0.003;     // of the robot's size: what moves no farther is not seen to move
+constexpr double after_rest_s = 0.5;  // of the film
+constexpr double ease_s = 0.5;        // of the film at its usual speed: so long before contact it slows down
+constexpr double pane_fade_s = 0.25;  // of the film at its usual speed
+constexpr double card_fade_s = 0.5;
 constexpr double full_contact = 0.05;  // of the strongest: from there on the robot is in contact
 
 // From over the photographer's left shoulder, so that what faces the camera is lit, and shadows fall to the
@@ -117,9 +118,15 @@ std::string length_words(double length_m) {
 }
 
 void require_letters(const scenes::FilmSpec& film) {
-  if (const std::string missing = render::letters_missing(film.caption); !missing.empty())
-    throw InputError(fmt::format(
-        "film.caption: limber's font has no letters for {} (it has Latin, Greek and Cyrillic)", missing));
+  const auto require = [](const char* key, const std::string& text) {
+    if (const std::string missing = render::letters_missing(text); !missing.empty())
+      throw InputError(fmt::format(
+          "{}: limber's font has no letters for {} (it has Latin, Greek and Cyrillic)", key, missing));
+  };
+  require("film.caption", film.caption);
+  for (const auto& [key, card] :
+       {std::pair("film.title", &film.title), std::pair("film.end_card", &film.end_card)})
+    if (*card) require(key, fmt::format("{}", fmt::join((*card)->lines, " ")));
 }
 
 Shot::Shot(const scenes::Scene& scene, const std::string& camera, const plan::Plan& plan,
@@ -175,15 +182,18 @@ void Shot::check() const {
   if (!output_.passes.empty() && film.side_by_side)
     throw InputError("--passes are of one picture; add --set film.side_by_side=false");
   require_letters(film);
-  std::vector<std::string> in_the_way;  // as sets that take them away
+  std::vector<std::string> in_the_way;  // as sets that take them away, where a table cannot be
   if (!film.caption.empty()) in_the_way.emplace_back("--set film.caption=");
   for (const auto& [is_on, key] :
        {std::pair(film.clock, "clock"), std::pair(film.scale_bar, "scale_bar"),
         std::pair(film.side_by_side, "side_by_side"), std::pair(film.outlines, "outlines")})
     if (is_on) in_the_way.push_back(fmt::format("--set film.{}=false", key));
+  for (const auto& [is_on, key] :
+       {std::pair(film.title.has_value(), "title"), std::pair(film.end_card.has_value(), "end_card")})
+    if (is_on) in_the_way.push_back(fmt::format("a scene without film.{}", key));
   if ((film.transparent || output_.bits == 16) && !in_the_way.empty())
     throw InputError(
-        fmt::format("{}: words, outlines and side_by_side need 8-bit pictures with a background; add {}",
+        fmt::format("{}: words, outlines and side_by_side need 8-bit pictures with a background; ask for {}",
                     film.transparent ? "film.transparent" : "--bits 16", fmt::join(in_the_way, " ")));
 }
 
@@ -297,7 +307,30 @@ void Shot::lay_out_time() {
       length = *film.length_s * film.frames_per_second;
     }
   }
-  moments_ = paced(contact, range, length);
+  const std::vector<Moment> motion = paced(contact, range, length);
+  of_motion_ = int(motion.size());
+  const auto frames_of = [&](const std::optional<scenes::CardSpec>& card) {
+    return card ? std::max(1, int(std::lround(card->duration_s * film.frames_per_second))) : 0;
+  };
+  before_ = frames_of(film.title);
+  moments_.assign(std::size_t(before_), motion.front());
+  moments_.insert(moments_.end(), motion.begin(), motion.end());
+  moments_.insert(moments_.end(), std::size_t(frames_of(film.end_card)), motion.back());
+}
+
+const scenes::CardSpec* Shot::card_of(int frame) const {
+  return frame < before_                ? &*scene_.film.title
+         : frame < before_ + of_motion_ ? nullptr
+                                        : &*scene_.film.end_card;
+}
+
+double Shot::card_share(int frame) const {
+  const scenes::CardSpec* card = card_of(frame);
+  if (!card) return 0;
+  const int away = frame < before_ ? before_ - frame : frame - before_ - of_motion_ + 1;
+  const double share = std::min(
+      1.0, double(away) / (std::min(card_fade_s, 0.5 * card->duration_s) * scene_.film.frames_per_second));
+  return share * share * (3 - 2 * share);
 }
 
 Box Shot::box_of_motion() const {
@@ -361,7 +394,7 @@ void Shot::lay_out_camera(double aspect) {
 }
 
 render::Camera Shot::camera_of(int frame) const {
-  const double share = frames() < 2 ? 0 : double(frame) / double(frames() - 1);
+  const double share = of_motion_ < 2 ? 0 : double(index_in_motion(frame)) / double(of_motion_ - 1);
   render::Camera camera = render::turned(render::camera_at(path_, share), share * camera_->turn_deg);
   if (followed_m_.rows() > 0) {
     const Vec3 way = (followed_m_.row(frame) - followed_m_.row(0)).transpose();
@@ -464,10 +497,11 @@ Json Shot::key_of_passes() const {
   return key;
 }
 
-// Of the stored frame that is shown, or was last.
+// Of the stored frame that is shown, or was last; none under cards.
 Json Shot::contacts_in_picture(int frame) const {
   const render::Camera camera = camera_of(frame);
   Json contacts = Json::array();
+  if (card_of(frame)) return contacts;
   for (const fem::ContactForce& touch : touches_[std::size_t(moment_of(frame))]) {
     if (!touches_robot(touch)) continue;
     const Vec3 pixel = render::pixel_from_world(camera, touch.place_m, look_.width, look_.height);
@@ -652,6 +686,10 @@ std::string Shot::hash_of(int frame) const {
       .matrix(camera.eye)
       .matrix(camera.target)
       .matrix(camera.up);
+  if (const scenes::CardSpec* card = card_of(frame))
+    hasher.value(card_share(frame))
+        .text(fmt::format("{}", fmt::join(card->lines, "\n")))
+        .value(int(card->plain));
   for (const PaneOf& pane : panes_)
     if (const double share = shown(pane.shown, frame); share > 0)
       hasher.value(pane.body).value(pane.wall.axis).value(int(pane.wall.upper)).value(share);

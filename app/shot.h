@@ -1,6 +1,7 @@
 // What one camera sees of a planned motion: from the number of a frame to a picture, by any worker alike.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <map>
 #include <memory>
@@ -48,6 +49,9 @@ class Shot {
   int frames() const;
   // Of the motion, when a frame of the film shows it.
   double time_s(int frame) const;
+  // Frames before the motion, and those of it; what is left over comes after it.
+  int frames_before() const { return before_; }
+  int frames_of_motion() const { return of_motion_; }
   // {"seconds": …, "motion_s": …, "left_out_s": …, "speed": [least, most]}: how the film tells the motion.
   Json time_told() const;
   // {"depth_m": [near, far], "objects": ["", NAME…], "scalar": {…}, "contacts": […]}: what the levels of the
@@ -67,8 +71,12 @@ class Shot {
     struct View;
     render::Image8 without_words(int frame, render::Passes*);
     render::Image8 annotated(render::Image8, int frame) const;
+    render::Image8 with_card(int frame, render::Passes*);
     const Shot& shot_;
     std::vector<std::unique_ptr<View>> views_;  // from left to right
+    // While a card is shown the motion stands still: its picture, and what the card makes of it.
+    const scenes::CardSpec* card_of_ = nullptr;
+    render::Image8 still_, card_;
   };
 
  private:
@@ -83,6 +91,10 @@ class Shot {
   }
   double moment_of(int frame) const { return moments_[std::size_t(frame)].at; }
   void lay_out_time();
+  int index_in_motion(int frame) const { return std::clamp(frame - before_, 0, of_motion_ - 1); }
+  // How much of a card is over a frame, 0 … 1.
+  double card_share(int frame) const;
+  const scenes::CardSpec* card_of(int frame) const;  // none: nullptr
   void find_controls();
   // At a stored frame.
   Control control_at(int stored) const;
@@ -139,6 +151,7 @@ class Shot {
   double near_m_ = 0, far_m_ = 1;        // depths of all that is ever seen
   double strongest_push_n_ = 0, arrow_m_per_n_ = 0, arrow_radius_m_ = 0;
   std::vector<Moment> moments_;  // a frame
+  int before_ = 0, of_motion_ = 1;
   std::vector<Push> pushes_;
   std::vector<PaneOf> panes_;
   std::vector<std::vector<fem::ContactForce>> touches_;  // a stored frame; empty where nothing asks for them

@@ -58,6 +58,7 @@ scenes::Scene of_one_moment(scenes::Scene scene) {
   film.color_by = scenes::ColorBy::body;
   film.forces = film.path = film.tree = false;
   film.pace = scenes::Pace::steady, film.length_s.reset();
+  film.title.reset(), film.end_card.reset();
   return scene;
 }
 

@@ -850,6 +850,31 @@ ColorBy read_color_by(const std::string& word) {
                                  : ColorBy::body;
 }
 
+// One line or several, without letters that cannot be seen.
+std::vector<std::string> lines_of(const Node& node, const char* key) {
+  std::vector<std::string> lines{""};
+  for (const char c : as_text(node)) {
+    if (c == '\n')
+      lines.emplace_back();
+    else if (static_cast<unsigned char>(c) < ' ' || c == 127)
+      complain(node, fmt::format("{} has letters that cannot be seen", key));
+    else
+      lines.back() += c;
+  }
+  while (lines.size() > 1 && lines.back().empty()) lines.pop_back();
+  constexpr std::size_t most = 8;
+  if (lines.size() > most)
+    complain(node, fmt::format("{} has {} lines; at most {} fit on the picture", key, lines.size(), most));
+  return lines;
+}
+
+std::optional<CardSpec> read_card(const Node& film, const char* name) {
+  const Node* table = film.find(name);
+  if (!table) return {};
+  return CardSpec{lines_of(child(*table, "text"), fmt::format("film.{}.text", name).c_str()),
+                  number(*table, "duration_s"), text(*table, "ground") == "plain"};
+}
+
 FilmSpec read_film(const Node& table) {
   const Eigen::Vector2i size = vector2(table, "size_px").cast<int>(),
                         sheet = vector2(table, "sheet").cast<int>();
@@ -895,6 +920,7 @@ FilmSpec read_film(const Node& table) {
   film.side_by_side = flag(table, "side_by_side");
   film.panes = flag(table, "panes");
   film.outlines = flag(table, "outlines");
+  film.title = read_card(table, "title"), film.end_card = read_card(table, "end_card");
   film.sheet_columns = sheet[0], film.sheet_rows = sheet[1];
   return film;
 }

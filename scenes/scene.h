@@ -223,6 +223,13 @@ struct CameraSpec {
 // What the colours of the bodies mean.
 enum class ColorBy { body, strain, volume, penetration, speed };
 
+// Words before or after the motion.
+struct CardSpec {
+  std::vector<std::string> lines;  // UTF-8; the first is set larger
+  double duration_s = 0;
+  bool plain = false;  // on a plain ground, instead of the first or last picture, blurred
+};
+
 struct FilmSpec {
   int width_px = 0, height_px = 0;
   int frames_per_second = 0;
@@ -242,6 +249,7 @@ struct FilmSpec {
   bool cages = false, forces = false, path = false, tree = false, side_by_side = false;
   bool panes = false;     // where bodies touch walls that are not drawn
   bool outlines = false;  // silhouettes and creases as dark lines
+  std::optional<CardSpec> title, end_card;
   int sheet_columns = 0, sheet_rows = 0;
 };
 

@@ -1,4 +1,4 @@
-// What a film tells of a motion, and when: pace, end, panes, outlines.
+// What a film tells of a motion, and when: pace, end, panes, outlines, cards.
 #include <gmock/gmock.h>
 
 #include <cmath>
@@ -170,6 +170,47 @@ TEST_F(Story_slow, OutlinesAreDrawnOnBodies) {
   EXPECT_EQ(brighter, 0);
   EXPECT_THAT(refusal({"render", out(), "--bits", "16", "--set", "film.outlines=true"}),
               HasSubstr("--set film.outlines=false"));
+}
+
+TEST_F(Story_slow, CardsComeBeforeAndAfterTheMotionAndLeaveItAsItIs) {
+  const Film plain = film({}),
+             told = film({"film.title={ text = \"Cube\\nfalls\", duration_s = 1 }",
+                          "film.end_card={ text = \"End\", duration_s = 0.5, ground = \"plain\" }"});
+  ASSERT_EQ(told.frames.size(), 20 + plain.frames.size() + 10);
+  for (std::size_t f = 0; f < plain.frames.size(); ++f) ASSERT_EQ(told.frames[20 + f], plain.frames[f]) << f;
+  // The title stands, and gives way in half a second.
+  EXPECT_EQ(told.frames[0], told.frames[9]);
+  double before = std::numeric_limits<double>::infinity();
+  for (std::size_t f = 10; f < 20; ++f) {
+    double away = 0;
+    for (std::size_t i = 0; i < told.frames[f].rgb.size(); ++i)
+      away += std::abs(told.frames[f].rgb[i] - plain.frames[0].rgb[i]);
+    EXPECT_GT(away, 0);
+    EXPECT_LT(away, before);
+    before = away;
+  }
+  // The end comes within a quarter of a second, and stands.
+  const std::size_t end = 20 + plain.frames.size();
+  EXPECT_NE(told.frames[end], plain.frames.back());
+  EXPECT_NE(told.frames[end + 2], told.frames[end + 4]);
+  EXPECT_EQ(told.frames[end + 5], told.frames[end + 9]);
+  // A part of the frames, by another worker, is the same.
+  const std::vector<std::string> words{
+      "render",   out(),  "--as",  "part",
+      "--frames", "15,3", "--set", "film.title={ text = \"Cube\\nfalls\", duration_s = 1 }"};
+  ASSERT_EQ(limber_program(words).code, exit_done);
+  for (const int f : {3, 15})
+    EXPECT_EQ(render::read_png(fs::path(out()) / "frames-part" / fmt::format("{:04}.png", f)),
+              told.frames[std::size_t(f)]);
+  for (const char* set : {"film.title={ text = \"心\" }", "film.end_card={ text = \"心\" }"})
+    EXPECT_THAT(refusal({"render", out(), "--set", set}), HasSubstr("no letters for 心"));
+  EXPECT_THAT(refusal({"render", out(), "--set", "film.title={ text = \"a\\tb\" }"}),
+              HasSubstr("letters that cannot be seen"));
+  EXPECT_THAT(
+      refusal({"render", out(), "--set", "film.title={ text = \"1\\n2\\n3\\n4\\n5\\n6\\n7\\n8\\n9\" }"}),
+      HasSubstr("9 lines; at most 8"));
+  EXPECT_THAT(refusal({"render", out(), "--bits", "16", "--set", "film.title={ text = \"A\" }"}),
+              HasSubstr("a scene without film.title"));
 }
 
 // passes.json tells where in each picture the robot is touched: on the cube's right, where the wall is.
