@@ -29,6 +29,7 @@ constexpr int most_triangles_that_cast = 60'000, triangles_of_caster = 20'000;
 
 constexpr double outline_step = 0.004, outline_width = 1.6 / 1080;  // of the stage's diagonal, of the height
 const Vec3 outline_color(0.10, 0.11, 0.14);
+constexpr double inset_rim = 3.0 / 1080;  // of the height
 
 constexpr int fine_cells = 300;  // of the maps that find crevices, along a body
 
@@ -341,6 +342,7 @@ struct Shot::Painter::View {
 Shot::Painter::Painter(const Shot& shot) : shot_(shot) {
   views_.push_back(std::make_unique<View>(shot, false));
   if (shot.scene_.film.side_by_side) views_.push_back(std::make_unique<View>(shot, true));
+  if (shot.inset_) inset_ = std::make_unique<Painter>(*shot.inset_);
 }
 Shot::Painter::~Painter() = default;
 
@@ -381,6 +383,12 @@ render::Image8 Shot::Painter::without_words(int frame, render::Passes* wanted) {
   };
   render::Image8 image = drawn(*views_[0]);
   if (views_.size() > 1) image = beside(image, drawn(*views_[1]));
+  if (inset_) {
+    const Eigen::Vector4d place = shot_.place_of_inset(shot_.inset_corner_);
+    render::paste(image, inset_->without_words(frame, nullptr), int(place[0]), int(place[1]),
+                  std::max(1, int(std::lround(inset_rim * image.height))),
+                  shot_.words_.on_dark ? Vec3(0.85, 0.85, 0.85) : Vec3(1, 1, 1));
+  }
   return image;
 }
 

@@ -170,6 +170,7 @@ Shot::Shot(const scenes::Scene& scene, const std::string& camera, const plan::Pl
           fem::center_of_mass_m(world, frames_shown[std::size_t((row + 1) / 2)], world.robot).transpose();
   }
   if (scene.film.tree) find_tree();
+  if (scene.film.inset && scene.film.inset->camera != camera) place_inset();
   place_words();
   look_hash_ = hash_of_look();
 }
@@ -189,12 +190,13 @@ void Shot::check() const {
         std::pair(film.side_by_side, "side_by_side"), std::pair(film.outlines, "outlines")})
     if (is_on) in_the_way.push_back(fmt::format("--set film.{}=false", key));
   for (const auto& [is_on, key] :
-       {std::pair(film.title.has_value(), "title"), std::pair(film.end_card.has_value(), "end_card")})
+       {std::pair(film.inset.has_value(), "inset"), std::pair(film.title.has_value(), "title"),
+        std::pair(film.end_card.has_value(), "end_card")})
     if (is_on) in_the_way.push_back(fmt::format("a scene without film.{}", key));
   if ((film.transparent || output_.bits == 16) && !in_the_way.empty())
-    throw InputError(
-        fmt::format("{}: words, outlines and side_by_side need 8-bit pictures with a background; ask for {}",
-                    film.transparent ? "film.transparent" : "--bits 16", fmt::join(in_the_way, " ")));
+    throw InputError(fmt::format(
+        "{}: words, insets, outlines and side_by_side need 8-bit pictures with a background; ask for {}",
+        film.transparent ? "film.transparent" : "--bits 16", fmt::join(in_the_way, " ")));
 }
 
 int Shot::frames() const { return int(moments_.size()); }
@@ -466,9 +468,43 @@ void Shot::place_words() {
   std::array<Eigen::Vector4d, 4> boxes;
   for (std::size_t c = 0; c < boxes.size(); ++c)
     boxes[c] = render::place_of_caption(width, look_.height, film.caption, clock, render::corners[c]);
-  const std::array<int, 4> hidden = hidden_by(boxes);
+  std::array<int, 4> hidden = hidden_by(boxes);
+  for (std::size_t c = 0; c < hidden.size(); ++c)
+    if (inset_ && render::corners[c] == inset_corner_) hidden[c] = std::numeric_limits<int>::max();
   words_.corner =
       render::corners[std::size_t(std::min_element(hidden.begin(), hidden.end()) - hidden.begin())];
+}
+
+Eigen::Vector4d Shot::place_of_inset(render::Corner corner) const {
+  const double margin = look_.width / 40.0, width = inset_->look_.width, height = inset_->look_.height;
+  const bool right = corner == render::Corner::bottom_right || corner == render::Corner::top_right,
+             bottom = corner == render::Corner::bottom_left || corner == render::Corner::bottom_right;
+  const double left = std::round(right ? look_.width - margin - width : margin),
+               top = std::round(bottom ? look_.height - margin - height : margin);
+  return {left, top, left + width, top + height};
+}
+
+void Shot::place_inset() {
+  const scenes::FilmSpec& film = scene_.film;
+  inset_scene_ = std::make_unique<scenes::Scene>(scene_);
+  inset_scene_->film.inset.reset();
+  Output output;
+  output.occlusion = output_.occlusion;
+  const auto side = [&](int whole) { return std::max(16, int(std::lround(film.inset->size * whole))); };
+  inset_ = std::make_unique<Shot>(*inset_scene_, film.inset->camera, plan_, world_, bodies_, scenery_,
+                                  std::pair(side(look_.width), side(look_.height)), output);
+  std::array<Eigen::Vector4d, 4> boxes;
+  for (std::size_t c = 0; c < boxes.size(); ++c) boxes[c] = place_of_inset(render::corners[c]);
+  const std::array<int, 4> hidden = hidden_by(boxes);
+  std::size_t best = 1;
+  for (std::size_t c = 0; c < boxes.size(); ++c) {
+    const bool right = boxes[c][0] > 0.5 * look_.width - 0.5 * (boxes[c][2] - boxes[c][0]),
+               bottom = boxes[c][1] > 0.5 * look_.height - 0.5 * (boxes[c][3] - boxes[c][1]);
+    // Bars of colours and of length have their places.
+    if ((film.color_by != scenes::ColorBy::body && right) || (film.scale_bar && bottom)) continue;
+    if (hidden[c] < hidden[best]) best = c;
+  }
+  inset_corner_ = render::corners[best];
 }
 
 void Shot::measure_depths() {
@@ -690,6 +726,7 @@ std::string Shot::hash_of(int frame) const {
     hasher.value(card_share(frame))
         .text(fmt::format("{}", fmt::join(card->lines, "\n")))
         .value(int(card->plain));
+  if (inset_) hasher.text(inset_->hash_of(frame)).value(int(inset_corner_)).value(scene_.film.inset->size);
   for (const PaneOf& pane : panes_)
     if (const double share = shown(pane.shown, frame); share > 0)
       hasher.value(pane.body).value(pane.wall.axis).value(int(pane.wall.upper)).value(share);

@@ -74,6 +74,7 @@ class Shot {
     render::Image8 with_card(int frame, render::Passes*);
     const Shot& shot_;
     std::vector<std::unique_ptr<View>> views_;  // from left to right
+    std::unique_ptr<Painter> inset_;
     // While a card is shown the motion stands still: its picture, and what the card makes of it.
     const scenes::CardSpec* card_of_ = nullptr;
     render::Image8 still_, card_;
@@ -118,6 +119,8 @@ class Shot {
   void lay_out_camera(double aspect);
   void check() const;
   void place_words();
+  void place_inset();
+  Eigen::Vector4d place_of_inset(render::Corner) const;
   // How many of some places in each box, one a corner (pixels: left, top, right, bottom), are on bodies, over
   // the film.
   std::array<int, 4> hidden_by(const std::array<Eigen::Vector4d, 4>& boxes) const;
@@ -152,6 +155,9 @@ class Shot {
   double strongest_push_n_ = 0, arrow_m_per_n_ = 0, arrow_radius_m_ = 0;
   std::vector<Moment> moments_;  // a frame
   int before_ = 0, of_motion_ = 1;
+  std::unique_ptr<scenes::Scene> inset_scene_;
+  std::unique_ptr<Shot> inset_;
+  render::Corner inset_corner_ = render::Corner::top_right;
   std::vector<Push> pushes_;
   std::vector<PaneOf> panes_;
   std::vector<std::vector<fem::ContactForce>> touches_;  // a stored frame; empty where nothing asks for them

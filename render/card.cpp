@@ -86,4 +86,15 @@ Image8 mixed(const Image8& from, const Image8& to, double share) {
   return image;
 }
 
+void paste(Image8& image, const Image8& inset, int left, int top, int rim_px, const Vec3& rim_srgb) {
+  const Image8 dot = filled(1, 1, rim_srgb);
+  for (int y = std::max(0, top - rim_px); y < std::min(image.height, top + inset.height + rim_px); ++y)
+    for (int x = std::max(0, left - rim_px); x < std::min(image.width, left + inset.width + rim_px); ++x) {
+      const bool in = left <= x && x < left + inset.width && top <= y && y < top + inset.height;
+      const std::uint8_t* from =
+          in ? &inset.rgb[3 * (std::size_t(y - top) * inset.width + std::size_t(x - left))] : dot.rgb.data();
+      std::copy_n(from, 3, &image.rgb[3 * (std::size_t(y) * image.width + std::size_t(x))]);
+    }
+}
+
 }  // namespace limber::render

@@ -10,7 +10,7 @@ namespace limber::render {
 // what the surface's slant explains, and where the normal turns by more than some 45 degrees.
 std::vector<float> outlines_of(const Passes&, double step_m);
 
-// As lines of ink, some width_px wide.
+// As lines of ink, some width_px wide, two pixels at least.
 void draw_outlines(Image8&, const Passes&, double step_m, double width_px, const Vec3& ink_srgb);
 
 }  // namespace limber::render

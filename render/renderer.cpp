@@ -250,7 +250,8 @@ Box Renderer::Impl::shown() const {
 Box Renderer::Impl::stage() const {
   if (!look.stage.empty()) return look.stage;
   Box box;
-  for (const Mesh& mesh : meshes) box.include(mesh.card.box());
+  for (const Mesh& mesh : meshes)
+    if (!mesh.look.seen || mesh.drawn()) box.include(mesh.card.box());
   return box.empty() ? shown() : box;
 }
 

@@ -842,6 +842,16 @@ std::vector<CameraSpec> read_cameras(const Node& root, const Scene& scene) {
   return cameras;
 }
 
+void check_inset(const Node& film, const Scene& scene) {
+  if (!scene.film.inset) return;
+  std::vector<std::string> names;
+  for (const CameraSpec& camera : scene.cameras) names.push_back(camera.name);
+  if (std::find(names.begin(), names.end(), scene.film.inset->camera) == names.end())
+    complain(child(child(film, "inset"), "camera"),
+             fmt::format("film.inset.camera: the scene has no camera \"{}\"; there are: {}",
+                         scene.film.inset->camera, fmt::join(names, ", ")));
+}
+
 ColorBy read_color_by(const std::string& word) {
   return word == "strain"        ? ColorBy::strain
          : word == "volume"      ? ColorBy::volume
@@ -920,7 +930,12 @@ FilmSpec read_film(const Node& table) {
   film.side_by_side = flag(table, "side_by_side");
   film.panes = flag(table, "panes");
   film.outlines = flag(table, "outlines");
+  if (const Node* inset = table.find("inset"))
+    film.inset = InsetSpec{text(*inset, "camera"), number(*inset, "size")};
   film.title = read_card(table, "title"), film.end_card = read_card(table, "end_card");
+  if (film.inset && film.side_by_side)
+    complain(child(table, "inset"),
+             "film.inset and film.side_by_side both show a second picture; take one of them");
   film.sheet_columns = sheet[0], film.sheet_rows = sheet[1];
   return film;
 }
@@ -985,6 +1000,7 @@ Scene read(const std::string& toml, const std::string& name_for_messages,
   fill_in_max_stretch(scene);
   if (all_bodies) complaints.during([&] { scene.cameras = read_cameras(root, scene); });
   complaints.during([&] { scene.film = read_film(child(root, "film")); });
+  if (all_bodies) complaints.during([&] { check_inset(child(root, "film"), scene); });
   scene.text = toml;
   scene.sets = sets;
   scene.script = script;

@@ -223,6 +223,12 @@ struct CameraSpec {
 // What the colours of the bodies mean.
 enum class ColorBy { body, strain, volume, penetration, speed };
 
+// A second camera's picture in a corner.
+struct InsetSpec {
+  std::string camera;
+  double size = 0.3;  // of the film's width
+};
+
 // Words before or after the motion.
 struct CardSpec {
   std::vector<std::string> lines;  // UTF-8; the first is set larger
@@ -249,6 +255,7 @@ struct FilmSpec {
   bool cages = false, forces = false, path = false, tree = false, side_by_side = false;
   bool panes = false;     // where bodies touch walls that are not drawn
   bool outlines = false;  // silhouettes and creases as dark lines
+  std::optional<InsetSpec> inset;
   std::optional<CardSpec> title, end_card;
   int sheet_columns = 0, sheet_rows = 0;
 };

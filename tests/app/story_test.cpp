@@ -1,7 +1,9 @@
-// What a film tells of a motion, and when: pace, end, panes, outlines, cards.
+// What a film tells of a motion, and when: pace, end, panes, outlines, cards, inset.
 #include <gmock/gmock.h>
 
 #include <cmath>
+#include <limits>
+#include <set>
 
 #include "app/plan_folder.h"
 #include "app/scene_world.h"
@@ -18,7 +20,7 @@ using testing::HasSubstr;
 constexpr const char* falling = R"(name = "falling"
 [world]
 bounds_m = [[0, 0, 0], [2, 2, 2]]
-gravity_m_s2 = [9.81, 0, 0]
+gravity_m_s2 = [3, 0, 0]
 [[bodies]]
 name = "cube"
 role = "robot"
@@ -35,6 +37,9 @@ max_force_n = 100
 size_px = [96, 64]
 frames_per_second = 20
 bounds_lines = false
+[[cameras]]
+name = "behind"
+direction = [0.2, 1, 0.3]
 )";
 
 class Story_slow : public Program {
@@ -91,7 +96,7 @@ TEST_F(Story_slow, FilmsAreSlowWhereTheRobotIsTouchedAndQuickWhereItIsNot) {
   EXPECT_NEAR(paced.json.at("time").at("speed").at(0), 0.2, 0.01);
   EXPECT_GT(paced.json.at("time").at("speed").at(1), 1);
   EXPECT_EQ(paced.json.at("time").at("motion_s"), steady.json.at("time").at("motion_s"));
-  // It falls for a sixth of the time, and lies on the wall for the rest.
+  // It falls for a quarter of the time, and lies on the wall for the rest.
   EXPECT_GT(paced.frames.size(), 2 * steady.frames.size());
   EXPECT_EQ(paced.frames.front(), steady.frames.front());
   EXPECT_EQ(paced.frames.back(), steady.frames.back());
@@ -150,7 +155,7 @@ TEST_F(Story_slow, APaneStandsWhereAWallIsTouchedAndNowhereElse) {
   for (const std::uint16_t level : object.levels) ASSERT_TRUE(level == 0 || level == 257);
   // The floor is drawn already.
   const std::string down =
-      std::string(falling).replace(std::string(falling).find("[9.81, 0, 0]"), 12, "[0, 0, -9.81]");
+      std::string(falling).replace(std::string(falling).find("[3, 0, 0]"), 9, "[0, 0, -3]");
   ASSERT_EQ(limber_program({"simulate", scene(down), "-o", out(), "--duration", "1"}).code, exit_done);
   EXPECT_EQ(film({}).frames, film({"film.panes=true"}).frames);
 }
@@ -213,6 +218,38 @@ TEST_F(Story_slow, CardsComeBeforeAndAfterTheMotionAndLeaveItAsItIs) {
               HasSubstr("a scene without film.title"));
 }
 
+// The other camera's picture, small, in a corner in which no body is; and nothing else changes.
+TEST_F(Story_slow, AnInsetIsTheOtherCamerasPictureInACorner) {
+  const Film plain = film({}), with = film({"film.inset={ camera = \"behind\", size = 0.25 }"});
+  ASSERT_EQ(with.frames.size(), plain.frames.size());
+  std::set<std::vector<int>> boxes;
+  for (std::size_t f = 0; f < plain.frames.size(); f += 7) {
+    std::vector<int> box{96, 64, 0, 0};
+    for (int y = 0; y < 64; ++y)
+      for (int x = 0; x < 96; ++x) {
+        const std::size_t at = 3 * std::size_t(96 * y + x);
+        if (!std::equal(&with.frames[f].rgb[at], &with.frames[f].rgb[at] + 3, &plain.frames[f].rgb[at]))
+          box = {std::min(box[0], x), std::min(box[1], y), std::max(box[2], x + 1), std::max(box[3], y + 1)};
+      }
+    boxes.insert(box);
+  }
+  for (const std::vector<int>& box : boxes) {
+    EXPECT_LE(box[2] - box[0], 24 + 2);
+    EXPECT_LE(box[3] - box[1], 16 + 2);
+    EXPECT_TRUE(box[2] < 48 || box[0] >= 48);
+    EXPECT_TRUE(box[3] < 32 || box[1] >= 32);
+  }
+  EXPECT_NE(with.frames.front(), plain.frames.front());
+  // Its own film has none of itself.
+  EXPECT_EQ(film({"film.inset={ camera = \"behind\" }"}, {"--camera", "behind"}).frames,
+            film({}, {"--camera", "behind"}).frames);
+  EXPECT_THAT(refusal({"render", out(), "--set", "film.inset={ camera = \"above\" }"}),
+              HasSubstr("no camera \"above\"; there are: main, behind"));
+  EXPECT_THAT(refusal({"render", out(), "--set", "film.inset={ camera = \"behind\" }", "--set",
+                       "film.side_by_side=true"}),
+              HasSubstr("take one of them"));
+}
+
 // passes.json tells where in each picture the robot is touched: on the cube's right, where the wall is.
 TEST_F(Story_slow, PassesTellWhereTheRobotIsTouched) {
   film({"film.pace=contact"}, {"--passes", "object,depth"});
@@ -225,13 +262,14 @@ TEST_F(Story_slow, PassesTellWhereTheRobotIsTouched) {
   for (int f = 0; f < frames; ++f) {
     if (key.at("contacts").at(std::size_t(f)).empty()) continue;
     const render::Raster16 object = render::read_png_16(frame(fmt::format("{:04}.object.png", f)));
-    int right = 0;
+    int left = object.width, right = 0;
     for (int y = 0; y < object.height; ++y)
       for (int x = 0; x < object.width; ++x)
         if (object.levels[std::size_t(y) * std::size_t(object.width) + std::size_t(x)])
-          right = std::max(right, x + 1);
+          left = std::min(left, x), right = std::max(right, x + 1);
     for (const Json& contact : key.at("contacts").at(std::size_t(f))) {
-      EXPECT_NEAR(contact.at(0), right, 6) << f;
+      EXPECT_GT(contact.at(0), 0.5 * (left + right)) << f;  // the wall is seen from its edge, to the right
+      EXPECT_LT(contact.at(0), right + 1) << f;
       EXPECT_GT(contact.at(2), near);
       EXPECT_LT(contact.at(2), far);
       EXPECT_GT(contact.at(3), 0);

@@ -1,4 +1,4 @@
-// Pictures with words in their middle.
+// Cards, and one picture in another.
 #include "render/card.h"
 
 #include <gtest/gtest.h>
@@ -85,6 +85,21 @@ TEST(Card, MixedIsTheOneTheOtherAndTheMeanOfBoth) {
   EXPECT_EQ(mixed(a, b, 1), b);
   const Image8 half = mixed(a, b, 0.5);
   for (std::size_t i = 0; i < a.rgb.size(); ++i) EXPECT_NEAR(half.rgb[i], 0.5 * (a.rgb[i] + b.rgb[i]), 0.5);
+}
+
+TEST(Card, APastedPictureIsThereWithinItsRimAndNothingElseChanges) {
+  const Image8 ground = filled(60, 40, Vec3(0, 0, 0)), small = noise(20, 10);
+  for (const auto& [left, top] : {std::pair(7, 9), std::pair(-5, -3), std::pair(50, 35)}) {
+    Image8 image = ground;
+    paste(image, small, left, top, 2, Vec3(1, 1, 1));
+    for (int y = 0; y < 40; ++y)
+      for (int x = 0; x < 60; ++x) {
+        const int u = x - left, v = y - top;
+        const bool in = 0 <= u && u < 20 && 0 <= v && v < 10, rim = -2 <= u && u < 22 && -2 <= v && v < 12;
+        const int expected = in ? small.rgb[3 * std::size_t(20 * v + u)] : rim ? 255 : 0;
+        ASSERT_EQ(image.rgb[3 * std::size_t(60 * y + x)], expected) << x << " " << y;
+      }
+  }
 }
 
 }  // namespace

@@ -138,7 +138,7 @@ TEST(Outlines, AreInkOnWhatWasThere) {
   const Passes passes = passes_of({sphere_mesh(Vec3::Zero(), 1, 40)}, camera);
   const Image8 white = filled(width, height, Vec3(1, 1, 1));
   double ink = 0;
-  for (const double line_width : {1.0, 2.0, 4.0}) {
+  for (const double line_width : {2.0, 3.0, 5.0}) {
     Image8 image = white;
     draw_outlines(image, passes, 0.02, line_width, Vec3::Zero());
     double sum = 0;

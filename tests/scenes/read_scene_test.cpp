@@ -643,6 +643,7 @@ std::string another_value(const Key& key) {
       {"forces[].body", "\"gate\""},
       {"forces[].box_m", "[[0, 0, 0], [1, 2, 2]]"},
       {"motions[].body", "\"shutter\""},
+      {"film.inset.camera", "\"main\""},
   };
   if (const auto at = particular.find(key.path); at != particular.end()) return at->second;
   switch (key.type) {
@@ -709,6 +710,10 @@ TEST(Keys, EveryKeyChangesTheScene) {
               "bodies.gate={ name = \"gate\", role = \"scenery\", model = { made = \"heart\" } }"};
     if (key.path == "camera.subject") sets = {"camera.keyframes=[]"};
     if (key.path == "cameras[].subject") sets = {"cameras=[{ name = \"side\" }]"};
+    if (key.path == "film.length_s" || key.path == "film.pace_range") sets = {"film.pace=contact"};
+    if (key.path.starts_with("film.inset.")) sets = {"film.inset={ camera = \"side\" }"};
+    for (const std::string_view card : {"film.title", "film.end_card"})
+      if (key.parent() == card) sets = {fmt::format("{}={{ text = \"Before\" }}", card)};
     if (key.path == "bodies[].pose.axis") sets = {"bodies.robot.pose.angle_deg=90"};
     if (key.parent() == "bodies[].parts[]")
       sets = {key.name() == "box_m"
@@ -751,6 +756,9 @@ TEST(Keys, DefaultsAreInTheirRanges) {
         const std::string preset = toml == key.fallback ? "paper" : "fast";  // keys that need one another
         std::vector<std::string> sets = {"planner.preset=" + preset, path + "=" + std::string(toml)};
         if (key.parent() == "goal.shape") sets.push_back("goal.shape.tolerance_m=0.25");
+        if (key.parent() == "film.inset") sets.push_back("film.inset.camera=side");
+        for (const std::string_view card : {"film.title", "film.end_card"})
+          if (key.parent() == card) sets.push_back(fmt::format("{}.text=Before", card));
         EXPECT_NO_THROW(read_scene(good, "s", sets));
       }
   EXPECT_NO_THROW(read_scene(good, "s"));
@@ -861,7 +869,11 @@ std::string all_of(const Scene& s) {
                    f.sheet_rows);
   for (const BodySpec& body : s.bodies) t += fmt::format(" {}", int(body.look));
   for (const BodySpec& body : s.scenery) t += fmt::format(" {} {}", body.triangles, int(body.look));
-  t += fmt::format(" {}", int(f.look));
+  t += fmt::format(" {} {} {} {} {} {} {} {}", int(f.look), int(f.pace), f.slowest, f.quickest,
+                   f.length_s.value_or(-1), int(f.end), f.panes, f.outlines);
+  if (f.inset) t += fmt::format(" {} {}", f.inset->camera, f.inset->size);
+  for (const auto& card : {f.title, f.end_card})
+    if (card) t += fmt::format(" {} {} {}", fmt::join(card->lines, "|"), card->duration_s, card->plain);
   return t + fmt::format("\n{} {} {} {} {} {} {} {} {} {} {} {} {} {}", f.speed, f.transparent, f.caption,
                          f.clock, int(f.color_by), range[0], range[1], f.cages, f.forces, f.path, f.tree,
                          f.side_by_side, f.scale_bar, s.scenery.size());
