@@ -3,6 +3,7 @@
 #include "app/body_store.h"
 #include "app/export.h"
 #include "app/preview.h"
+#include "core/appearance_file.h"
 #include "core/contact_shape_file.h"
 #include "core/error.h"
 #include "core/events.h"
@@ -18,6 +19,7 @@
 #include "meshing/quality.h"
 #include "meshing/shell_check.h"
 #include "meshing/split_edges.h"
+#include "render/image_file.h"
 
 namespace limber::app {
 
@@ -29,11 +31,13 @@ bool has_shells(const PrepareSettings& s) { return s.only != "cage" || s.mode ==
 bool has_cage(const PrepareSettings& s) { return s.only != "shells"; }
 bool is_whole(const PrepareSettings& s) { return s.only.empty(); }
 
-std::vector<std::string> files_of(const PrepareSettings& s) {
+// Images apart.
+std::vector<std::string> files_of(const PrepareSettings& s, bool with_appearance) {
   std::vector<std::string> files{"surface.ply"};
   if (has_shells(s)) files.push_back("shells.obj");
   if (has_cage(s)) files.push_back("cage.msh");
   if (is_whole(s)) files.insert(files.end(), {"binding.npz", "contact.npz"});
+  if (with_appearance) files.push_back(appearance_file);
   return files;
 }
 
@@ -127,6 +131,9 @@ void require_report(const Json& report, const fs::path& file) {
   }
   require_like(report, example, Keys::all, file.string(), remedy);
   require_like(report, {{"shells", {{"vertices_uncovered", -1}}}}, Keys::those_there, file.string(), remedy);
+  require_like(report,
+               {{"appearance", {{"materials", -1}, {"images", Json::array()}, {"corner_colors", true}}}},
+               Keys::those_there, file.string(), remedy);
   for (const auto& [stage, any] : report.at("cpu_seconds").items())
     require_like(report, {{"cpu_seconds", {{stage, 0.5}}}}, Keys::all, file.string(), remedy);
 }
@@ -195,11 +202,18 @@ bool body_is_up_to_date(const fs::path& folder, const Json& input) {
     const Json report = read_json(folder / "report.json");
     require_report(report, folder / "report.json");
     if (report.at("version") != version || report.at("input") != input) return false;
-    const std::vector<std::string> files = files_of(settings_of_input(input));
-    if (report.at("files").size() != files.size()) return false;
-    for (const std::string& name : files)
-      if (report.at("files").at(name) != hash_of_file(folder / name)) return false;
-    return true;
+    const Json& files = report.at("files");
+    std::size_t found = 0;
+    for (const std::string& name : files_of(settings_of_input(input), report.contains("appearance"))) {
+      if (files.at(name) != hash_of_file(folder / name)) return false;
+      ++found;
+    }
+    for (const auto& [name, hash] : files.items())
+      if (is_name_of_image_file(name)) {
+        if (hash != hash_of_file(folder / name)) return false;
+        ++found;
+      }
+    return found == files.size();
   } catch (const InputError&) {
     return false;
   } catch (const Json::exception&) {
@@ -216,6 +230,7 @@ void clear_body(const fs::path& folder) {
   for (const char* name : preview_files) fs::remove(folder / name, ignored);
   fs::remove(folder / picture_file, ignored);
   for (const char* name : body_files) fs::remove(folder / name, ignored);
+  remove_appearance(folder);
 }
 
 void take_costs_out(Json& report) {
@@ -223,9 +238,58 @@ void take_costs_out(Json& report) {
   report["peak_memory_mb"] = 0;
 }
 
-SurfaceMesh surface_that_bends(const SurfaceMesh& surface, const PrepareSettings& settings) {
-  if (settings.tets == 0) return surface;
-  return meshing::split_long_edges(surface, meshing::longest_edge(surface, settings.tets));
+namespace {
+
+bool is_grey(const render::Image8& image) {
+  for (std::size_t i = 0; i + 2 < image.rgb.size(); i += 3)
+    if (image.rgb[i] != image.rgb[i + 1] || image.rgb[i] != image.rgb[i + 2]) return false;
+  return true;
+}
+
+// Leaves out those that cannot be decoded, are too large together, or are no normals though they should be.
+void look_into_images(Appearance& appearance, std::vector<std::string>& warnings) {
+  std::int64_t pixels = 0;
+  std::vector<bool> gone(appearance.images.size(), false);
+  for (int i = 0; i < int(appearance.images.size()); ++i) {
+    const ImageFile& file = appearance.images[std::size_t(i)];
+    try {
+      const render::Image8 image = render::decoded_image(file.bytes, file.name);
+      if (pixels + std::int64_t(image.width) * image.height > render::most_image_pixels)
+        throw InputError(fmt::format("\"{}\": the images of the model have more than {} pixels together",
+                                     file.name, render::most_image_pixels));
+      pixels += std::int64_t(image.width) * image.height;
+      bool has_heights = false;
+      for (SurfaceMaterial& material : appearance.materials)
+        if (material.normal_image == i && is_grey(image)) material.normal_image = -1, has_heights = true;
+      if (has_heights)
+        warnings.push_back(
+            fmt::format("image \"{}\" has heights, not normals: its relief is left out", file.name));
+    } catch (const InputError& error) {
+      warnings.push_back(fmt::format("image {}; what shows it is plain", error.what()));
+      gone[std::size_t(i)] = true;
+    }
+  }
+  appearance.drop_images(gone);
+  appearance.drop_unused();
+}
+
+}  // namespace
+
+void make_model_of_body(meshing::ImportedModel& model, const PrepareSettings& settings) {
+  look_into_images(model.appearance, model.warnings);
+  if (settings.tets > 0) {
+    const Eigen::Index own_vertices = model.surface.positions.rows();
+    CornerMap corners;
+    model.surface =
+        meshing::split_long_edges(model.surface, meshing::longest_edge(model.surface, settings.tets), {},
+                                  model.appearance.empty() ? nullptr : &corners);
+    model.appearance = carried(model.appearance, corners);
+    if (const Eigen::Index more = model.surface.positions.rows() - own_vertices; more > 0)
+      model.mended.push_back(
+          fmt::format("cut long edges at {} places, so that its {} triangles bend as the cage does", more,
+                      model.surface.triangles.rows()));
+  }
+  round_to_floats(model.appearance);
 }
 
 double concavity_of(const SurfaceMesh& surface, const PrepareSettings& settings) {
@@ -281,12 +345,7 @@ WholeBody make_body(const BodySource& source, const PrepareSettings& settings,
   body.model = source.load();
   SurfaceMesh& surface = body.model.surface;
   validate(surface, source.model);
-  const Eigen::Index own_vertices = surface.positions.rows();
-  surface = surface_that_bends(surface, settings);
-  if (const Eigen::Index more = surface.positions.rows() - own_vertices; more > 0)
-    body.model.mended.push_back(
-        fmt::format("cut long edges at {} places, so that its {} triangles bend as the cage does", more,
-                    surface.triangles.rows()));
+  make_model_of_body(body.model, settings);
   end_stage("import");
   throw_if_stopped();
 
@@ -340,11 +399,12 @@ Json report_of(const WholeBody& body, const BodySource& source, const PrepareSet
   report["warnings"] = warnings;
   report.update(facts_of_body(body.model.surface, body.made.decomposition.shells, body.made.cage.mesh,
                               body.binding, body.made.contact, certificate));
+  if (!body.model.appearance.empty()) report["appearance"] = facts_of_appearance(body.model.appearance);
   const Json making = facts_of_making(body.made, settings);
   for (const auto& [table, figures] : making.items()) report[table].update(figures);
   if (!has_shells(settings)) report.erase("shells");
   if (!has_cage(settings)) report.erase("cage"), report.erase("certificate");
-  if (!is_whole(settings)) report.erase("binding"), report.erase("contact");
+  if (!is_whole(settings)) report.erase("binding"), report.erase("contact"), report.erase("appearance");
   return report;
 }
 
@@ -355,14 +415,17 @@ Json write_body(const WholeBody& body, const BodySource& source, const PrepareSe
   remove_abandoned(folder);
   clear_body(folder);
   write_ply(folder / "surface.ply", surface);
+  std::vector<std::string> files = files_of(settings, false);
   if (has_shells(settings)) write_obj(folder / "shells.obj", body.made.decomposition.shells);
   if (has_cage(settings)) write_msh(folder / "cage.msh", cage.mesh, cage.shell_from_tet);
   if (is_whole(settings)) {
     ffd::write_binding(folder / "binding.npz", body.binding, surface, cage.mesh);
     write_contact_shape(folder / "contact.npz", body.made.contact, surface, cage.mesh);
+    const std::vector<std::string> shown = write_appearance(folder, body.model.appearance, surface);
+    files.insert(files.end(), shown.begin(), shown.end());
   }
   Json report = report_of(body, source, settings);
-  for (const std::string& name : files_of(settings)) report["files"][name] = hash_of_file(folder / name);
+  for (const std::string& name : files) report["files"][name] = hash_of_file(folder / name);
   take_costs_out(report);
   write_json(folder / "report.json", report);
   return report;
@@ -447,6 +510,27 @@ Json facts_of_body(const SurfaceMesh& surface, const std::vector<ConvexShell>& s
   return facts;
 }
 
+Json facts_of_appearance(const Appearance& a) {
+  if (a.empty()) return {};
+  Json images = Json::array();
+  for (const ImageFile& image : a.images)
+    images.push_back({{"name", image.name}, {"bytes", image.bytes.size()}});
+  return {
+      {"coordinates", a.uv.rows() > 0},
+      {"corner_colors", a.colors.rows() > 0},
+      {"materials", a.materials.size()},
+      {"plain_triangles", std::count(a.material_from_triangle.begin(), a.material_from_triangle.end(), -1)},
+      {"images", images}};
+}
+
+std::vector<std::string> files_of_body(const Appearance& a) {
+  std::vector<std::string> names(std::begin(body_files), std::end(body_files));
+  if (a.empty()) return names;
+  names.push_back(appearance_file);
+  for (std::size_t i = 0; i < a.images.size(); ++i) names.push_back(name_of_image_file(a, i));
+  return names;
+}
+
 PreparedBody read_body(const fs::path& folder) {
   PreparedBody body;
   try {
@@ -454,14 +538,21 @@ PreparedBody read_body(const fs::path& folder) {
     require_report(body.report, folder / "report.json");
     if (const std::string only = settings_of_input(body.report.at("input")).only; !only.empty())
       throw InputError(fmt::format("{}: is a part of a body, made with --only {}", folder.string(), only));
-    for (const char* name : body_files)
+    const auto require_hash = [&](const std::string& name) {
       if (body.report.at("files").at(name) != hash_of_file(folder / name))
         throw InputError(
             fmt::format("{}: is not the file that report.json was written for", (folder / name).string()));
+    };
+    for (const char* name : body_files) require_hash(name);
     body.surface = read_ply(folder / "surface.ply");
     body.cage = read_msh(folder / "cage.msh", &body.shell_from_tet);
     body.binding = ffd::read_binding(folder / "binding.npz", body.surface, body.cage);
     body.contact = read_contact_shape(folder / "contact.npz", body.surface, body.cage);
+    if (body.report.at("files").contains(appearance_file)) {
+      require_hash(appearance_file);
+      body.appearance = read_appearance(folder, body.surface);
+      for (const std::string& name : files_of_body(body.appearance)) require_hash(name);
+    }
     body.gradients = node_gradients(body.cage);
   } catch (const InputError& error) {
     throw InputError(fmt::format(
@@ -523,6 +614,12 @@ std::string summary_of_report(const Json& report) {
                   contact.at("memory_mb").get<double>(), contact.at("error_p99_m").get<double>(),
                   contact.at("error_max_m").get<double>())
             : "  contact      by the cage\n";
+  }
+  if (report.contains("appearance")) {
+    const Json& a = report.at("appearance");
+    text +=
+        fmt::format("  appearance   {} materials, {} images{}\n", a.at("materials").get<int>(),
+                    a.at("images").size(), a.at("corner_colors").get<bool>() ? ", colors of vertices" : "");
   }
   for (const Json& sentence : report.at("mended"))
     text += fmt::format("  mended       {}\n", sentence.get<std::string>());

@@ -1,11 +1,12 @@
-// A body's folder: surface.ply, shells.obj, cage.msh, binding.npz, contact.npz, report.json. See
-// docs/files.md.
+// A body's folder: surface.ply, shells.obj, cage.msh, binding.npz, contact.npz, report.json; and, of a model
+// with colors of its own, appearance.npz and images. See docs/files.md.
 #pragma once
 
 #include <functional>
 #include <optional>
 #include <string>
 
+#include "core/appearance.h"
 #include "core/contact_shape.h"
 #include "core/file.h"
 #include "core/json.h"
@@ -54,8 +55,9 @@ Json input_of(const Json& identity, const PrepareSettings&);
 // The settings of such an input. Throws Json::exception where it is none.
 PrepareSettings settings_of_input(const Json& input);
 
-// A model's surface, its long edges cut so that it bends as the cage does; that of a body in cells as it is.
-SurfaceMesh surface_that_bends(const SurfaceMesh& model, const PrepareSettings&);
+// A model as its body has it: its long edges cut so that it bends as the cage does, but for a body in cells;
+// images that cannot be shown left out, with a warning.
+void make_model_of_body(meshing::ImportedModel&, const PrepareSettings&);
 
 // A body's shells, cage and contact, made from its surface and those before; `made_cage` is that of a body in
 // cells.
@@ -107,6 +109,7 @@ Json prepare_body(const BodySource&, const PrepareSettings&, const fs::path& fol
 
 struct PreparedBody {
   SurfaceMesh surface;
+  Appearance appearance;  // empty: the scene's color for all
   TetMesh cage;
   std::vector<int> shell_from_tet;  // (T)
   ffd::Binding binding;
@@ -120,6 +123,9 @@ struct PreparedBody {
 // "cage", "certificate", "binding" and "contact".
 Json facts_of_body(const SurfaceMesh&, const std::vector<ConvexShell>&, const TetMesh& cage,
                    const ffd::Binding&, const ContactShape&, const meshing::Certificate&);
+Json facts_of_appearance(const Appearance&);  // a table within "appearance"; null where that is empty
+// The names of the body's files, report.json apart.
+std::vector<std::string> files_of_body(const Appearance&);
 
 // Throws InputError naming the file and the command that renews it when one is missing, damaged, or of
 // another body.

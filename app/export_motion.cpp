@@ -42,6 +42,12 @@ Points surface_at_rest(const fem::Body& body, const PreparedBody& prepared) {
   return surface;
 }
 
+const Appearance& appearance_shown(const PlannedMotion& motion, int body) {
+  static const Appearance none;
+  const auto b = std::size_t(body);
+  return motion.scene.bodies[b].texture ? motion.bodies[b].appearance : none;
+}
+
 std::vector<fs::path> exported_files(const fs::path& folder) {
   std::vector<fs::path> files;
   const auto add = [&](const fs::path& where, const auto& is_ours) {
@@ -53,6 +59,10 @@ std::vector<fs::path> exported_files(const fs::path& folder) {
     return [names](const fs::path& file) { return names.contains(file.filename().string()); };
   };
   add(folder, is({"motion.glb", "motion.usda"}));
+  add(folder / "textures", [](const fs::path& file) {
+    return file.stem().string().find("-image-") != std::string::npos &&
+           (file.extension() == ".png" || file.extension() == ".jpg");
+  });
   add(folder / "pc2", [](const fs::path& file) { return file.extension() == ".pc2"; });
   for (const fs::path& cache : std::vector<fs::path>(files))
     if (cache.extension() == ".pc2") files.push_back(fs::path(cache).replace_extension(".obj"));

@@ -13,6 +13,7 @@ namespace {
 
 constexpr std::size_t longest_path = 300, longest_ending = 8;
 constexpr std::uintmax_t most_named_bytes = std::uintmax_t(2) << 30;
+constexpr std::uintmax_t most_mtl_bytes = 16 << 20;
 constexpr std::size_t most_names = 100'000;  // no model names so many
 
 bool is_letter(char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z'); }
@@ -50,6 +51,26 @@ std::set<std::string> paths_in(std::string_view bytes) {
   return paths;
 }
 
+std::string ending_of(const fs::path& file) {
+  std::string ending = file.extension().string();
+  for (char& c : ending)
+    if (c >= 'A' && c <= 'Z') c = char(c - 'A' + 'a');
+  return ending;
+}
+
+// Those that count for the model: named in its bytes, or in those of its materials.
+std::vector<fs::path> companions_of(std::string_view bytes, const fs::path& model) {
+  std::vector<fs::path> files = files_named_in(bytes, model);
+  for (const fs::path& materials : std::vector<fs::path>(files))
+    if (ending_of(materials) == ".mtl") try {
+        for (const fs::path& image : files_named_in(read_file(materials, most_mtl_bytes), model))
+          if (std::find(files.begin(), files.end(), image) == files.end()) files.push_back(image);
+      } catch (const InputError&) {  // importing reads none either
+      }
+  std::sort(files.begin(), files.end());
+  return files;
+}
+
 }  // namespace
 
 std::vector<fs::path> files_named_in(std::string_view bytes, const fs::path& model) {
@@ -71,7 +92,7 @@ std::vector<fs::path> files_named_in(std::string_view bytes, const fs::path& mod
 ModelContent content_of_model(const fs::path& model) {
   const std::string bytes = read_file(model);
   std::string all;
-  for (const fs::path& file : files_named_in(bytes, model)) {
+  for (const fs::path& file : companions_of(bytes, model)) {
     std::error_code none;
     if (fs::file_size(file, none) > most_named_bytes) continue;  // no model's
     try {
@@ -81,9 +102,7 @@ ModelContent content_of_model(const fs::path& model) {
     }
   }
   const std::string alone = content_hash(bytes);
-  std::string ending = model.extension().string();
-  for (char& c : ending)
-    if (c >= 'A' && c <= 'Z') c = char(c - 'A' + 'a');
+  const std::string ending = ending_of(model);
   if (all.empty()) return {hex(hash_of(std::string_view(bytes))), alone, ending};
   return {hex(hash_of(std::string_view(alone + all))), content_hash(alone + all), ending};
 }

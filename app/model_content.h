@@ -1,5 +1,5 @@
-// What a model file holds, and the files that it names: .bin of a .gltf, objects of a scene. A body made of
-// it depends on both.
+// What a model file holds, and the files that it names: .bin of a .gltf, objects of a scene, materials of an
+// OBJ and the images that these name. A body made of it depends on all.
 #pragma once
 
 #include <string>

@@ -30,6 +30,9 @@ Points surface_at(const PlannedMotion&, int body, int frame);
 // clamped weights.
 Points surface_at_rest(const fem::Body&, const PreparedBody&);
 
+// What the scene shows of the colors that a body's model has; empty: the scene's color.
+const Appearance& appearance_shown(const PlannedMotion&, int body);
+
 struct WrittenFiles {
   fs::path open;  // the one to open
   int files = 0;  // how many there are
@@ -45,7 +48,7 @@ struct WrittenFiles {
 // most.
 WrittenFiles write_gltf(const PlannedMotion&, const fs::path& folder);
 
-// motion.usda: meshes with their points at each frame.
+// motion.usda: meshes with their points at each frame; textures/: the images that they show.
 WrittenFiles write_usd(const PlannedMotion&, const fs::path& folder);
 
 // pc2/: NAME.obj at rest, NAME.pc2 with its points at each frame, what loads them into Blender. Throws

@@ -174,8 +174,11 @@ struct Shot::Painter::View {
     render::MeshLook look = look_of(shot.scene_.bodies[b], size_of(prepared.surface));
     look.casts_shadow = !has_caster(b);
     if (cages) look.crease_angle_deg = 0, look.grain = 0;
-    meshes.push_back(cages ? renderer.add_mesh(hull, prepared.cage.positions, look)
-                           : renderer.add_mesh(prepared.surface.triangles, prepared.surface.positions, look));
+    const SurfaceMesh& fine = prepared.surface;
+    meshes.push_back(cages                      ? renderer.add_mesh(hull, prepared.cage.positions, look)
+                     : shot.shows_own_colors(b) ? renderer.add_mesh(fine.triangles, fine.positions, look,
+                                                                    prepared.appearance, shot.images_[b])
+                                                : renderer.add_mesh(fine.triangles, fine.positions, look));
     rest_normals.push_back(vertex_normals(prepared.surface.positions, prepared.surface.triangles));
     hulls.push_back(prepared.cage.positions);
     boxes.push_back(bounding_box(prepared.surface.positions));

@@ -102,18 +102,19 @@ scenes::Scene filmed_as(const scenes::Scene& planned, const std::vector<std::str
   for (const std::string& set : sets) {
     const std::string key = set.substr(0, set.find('='));
     const auto last = key.substr(key.rfind('.') + 1);
-    const bool look = key.starts_with("bodies.") &&
-                      (last == "color" || last == "opacity" || last == "look" || last == "roughness" ||
-                       last == "metallic" || (last == "deformation" && all_touched_at_cages(planned)));
+    const bool look =
+        key.starts_with("bodies.") &&
+        (last == "color" || last == "texture" || last == "opacity" || last == "look" || last == "roughness" ||
+         last == "metallic" || (last == "deformation" && all_touched_at_cages(planned)));
     const bool film = key.starts_with("film.") && key != "film.speed" && key != "film.frames_per_second";
     if (!look && !film && key != "cameras" && !key.starts_with("camera.") && !key.starts_with("cameras."))
-      throw InputError(
-          fmt::format("--set {}: the motion is planned already; what can be set here are film (but speed and "
-                      "frames_per_second), camera, cameras, and color, opacity, look, roughness and metallic "
-                      "of bodies (and "
-                      "deformation, where all are touched at their cages); "
-                      "for the rest plan anew with limber plan",
-                      set));
+      throw InputError(fmt::format(
+          "--set {}: the motion is planned already; what can be set here are film (but speed and "
+          "frames_per_second), camera, cameras, and color, texture, opacity, look, roughness and metallic "
+          "of bodies (and "
+          "deformation, where all are touched at their cages); "
+          "for the rest plan anew with limber plan",
+          set));
   }
   std::vector<std::string> all = planned.sets;
   all.insert(all.end(), sets.begin(), sets.end());

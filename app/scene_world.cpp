@@ -249,6 +249,24 @@ bool same_surface(const SurfaceMesh& a, const SurfaceMesh& b) {
                                          1e-9 * bounding_box(a.positions).diagonal());
 }
 
+bool same_appearance(const Appearance& a, const Appearance& b) {
+  const auto near = [](const auto& one, const auto& other) {
+    return one.rows() == other.rows() &&
+           (one.rows() == 0 || (one - other).cwiseAbs().maxCoeff() <= 1e-6 * (1 + one.cwiseAbs().maxCoeff()));
+  };
+  return near(a.uv, b.uv) && near(a.colors, b.colors) &&
+         a.material_from_triangle == b.material_from_triangle &&
+         std::equal(a.materials.begin(), a.materials.end(), b.materials.begin(), b.materials.end(),
+                    [&](const SurfaceMaterial& one, const SurfaceMaterial& other) {
+                      return one.name == other.name && near(one.color, other.color) &&
+                             one.image == other.image && one.normal_image == other.normal_image;
+                    }) &&
+         std::equal(a.images.begin(), a.images.end(), b.images.begin(), b.images.end(),
+                    [](const ImageFile& one, const ImageFile& other) {
+                      return one.name == other.name && one.bytes == other.bytes;
+                    });
+}
+
 std::vector<fs::path> with(std::vector<fs::path> folders, const fs::path& last) {
   folders.push_back(last);
   return folders;
@@ -300,6 +318,7 @@ Origin origin_of(const scenes::Scene& scene, const scenes::BodySpec& body, const
                  const PreparedBody& prepared) {
   const Json& said = prepared.report.at("input");
   Origin origin;
+  if (!prepared.appearance.empty()) origin.appearance = Appearing::not_here;
   try {
     const std::string source = said.at("model").at("model").at("source").get<std::string>();
     origin.placed_so = said == input_of(identity_of(body, source), settings_of(body));
@@ -311,8 +330,13 @@ Origin origin_of(const scenes::Scene& scene, const scenes::BodySpec& body, const
     const BodySource found = source_of(scene, body, data);
     // A file may have changed, or another of its name lie here.
     if (file && found.identity.at("model").at("source") != source) return origin;
-    origin.same_surface =
-        same_surface(surface_that_bends(found.load().surface, settings_of(body)), prepared.surface);
+    meshing::ImportedModel model = found.load();
+    make_model_of_body(model, settings_of(body));
+    origin.same_surface = same_surface(model.surface, prepared.surface);
+    if (!model.appearance.empty() || !prepared.appearance.empty())
+      origin.appearance = *origin.same_surface && same_appearance(model.appearance, prepared.appearance)
+                              ? Appearing::same
+                              : Appearing::another;
     origin.made_cage = found.made_cage();
   } catch (const Json::exception&) {
     origin.placed_so = false;

@@ -44,11 +44,15 @@ bool all_touched_at_cages(const scenes::Scene&);
 // not found.
 Json identity_of(const scenes::Scene&, const scenes::BodySpec&, const std::vector<fs::path>& data);
 
+// What a body's appearance is to its model's; plain where neither has one.
+enum class Appearing { plain, not_here, same, another };
+
 // What a scene says of a body that was prepared before.
 struct Origin {
   bool placed_so = false;            // its report tells of the scene's pose, cage and settings
   std::optional<bool> same_surface;  // read and placed again; nothing where the model file is not here
   std::optional<TetMesh> made_cage;  // of a body in cells
+  Appearing appearance = Appearing::plain;
 };
 Origin origin_of(const scenes::Scene&, const scenes::BodySpec&, const std::vector<fs::path>& data,
                  const PreparedBody&);

@@ -17,6 +17,7 @@
 #include "fem/control_forces.h"
 #include "fem/observe.h"
 #include "render/film.h"
+#include "render/image_file.h"
 
 namespace limber::app {
 
@@ -170,6 +171,13 @@ Shot::Shot(const scenes::Scene& scene, const std::string& camera, const plan::Pl
           fem::center_of_mass_m(world, frames_shown[std::size_t((row + 1) / 2)], world.robot).transpose();
   }
   if (scene.film.tree) find_tree();
+  for (std::size_t b = 0; b < bodies.size(); ++b) {
+    images_.emplace_back();
+    for (const ImageFile& image : bodies[b].appearance.images)
+      if (shows_own_colors(b))
+        images_[b].push_back(
+            std::make_shared<const render::Image8>(render::decoded_image(image.bytes, image.name)));
+  }
   if (scene.film.inset && scene.film.inset->camera != camera) place_inset();
   place_words();
   look_hash_ = hash_of_look();
@@ -333,6 +341,12 @@ double Shot::card_share(int frame) const {
   const double share = std::min(
       1.0, double(away) / (std::min(card_fade_s, 0.5 * card->duration_s) * scene_.film.frames_per_second));
   return share * share * (3 - 2 * share);
+}
+// Not where the film's colors mean something.
+bool Shot::shows_own_colors(std::size_t body) const {
+  return !bodies_[body].appearance.empty() && scene_.bodies[body].texture &&
+         (scene_.film.color_by == scenes::ColorBy::body ||
+          world_.bodies[body].kind != fem::BodyKind::deformable);
 }
 
 Box Shot::box_of_motion() const {
@@ -705,6 +719,12 @@ std::uint64_t Shot::hash_of_look() const {
     hasher.value(limber::hash_of(bodies_[b].surface)).value(limber::hash_of(bodies_[b].cage));
     hasher.value(int(bodies_[b].deformation));
     add_look(scene_.bodies[b]);
+    if (!shows_own_colors(b)) continue;
+    const Appearance& a = bodies_[b].appearance;
+    hasher.matrix(a.uv).matrix(a.colors);
+    for (const int m : a.material_from_triangle) hasher.value(m);
+    for (const SurfaceMaterial& m : a.materials) hasher.matrix(m.color).value(m.image).value(m.normal_image);
+    for (const ImageFile& image : a.images) hasher.text(image.bytes);
   }
   for (std::size_t s = 0; s < scenery_.size(); ++s) {
     hasher.value(limber::hash_of(scenery_[s]));

@@ -134,6 +134,7 @@ class Shot {
   // Arrows of a frame, rows 2i and 2i + 1 their ends; always the same number, those of no force without
   // length: the control's push, what each body does to the robot and last the walls, each force of the world.
   Points arrows_at(int frame) const;
+  bool shows_own_colors(std::size_t body) const;
   Points arrows_at_stored(int stored) const;
   bool acts(const fem::Force&, int stored) const;  // in some step of those from this frame to the next
   std::uint64_t hash_of_look() const;
@@ -145,6 +146,8 @@ class Shot {
   const std::vector<PreparedBody>& bodies_;
   const std::vector<SurfaceMesh>& scenery_;
   Output output_;
+  std::vector<std::vector<std::shared_ptr<const render::Image8>>>
+      images_;                           // a body, where it shows its own colors
   render::Look look_;                    // of one view
   std::vector<render::CameraKey> path_;  // over the share of the film
   Points followed_m_;                    // (frames × 3) the way of the body that the camera follows, or none

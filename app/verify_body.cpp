@@ -16,6 +16,7 @@
 #include "meshing/contact_check.h"
 #include "meshing/shell_check.h"
 #include "meshing/surface_tree.h"
+#include "render/image_file.h"
 
 namespace limber::app {
 
@@ -151,7 +152,7 @@ void check_contact(const std::string& name, const PreparedBody& body, Promises& 
 }
 
 // A key of the report that limber does not write there, "" where there is none.
-std::string odd_key(const Json& report, const Json& facts, const Json& making) {
+std::string odd_key(const Json& report, const Json& facts, const Json& making, std::size_t files) {
   const std::set<std::string> known{
       "version",       "model",    "input", "found",       "left",
       "mended",        "warnings", "files", "cpu_seconds", "peak_memory_mb_after",
@@ -164,7 +165,18 @@ std::string odd_key(const Json& report, const Json& facts, const Json& making) {
       if (!facts.value(table, Json()).contains(key) && !making.value(table, Json()).contains(key))
         return table + "." + key;
   }
-  return report.at("files").size() == 5 ? "" : "files";
+  return report.at("files").size() == files ? "" : "files";
+}
+
+void check_images(const std::string& name, const Appearance& appearance, Promises& table) {
+  std::string fault;
+  for (const ImageFile& image : appearance.images) try {
+      render::decoded_image(image.bytes, image.name);
+    } catch (const InputError& error) {
+      fault = error.what();
+    }
+  table.row(name + ": its images can be shown", fault.empty(),
+            fault.empty() ? fmt::format("{} images", appearance.images.size()) : fault);
 }
 
 bool near(double a, double b, double size) { return std::abs(a - b) <= rounding * size; }
@@ -335,10 +347,15 @@ void check_body(const std::string& name, const PreparedBody& body, const fs::pat
   check_contact(name, body, table);
   table.row(name + ": its settings are some that limber takes", told.has_value(), "");
   const Json making = check_making(name, body, settings, shells, made_cage, remake, table);
-  const Json facts = facts_of_body(body.surface, shells, body.cage, body.binding, body.contact, certificate);
+  Json facts = facts_of_body(body.surface, shells, body.cage, body.binding, body.contact, certificate);
+  if (!body.appearance.empty()) {
+    facts["appearance"] = facts_of_appearance(body.appearance);
+    check_images(name, body.appearance, table);
+  }
   std::string wrong = first_wrong(facts, body.report);
   if (wrong.empty() && !making.is_null()) wrong = first_wrong(making, body.report);
-  if (wrong.empty() && !making.is_null()) wrong = odd_key(body.report, facts, making);
+  if (wrong.empty() && !making.is_null())
+    wrong = odd_key(body.report, facts, making, files_of_body(body.appearance).size());
   table.row(name + ": report.json tells of these files", wrong.empty(),
             wrong.empty() ? "" : wrong + " is another's");
 }
@@ -350,6 +367,14 @@ void check_origin(const std::string& name, const Origin& origin, bool must_be_he
               origin.same_surface ? "" : "its model file is not here, or is another");
   else
     table.measured(name + ": surface", "its model file is not here to be compared with");
+  if (origin.appearance == Appearing::plain) return;
+  if (origin.appearance != Appearing::not_here || must_be_here)
+    table.row(name + ": colors and images are the model's", origin.appearance == Appearing::same,
+              origin.appearance == Appearing::not_here
+                  ? "its model file, or one that it names, is not here, or is another"
+                  : "");
+  else
+    table.measured(name + ": colors and images", "their files are not here to be compared with");
 }
 
 void check_goal_cage(GoalCage found, bool must_be_here, Promises& table) {

@@ -8,6 +8,7 @@
 #include "core/json.h"
 #include "core/log.h"
 #include "core/progress.h"
+#include "core/split_at_seams.h"
 #include "core/version.h"
 #include "fem/observe.h"
 #include "render/image.h"
@@ -109,7 +110,7 @@ class Gltf {
     if (target != none) view["target"] = int(target);
     add("bufferViews", view);
   }
-  // `components` numbers an element: 1, 3, 4 or 16.
+  // `components` numbers an element: 1, 2, 3, 4 or 16.
   template <class T>
   int accessor(const std::vector<T>& values, int components, bool with_bounds = false) {
     constexpr int type_of_number = std::is_same_v<T, float>           ? 5126
@@ -120,6 +121,7 @@ class Gltf {
                {"componentType", type_of_number},
                {"count", values.size() / std::size_t(components)},
                {"type", components == 1   ? "SCALAR"
+                        : components == 2 ? "VEC2"
                         : components == 3 ? "VEC3"
                         : components == 4 ? "VEC4"
                                           : "MAT4"}};
@@ -138,6 +140,22 @@ class Gltf {
   int accessor_alone(const std::vector<T>& values, int components, Target target, bool with_bounds = false) {
     begin_view(target);
     return accessor(values, components, with_bounds);
+  }
+
+  // A file as it is; returns the number of a texture that shows it.
+  int texture(const ImageFile& image) {
+    begin_view(none);
+    bytes_ += image.bytes;
+    document["bufferViews"].back()["byteLength"] = image.bytes.size();
+    bytes_.resize((bytes_.size() + 3) / 4 * 4);
+    const char* type = extension_of_image(image.bytes) == ".png" ? "image/png" : "image/jpeg";
+    const int source = add(
+        "images",
+        {{"name", image.name}, {"bufferView", document.at("bufferViews").size() - 1}, {"mimeType", type}});
+    constexpr int linear = 9729, linear_mipmap_linear = 9987;
+    if (!document.contains("samplers"))
+      add("samplers", {{"magFilter", linear}, {"minFilter", linear_mipmap_linear}});
+    return add("textures", {{"sampler", 0}, {"source", source}});
   }
 
   std::string binary() {
@@ -210,38 +228,80 @@ class Writer {
     return roots_.back();
   }
 
+  int material(const std::string& name, const Vec3& color, int texture, int normal_texture) {
+    const render::MeshLook look;
+    Json surface{{"baseColorFactor", {color.x(), color.y(), color.z(), 1}},
+                 {"metallicFactor", look.metallic},
+                 {"roughnessFactor", look.roughness}};
+    if (texture >= 0) surface["baseColorTexture"] = {{"index", texture}};
+    Json made{{"name", name}, {"doubleSided", true}, {"pbrMetallicRoughness", surface}};
+    if (normal_texture >= 0) made["normalTexture"] = {{"index", normal_texture}};
+    return gltf_.add("materials", made);
+  }
+
+  // The plain one first, −1 where nothing is plain; then those of the appearance.
+  std::vector<int> materials(const scenes::BodySpec& spec, const Appearance& appearance) {
+    const auto& of_triangle = appearance.material_from_triangle;
+    const bool some_plain =
+        appearance.empty() || std::find(of_triangle.begin(), of_triangle.end(), -1) != of_triangle.end();
+    std::vector<int> made{some_plain ? material(spec.name, render::linear_from_srgb(spec.color_srgb), -1, -1)
+                                     : -1};
+    std::vector<int> textures;
+    for (const ImageFile& image : appearance.images) textures.push_back(gltf_.texture(image));
+    const auto texture_of = [&](int image) { return image < 0 ? -1 : textures[std::size_t(image)]; };
+    for (const SurfaceMaterial& m : appearance.materials)
+      made.push_back(material(m.name, m.color, texture_of(m.image), texture_of(m.normal_image)));
+    return made;
+  }
+
   int mesh(int b) {
     const PreparedBody& prepared = motion_.bodies[std::size_t(b)];
     const scenes::BodySpec& spec = motion_.scene.bodies[std::size_t(b)];
+    const Appearance& appearance = appearance_shown(motion_, b);
     const SurfaceMesh surface{surface_at_rest(motion_.world.bodies[std::size_t(b)], prepared),
                               prepared.surface.triangles};
-    const Vec3 color = render::linear_from_srgb(spec.color_srgb);
-    const render::MeshLook look;
-    const int material = gltf_.add("materials", {{"name", spec.name},
-                                                 {"doubleSided", true},
-                                                 {"pbrMetallicRoughness",
-                                                  {{"baseColorFactor", {color.x(), color.y(), color.z(), 1}},
-                                                   {"metallicFactor", look.metallic},
-                                                   {"roughnessFactor", look.roughness}}}});
     Points normals = vertex_normals(surface.positions, surface.triangles);
     for (Eigen::Index v = 0; v < normals.rows(); ++v)
       if (normals.row(v).isZero()) normals.row(v) << 0, 0, 1;  // glTF wants unit vectors
-    Json attributes{{"POSITION", gltf_.accessor_alone(floats_of(y_up(surface.positions)), 3,
-                                                      Gltf::vertex_attributes, true)},
-                    {"NORMAL", gltf_.accessor_alone(floats_of(y_up(normals)), 3, Gltf::vertex_attributes)}};
+    SplitAtSeams split;
+    if (appearance.empty()) {
+      split.triangles = surface.triangles;
+      for (int v = 0; v < surface.positions.rows(); ++v) split.vertex_from_row.push_back(v);
+    } else {
+      split = split_at_seams(surface, appearance);
+    }
+    const std::vector<int>& rows = split.vertex_from_row;
+    Json attributes{
+        {"POSITION", gltf_.accessor_alone(floats_of(Points(y_up(surface.positions)(rows, Eigen::all))), 3,
+                                          Gltf::vertex_attributes, true)},
+        {"NORMAL", gltf_.accessor_alone(floats_of(Points(y_up(normals)(rows, Eigen::all))), 3,
+                                        Gltf::vertex_attributes)}};
+    if (split.uv.rows() > 0) {
+      split.uv.col(1) = 1 - split.uv.col(1).array();  // glTF's begins at the top
+      attributes["TEXCOORD_0"] = gltf_.accessor_alone(floats_of(split.uv), 2, Gltf::vertex_attributes);
+    }
+    if (split.colors.rows() > 0)
+      attributes["COLOR_0"] = gltf_.accessor_alone(floats_of(split.colors), 3, Gltf::vertex_attributes);
     if (motion_.world.bodies[std::size_t(b)].moving &&
         motion_.world.bodies[std::size_t(b)].kind == fem::BodyKind::deformable)
-      add_weights(b, attributes);
-    const std::vector<std::uint32_t> corners(surface.triangles.data(),
-                                             surface.triangles.data() + surface.triangles.size());
-    return gltf_.add("meshes", {{"name", spec.name},
-                                {"primitives",
-                                 {{{"attributes", attributes},
-                                   {"indices", gltf_.accessor_alone(corners, 1, Gltf::vertex_indices)},
-                                   {"material", material}}}}});
+      add_weights(b, rows, attributes);
+
+    const std::vector<int> made = materials(spec, appearance);
+    Json primitives = Json::array();
+    for (int m = -1; m < int(appearance.materials.size()); ++m) {
+      std::vector<std::uint32_t> corners;
+      for (Eigen::Index t = 0; t < split.triangles.rows(); ++t)
+        if (appearance.empty() || appearance.material_from_triangle[std::size_t(t)] == m)
+          for (int c = 0; c < 3; ++c) corners.push_back(std::uint32_t(split.triangles(t, c)));
+      if (corners.empty()) continue;
+      primitives.push_back({{"attributes", attributes},
+                            {"indices", gltf_.accessor_alone(corners, 1, Gltf::vertex_indices)},
+                            {"material", made[std::size_t(m + 1)]}});
+    }
+    return gltf_.add("meshes", {{"name", spec.name}, {"primitives", primitives}});
   }
 
-  void add_weights(int b, Json& attributes) {
+  void add_weights(int b, const std::vector<int>& rows, Json& attributes) {
     const PreparedBody& prepared = motion_.bodies[std::size_t(b)];
     const ffd::Binding& binding = prepared.binding;
     const std::string& name = motion_.scene.bodies[std::size_t(b)].name;
@@ -254,7 +314,7 @@ class Writer {
                       name, nodes, most));
     std::vector<std::uint16_t> joints;
     std::vector<float> weights;
-    for (Eigen::Index v = 0; v < binding.weights.rows(); ++v) {
+    for (const int v : rows) {
       Eigen::RowVector4d w = binding.weights.row(v).cwiseMax(0);
       w /= w.sum();
       for (int k = 0; k < 4; ++k) {

@@ -8,6 +8,7 @@
 #include <span>
 
 #include "core/error.h"
+#include "meshing/detail/looks.h"
 #include "meshing/detail/polygon_soup.h"
 #include "meshing/detail/text_scanner.h"
 #include "meshing/detail/triangulate.h"
@@ -98,6 +99,7 @@ PolygonSoup read_soup(const fs::path& path) {
   switch (kind.format) {
     case Format::obj:
       soup = detail::read_obj(bytes, file);
+      detail::read_materials(path, soup);
       break;
     case Format::off:
       soup = detail::read_off(bytes, file);
@@ -160,13 +162,14 @@ Defect blank_out_unusable(Points& positions) {
 
 struct Triangulated {
   Triangles triangles;
+  std::vector<detail::TriangleOrigin> origins;  // a triangle
   Defect n_gons;
   int lost_faces = 0;  // with a corner that has no place
 };
 
 Triangulated triangulated(const PolygonSoup& soup, const Points& positions) {
   Triangulated result;
-  std::vector<std::array<int, 3>> triangles;
+  std::vector<std::array<int, 3>> of_polygon;  // places of its corners
   for (int i = 0; i < soup.polygon_count(); ++i) {
     const std::span<const int> corners(soup.corners.data() + soup.first_corner[i],
                                        std::size_t(soup.first_corner[i + 1] - soup.first_corner[i]));
@@ -176,11 +179,23 @@ Triangulated triangulated(const PolygonSoup& soup, const Points& positions) {
     }
     if (corners.size() > 3 && ++result.n_gons.count <= 5)
       result.n_gons.places.push_back(fmt::format("face {} with {} corners", i, corners.size()));
-    detail::triangulate(positions, corners, triangles);
+    of_polygon.clear();
+    if (corners.size() == 3) {
+      of_polygon.push_back({0, 1, 2});
+    } else {
+      Points places(std::ssize(corners), 3);
+      std::vector<int> all(corners.size());
+      for (std::size_t c = 0; c < corners.size(); ++c)
+        places.row(Eigen::Index(c)) = positions.row(corners[c]), all[c] = int(c);
+      detail::triangulate(places, all, of_polygon);
+    }
+    const int first = soup.first_corner[i];
+    for (const auto& [a, b, c] : of_polygon) result.origins.push_back({i, {first + a, first + b, first + c}});
   }
-  result.triangles.resize(Eigen::Index(triangles.size()), 3);
-  for (std::size_t t = 0; t < triangles.size(); ++t)
-    result.triangles.row(Eigen::Index(t)) << triangles[t][0], triangles[t][1], triangles[t][2];
+  result.triangles.resize(std::ssize(result.origins), 3);
+  for (std::size_t t = 0; t < result.origins.size(); ++t)
+    for (int c = 0; c < 3; ++c)
+      result.triangles(Eigen::Index(t), c) = soup.corners[result.origins[t].corners[std::size_t(c)]];
   return result;
 }
 
@@ -223,16 +238,16 @@ void require_some_triangle(const PolygonSoup& soup, const Triangulated& faces, s
 }
 
 // Removes what a surface can do without and turns the rest the right way round.
-void mend(ImportedModel& model, double tolerance_m) {
-  auto& [mesh, found, left, mended, warnings] = model;
-  const int collapsed = drop_collapsed(mesh);
+void mend(ImportedModel& model, double tolerance_m, CornerMap* corners) {
+  auto& [mesh, appearance, found, left, mended, warnings] = model;
+  const int collapsed = drop_collapsed(mesh, corners);
   if (collapsed > 0)
     mended.push_back(counted(collapsed, "face", "faces") + " whose corners fall together dropped");
-  const int duplicates = drop_duplicates(mesh);
+  const int duplicates = drop_duplicates(mesh, corners);
   if (duplicates > 0)
     mended.push_back(counted(duplicates, "duplicate face", "duplicate faces") + " dropped, one of each kept");
 
-  const Orientation orientation = orient(mesh);
+  const Orientation orientation = orient(mesh, corners);
   if (orientation.turned_triangles > 0)
     mended.push_back(counted(orientation.turned_triangles, "triangle", "triangles") +
                      " turned to agree with their neighbours");
@@ -249,7 +264,7 @@ void mend(ImportedModel& model, double tolerance_m) {
     warnings.push_back(counted(orientation.one_sided, "piece is", "pieces are") +
                        " one-sided, like a Möbius strip: left as in the file");
 
-  const Flattened flat = remove_flat(mesh, tolerance_m);
+  const Flattened flat = remove_flat(mesh, tolerance_m, corners);
   if (flat.flipped > 0)
     mended.push_back(counted(flat.flipped, "face", "faces") +
                      " without area merged into a neighbour, the surface is the same");
@@ -267,6 +282,10 @@ ImportedModel finish(const PolygonSoup& soup, const ImportOptions& options, cons
   Triangulated faces = triangulated(soup, mesh.positions);
   require_some_triangle(soup, faces, unusable.count, file);
   mesh.triangles = std::move(faces.triangles);
+  const Appearance looks = detail::appearance_of(soup, faces.origins, model.warnings);
+  faces.origins = {};
+  CornerMap corners;
+  if (!looks.empty()) corners = same_corners(mesh.triangles.rows());
   if (unusable)
     model.warnings.push_back(fmt::format("{} and {} at them dropped, the first: {}",
                                          counted(unusable.count, "infinite vertex", "infinite vertices"),
@@ -288,12 +307,14 @@ ImportedModel finish(const PolygonSoup& soup, const ImportOptions& options, cons
   model.found.duplicate_vertices = std::move(duplicate);
   model.found.isolated_vertices = std::move(isolated);
 
-  mend(model, tolerance_m);
+  mend(model, tolerance_m, looks.empty() ? nullptr : &corners);
   if (mesh.triangles.rows() == 0)
     throw InputError(
         fmt::format("{}: none of its {} triangles has an area; is the model flattened, or the scale wrong?",
                     file, model.found.triangles));
   drop_unused(mesh);
+  model.appearance = carried(looks, corners);
+  model.appearance.drop_unused();
   if (const std::int64_t unused = model.found.isolated_vertices.count; unused > 0) {
     model.mended.push_back(counted(unused, "vertex", "vertices") + " in no face dropped");
     if (unused * 10 > model.found.vertices)
@@ -324,7 +345,10 @@ ImportedModel finish(const PolygonSoup& soup, const ImportOptions& options, cons
 }  // namespace
 
 ImportedModel import_model(const fs::path& path, const ImportOptions& options) {
-  return finish(read_soup(path), options, path.filename().string());
+  const PolygonSoup soup = read_soup(path);
+  ImportedModel model = finish(soup, options, path.filename().string());
+  detail::read_images(path, soup, model.appearance, model.warnings);
+  return model;
 }
 
 const std::vector<std::string>& model_endings() {

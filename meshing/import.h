@@ -3,6 +3,7 @@
 // docs/import.md
 #pragma once
 
+#include "core/appearance.h"
 #include "meshing/defects.h"
 
 namespace limber::meshing {
@@ -16,6 +17,7 @@ struct ImportOptions {
 
 struct ImportedModel {
   SurfaceMesh surface;                // validate() holds; welded, oriented, no duplicate or degenerate face
+  Appearance appearance;              // of `surface`, as the file has it; its images are not looked into here
   Defects found;                      // in the file, before mending; vertex numbers are the file's, from 0
   Defects left;                       // in `surface`
   std::vector<std::string> mended;    // what was done, as sentences

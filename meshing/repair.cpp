@@ -25,12 +25,19 @@ bool collapsed(const Triangles& triangles, int t) {
 }
 
 // Keeps the triangles for which keep[t]; returns how many went.
-int keep_triangles(SurfaceMesh& mesh, const std::vector<char>& keep) {
+int keep_triangles(SurfaceMesh& mesh, const std::vector<char>& keep, CornerMap* corners) {
   int kept = 0;
-  for (int t = 0; t < mesh.triangles.rows(); ++t)
-    if (keep[t]) mesh.triangles.row(kept++) = mesh.triangles.row(t).eval();
+  for (int t = 0; t < mesh.triangles.rows(); ++t) {
+    if (!keep[t]) continue;
+    if (corners) {
+      corners->triangle[kept] = corners->triangle[t];
+      corners->weights.middleRows<3>(3 * kept) = corners->weights.middleRows<3>(3 * t).eval();
+    }
+    mesh.triangles.row(kept++) = mesh.triangles.row(t).eval();
+  }
   const int dropped = int(mesh.triangles.rows()) - kept;
   mesh.triangles.conservativeResize(kept, 3);
+  if (corners) corners->triangle.resize(kept), corners->weights.conservativeResize(3 * kept, 3);
   return dropped;
 }
 
@@ -130,13 +137,13 @@ double thinness(const SurfaceMesh& mesh, int t) {
   return longest > 0 && !collapsed(mesh.triangles, t) ? (b - a).cross(c - a).norm() / longest : 0;
 }
 
-int drop_collapsed(SurfaceMesh& mesh) {
+int drop_collapsed(SurfaceMesh& mesh, CornerMap* corners) {
   std::vector<char> keep(std::size_t(mesh.triangles.rows()));
   for (int t = 0; t < mesh.triangles.rows(); ++t) keep[t] = !collapsed(mesh.triangles, t);
-  return keep_triangles(mesh, keep);
+  return keep_triangles(mesh, keep, corners);
 }
 
-int drop_duplicates(SurfaceMesh& mesh) {
+int drop_duplicates(SurfaceMesh& mesh, CornerMap* corners) {
   std::vector<std::array<int, 4>> faces;  // sorted corners, then the triangle
   for (int t = 0; t < mesh.triangles.rows(); ++t) {
     faces.push_back({mesh.triangles(t, 0), mesh.triangles(t, 1), mesh.triangles(t, 2), t});
@@ -146,7 +153,7 @@ int drop_duplicates(SurfaceMesh& mesh) {
   std::vector<char> keep(faces.size(), true);
   for (std::size_t i = 1; i < faces.size(); ++i)
     if (std::equal(faces[i].begin(), faces[i].begin() + 3, faces[i - 1].begin())) keep[faces[i][3]] = false;
-  return keep_triangles(mesh, keep);
+  return keep_triangles(mesh, keep, corners);
 }
 
 namespace {
@@ -162,9 +169,22 @@ std::span<const EdgeUse> uses_of(const std::vector<EdgeUse>& uses, int a, int b)
   return {begin, end};
 }
 
+// t is now (a b d) and n (b c d), where n was (a c d), with the corner of a at `side`; b lies on a–c. All
+// that is seen there was n's.
+void carry_flip(const SurfaceMesh& mesh, int a, int b, int c, int t, int n, int side, CornerMap& corners) {
+  const Vec3 pa = mesh.positions.row(a), pc = mesh.positions.row(c), pb = mesh.positions.row(b);
+  const double share = std::clamp((pb - pa).dot(pc - pa) / (pc - pa).squaredNorm(), 0., 1.);
+  using Row = Eigen::RowVector3d;
+  const Row of_a = corners.weights.row(3 * n + side), of_c = corners.weights.row(3 * n + (side + 1) % 3),
+            of_d = corners.weights.row(3 * n + (side + 2) % 3), of_b = (1 - share) * of_a + share * of_c;
+  corners.triangle[t] = corners.triangle[n];
+  corners.weights.middleRows<3>(3 * t) << of_a, of_b, of_d;
+  corners.weights.middleRows<3>(3 * n) << of_b, of_c, of_d;
+}
+
 // One pass over the flat triangles, each with its neighbour on its longest side; returns how many were
 // flipped.
-int flip_flat(SurfaceMesh& mesh, double tolerance_m) {
+int flip_flat(SurfaceMesh& mesh, double tolerance_m, CornerMap* corners) {
   const std::vector<EdgeUse> uses = detail::edge_uses(mesh.triangles);
   std::vector<char> changed(std::size_t(mesh.triangles.rows()), false);
   std::set<std::array<int, 2>> new_edges;
@@ -193,6 +213,7 @@ int flip_flat(SurfaceMesh& mesh, double tolerance_m) {
       mesh.triangles.row(t) = old_t, mesh.triangles.row(n) = old_n;
       continue;
     }
+    if (corners) carry_flip(mesh, a, b, c, t, n, other.side, *corners);
     changed[t] = changed[n] = true;
     new_edges.insert(new_edge);
     ++flipped;
@@ -202,17 +223,17 @@ int flip_flat(SurfaceMesh& mesh, double tolerance_m) {
 
 }  // namespace
 
-Flattened remove_flat(SurfaceMesh& mesh, double tolerance_m) {
+Flattened remove_flat(SurfaceMesh& mesh, double tolerance_m, CornerMap* corners) {
   Flattened done;
   // A row of flat triangles along one side is unrolled from the outside, one a pass.
   for (int pass = 0; pass < 50; ++pass) {
-    const int flipped = flip_flat(mesh, tolerance_m);
+    const int flipped = flip_flat(mesh, tolerance_m, corners);
     if (flipped == 0) break;
     done.flipped += flipped;
   }
   std::vector<char> keep(std::size_t(mesh.triangles.rows()));
   for (int t = 0; t < mesh.triangles.rows(); ++t) keep[t] = thinness(mesh, t) > tolerance_m;
-  done.dropped = keep_triangles(mesh, keep);
+  done.dropped = keep_triangles(mesh, keep, corners);
   return done;
 }
 
@@ -273,10 +294,13 @@ Pieces agreeing_pieces(const Triangles& triangles) {
   return pieces;
 }
 
-void turn(SurfaceMesh& mesh, int t) { std::swap(mesh.triangles(t, 1), mesh.triangles(t, 2)); }
+void turn(SurfaceMesh& mesh, int t, CornerMap* corners) {
+  std::swap(mesh.triangles(t, 1), mesh.triangles(t, 2));
+  if (corners) corners->weights.row(3 * t + 1).swap(corners->weights.row(3 * t + 2));
+}
 
 // Turns the smaller part, by area, of each piece; leaves one-sided ones alone.
-void make_pieces_agree(SurfaceMesh& mesh, const Pieces& pieces, Orientation& done) {
+void make_pieces_agree(SurfaceMesh& mesh, const Pieces& pieces, CornerMap* corners, Orientation& done) {
   const int n = int(mesh.triangles.rows());
   std::vector<double> area_to_turn(std::size_t(n), 0.0), area_of_all(std::size_t(n), 0.0);
   for (int t = 0; t < n; ++t) {
@@ -290,7 +314,7 @@ void make_pieces_agree(SurfaceMesh& mesh, const Pieces& pieces, Orientation& don
     if (pieces.one_sided[p]) {
       done.one_sided += t == p;
     } else if (bool(pieces.turned[t]) != (2 * area_to_turn[p] > area_of_all[p])) {
-      turn(mesh, t);
+      turn(mesh, t, corners);
       ++done.turned_triangles;
     }
   }
@@ -458,10 +482,10 @@ class Nest {
 
 }  // namespace
 
-Orientation orient(SurfaceMesh& mesh) {
+Orientation orient(SurfaceMesh& mesh, CornerMap* corners) {
   Orientation done;
   const Pieces pieces = agreeing_pieces(mesh.triangles);
-  make_pieces_agree(mesh, pieces, done);
+  make_pieces_agree(mesh, pieces, corners, done);
 
   std::vector<Solid> solids = solids_of(mesh, pieces);
   if (solids.empty()) return done;
@@ -490,13 +514,13 @@ Orientation orient(SurfaceMesh& mesh) {
     }
     if (!turned[i]) continue;
     turned_area += solids[i].area;
-    for (const int triangle : solids[i].triangles) turn(mesh, triangle);
+    for (const int triangle : solids[i].triangles) turn(mesh, triangle, corners);
   }
   // A sheet does not show its outside; it goes with the larger part of the model.
   if (2 * turned_area > area)
     for (int i = judged; i < int(solids.size()); ++i) {
       turned[i] = true;
-      for (const int triangle : solids[i].triangles) turn(mesh, triangle);
+      for (const int triangle : solids[i].triangles) turn(mesh, triangle, corners);
     }
   done.turned_components = int(std::count(turned.begin(), turned.end(), true));
   return done;

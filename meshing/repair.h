@@ -1,8 +1,10 @@
 // The steps that make a triangle soup fit to compute with. None moves a vertex that stays. docs/import.md
+// Where a CornerMap is given, its rows go with the triangles.
 #pragma once
 
 #include <vector>
 
+#include "core/appearance.h"
 #include "core/mesh.h"
 
 namespace limber::meshing {
@@ -21,16 +23,17 @@ std::vector<int> weld(const Points&, double tolerance_m);
 double thinness(const SurfaceMesh&, int triangle);
 
 // Drops triangles that name a vertex twice. Returns how many.
-int drop_collapsed(SurfaceMesh&);
+int drop_collapsed(SurfaceMesh&, CornerMap* = nullptr);
 // Drops triangles with the vertices of an earlier one, whichever way round. Returns how many.
-int drop_duplicates(SurfaceMesh&);
+int drop_duplicates(SurfaceMesh&, CornerMap* = nullptr);
 
 struct Flattened {
   int flipped = 0;  // cut with the neighbour on the longest side by the quad's other diagonal
   int dropped = 0;  // where that was not possible
 };
-// Removes triangles thinner than tolerance_m. A flip keeps the surface where it is and watertight.
-Flattened remove_flat(SurfaceMesh&, double tolerance_m);
+// Removes triangles thinner than tolerance_m. A flip keeps the surface where it is and watertight; its
+// corners are those of the neighbour, for the flat triangle covered nothing.
+Flattened remove_flat(SurfaceMesh&, double tolerance_m, CornerMap* = nullptr);
 
 struct Orientation {
   int turned_triangles = 0;   // to agree with the larger part of their piece
@@ -43,7 +46,7 @@ struct Orientation {
 // outward. One inside another is turned with it, so that a model that is inside out as a whole comes out
 // right; if it then faces inward, and the winding number of the others round it is at least a half, it is a
 // cavity and stays. Open sheets keep the side they have, unless more than half of the surface is turned.
-Orientation orient(SurfaceMesh&);
+Orientation orient(SurfaceMesh&, CornerMap* = nullptr);
 
 // Drops vertices in no triangle; the others keep their order. Returns how many.
 int drop_unused(SurfaceMesh&);

@@ -58,25 +58,51 @@ void cut(const std::vector<Vec3>& points, const std::array<int, 3>& v, const std
   }
 }
 
+// Where the corners of a triangle were at the beginning: row i is of corner i.
+struct OldCorners {
+  int triangle;
+  Eigen::Matrix3d weights;
+};
+
+// Of a piece of the triangle that cut() was given.
+OldCorners of_piece(const std::array<int, 3>& piece, const std::array<int, 3>& v, const std::array<int, 3>& m,
+                    const OldCorners& whole) {
+  OldCorners of{whole.triangle, {}};
+  for (int i = 0; i < 3; ++i)
+    for (int k = 0; k < 3; ++k) {
+      if (piece[std::size_t(i)] == v[std::size_t(k)]) of.weights.row(i) = whole.weights.row(k);
+      if (piece[std::size_t(i)] == m[std::size_t(k)])
+        of.weights.row(i) = 0.5 * (whole.weights.row(k) + whole.weights.row((k + 1) % 3));
+    }
+  return of;
+}
+
 }  // namespace
 
 double longest_edge(const SurfaceMesh& surface, int tets, const SplitSettings& settings) {
   return settings.share * std::sqrt(area(surface)) / std::cbrt(double(tets));
 }
 
-SurfaceMesh split_long_edges(const SurfaceMesh& surface, double longest_m, const SplitSettings& settings) {
+SurfaceMesh split_long_edges(const SurfaceMesh& surface, double longest_m, const SplitSettings& settings,
+                             CornerMap* corners) {
   while (vertices_needed(surface, longest_m) > settings.most_new_vertices) longest_m *= 2;
   std::vector<Vec3> points;
   for (Eigen::Index i = 0; i < surface.positions.rows(); ++i) points.emplace_back(surface.positions.row(i));
   std::vector<std::array<int, 3>> triangles, cut_ones;
+  std::vector<OldCorners> old_corners,
+      old_corners_of_cut;  // of triangles and cut_ones, where they are wanted
   for (Eigen::Index i = 0; i < surface.triangles.rows(); ++i)
     triangles.push_back({surface.triangles(i, 0), surface.triangles(i, 1), surface.triangles(i, 2)});
+  for (int t = 0; corners && t < int(triangles.size()); ++t)
+    old_corners.push_back({t, Eigen::Matrix3d::Identity()});
 
   for (bool cut_some = true; cut_some; triangles.swap(cut_ones)) {
     std::map<Edge, int> middles;
     cut_ones.clear();
     cut_some = false;
-    for (const std::array<int, 3>& v : triangles) {
+    old_corners_of_cut.clear();
+    for (std::size_t t = 0; t < triangles.size(); ++t) {
+      const std::array<int, 3>& v = triangles[t];
       std::array<int, 3> m{-1, -1, -1};
       for (std::size_t k = 0; k < 3; ++k) {
         const int a = v[k], b = v[(k + 1) % 3];
@@ -85,13 +111,24 @@ SurfaceMesh split_long_edges(const SurfaceMesh& surface, double longest_m, const
         if (fresh) points.push_back(0.5 * (points[std::size_t(a)] + points[std::size_t(b)]));
         m[k] = at->second, cut_some = true;
       }
+      const std::size_t first = cut_ones.size();
       cut(points, v, m, cut_ones);
+      for (std::size_t i = first; corners && i < cut_ones.size(); ++i)
+        old_corners_of_cut.push_back(of_piece(cut_ones[i], v, m, old_corners[t]));
     }
+    old_corners.swap(old_corners_of_cut);
   }
   SurfaceMesh out{Points(points.size(), 3), Triangles(triangles.size(), 3)};
   for (std::size_t i = 0; i < points.size(); ++i) out.positions.row(Eigen::Index(i)) = points[i];
   for (std::size_t i = 0; i < triangles.size(); ++i)
     out.triangles.row(Eigen::Index(i)) << triangles[i][0], triangles[i][1], triangles[i][2];
+  if (!corners) return out;
+  corners->triangle.clear();
+  corners->weights.resize(3 * out.triangles.rows(), 3);
+  for (const OldCorners& old : old_corners) {
+    corners->weights.middleRows<3>(3 * Eigen::Index(corners->triangle.size())) = old.weights;
+    corners->triangle.push_back(old.triangle);
+  }
   return out;
 }
 

@@ -2,6 +2,7 @@
 // leave the body that is simulated, and its contact: a box of twelve triangles could not bend at all.
 #pragma once
 
+#include "core/appearance.h"
 #include "core/mesh.h"
 
 namespace limber::meshing {
@@ -16,7 +17,8 @@ double longest_edge(const SurfaceMesh&, int tets, const SplitSettings& = {});
 
 // The same surface with edges cut at their middle until none is longer than `longest_m` > 0, or than its
 // least multiple by a power of two that makes no more than most_new_vertices. Vertices keep their numbers;
-// new ones follow, on the edges of the old.
-SurfaceMesh split_long_edges(const SurfaceMesh&, double longest_m, const SplitSettings& = {});
+// new ones follow, on the edges of the old. `corners`, where given, is overwritten.
+SurfaceMesh split_long_edges(const SurfaceMesh&, double longest_m, const SplitSettings& = {},
+                             CornerMap* corners = nullptr);
 
 }  // namespace limber::meshing

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 
+#include "core/appearance.h"
 #include "core/error.h"
 
 namespace limber::render {
@@ -66,7 +67,7 @@ Image8 filled(int width, int height, const Vec3& color_srgb) {
 double srgb_from_linear(double x) {
   return x <= 0.0031308 ? 12.92 * x : 1.055 * std::pow(x, 1 / 2.4) - 0.055;
 }
-double linear_from_srgb(double x) { return x <= 0.04045 ? x / 12.92 : std::pow((x + 0.055) / 1.055, 2.4); }
+double linear_from_srgb(double x) { return limber::linear_from_srgb(x); }
 Vec3 linear_from_srgb(const Vec3& color) {
   return color.unaryExpr([](double x) { return linear_from_srgb(x); });
 }

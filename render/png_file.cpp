@@ -225,6 +225,8 @@ std::optional<PngInfo> inspect_png(const fs::path& path) {
   }
 }
 
+std::optional<PngInfo> inspect_png_bytes(std::string_view bytes) { return inspect(bytes); }
+
 std::optional<std::string> frame_hash(const fs::path& path) {
   const auto info = inspect_png(path);
   if (!info || !info->texts.contains("limber-hash")) return std::nullopt;

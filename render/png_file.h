@@ -4,6 +4,7 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <string_view>
 
 #include "core/file.h"
 #include "render/image.h"
@@ -33,6 +34,7 @@ struct PngInfo {
 };
 // Walks all chunks and their checksums without decoding. nullopt: missing, not a PNG, cut short, or damaged.
 std::optional<PngInfo> inspect_png(const fs::path&);
+std::optional<PngInfo> inspect_png_bytes(std::string_view);  // the same of what a file holds
 
 // What the frame shows, as text "limber-hash" says: how a resumed run knows a good frame. nullopt also when
 // it does not say.

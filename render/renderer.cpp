@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <map>
 #include <numbers>
 #include <span>
 #include <utility>
@@ -17,6 +18,7 @@
 #include "render/detail/gl_context.h"
 #include "render/detail/grain.h"
 #include "render/detail/ground_shade.h"
+#include "render/detail/image_on_card.h"
 #include "render/detail/layer_lists.h"
 #include "render/detail/line_quads.h"
 #include "render/detail/mesh_on_card.h"
@@ -40,8 +42,10 @@ constexpr double sky_spreads[] = {0.5, 1.6};
 struct Mesh {
   MeshLook look;
   MeshOnCard card;
-  Points colors = {};              // linear; empty: the look's
-  Eigen::VectorXd occlusion = {};  // empty: none
+  Points colors = {};                                        // linear; empty: the look's
+  Eigen::VectorXd occlusion = {};                            // empty: none
+  std::vector<SurfaceMaterial> materials = {};               // empty: no appearance
+  std::vector<ImageOnCard> images = {}, normal_images = {};  // a material; 0: none
 
   bool transparent() const { return look.opacity < 1; }
   bool drawn() const { return look.seen && look.opacity > 0; }
@@ -181,7 +185,9 @@ struct Renderer::Impl {
 
   std::vector<Plane> planes_of(const Mesh&) const;
   // Programs for what is drawn next, with all their uniforms.
-  const Program& use_mesh(const Mesh&, const std::string& defines);
+  const Program& use_mesh(const Mesh&, const std::string& defines, const DrawnMesh::Batch* = nullptr);
+  template <class WithProgram>
+  void draw_mesh(const Mesh&, const std::string& defines, const WithProgram&);
   void use_depth(const Mat4& clip_from, const std::vector<Plane>&);
   bool has_veils() const;
   // Checks the number, and that there is a value for each of its vertices.
@@ -384,9 +390,32 @@ void Renderer::Impl::use_depth(const Mat4& clip_from, const std::vector<Plane>& 
   set_planes(p, planes);
 }
 
-const Program& Renderer::Impl::use_mesh(const Mesh& mesh, const std::string& defines) {
+namespace {
+
+// The color that a part of a mesh has, all in all.
+struct Paint {
+  Vec3 color;  // linear
+  const ImageOnCard *image = nullptr, *normal_image = nullptr;
+  Vec3 mean() const { return image ? Vec3(color.cwiseProduct(image->mean)) : color; }
+};
+Paint paint_of(const Mesh& mesh, const DrawnMesh::Batch* batch) {
+  if (!batch || batch->material < 0) return {linear_from_srgb(mesh.look.color_srgb)};
+  const auto m = std::size_t(batch->material);
+  const auto made = [](const ImageOnCard& image) { return image.texture.id ? &image : nullptr; };
+  return {mesh.materials[m].color, made(mesh.images[m]), made(mesh.normal_images[m])};
+}
+
+}  // namespace
+
+const Program& Renderer::Impl::use_mesh(const Mesh& mesh, const std::string& defines,
+                                        const DrawnMesh::Batch* batch) {
   const std::vector<Plane> planes = planes_of(mesh);
   std::string all = plane_defines(planes) + defines;
+  const Paint paint = paint_of(mesh, batch);
+  if (batch) all += "#define PAINTED\n";
+  if (paint.image) all += "#define IMAGE\n";
+  if (paint.normal_image) all += "#define NORMAL_IMAGE\n";
+  if (batch && batch->material >= 0 && !mesh.card.drawn().colors.empty()) all += "#define CORNER_COLORS\n";
   if (mesh.card.tinted()) all += "#define TINTED\n";
   if (mesh.translucent()) all += "#define TRANSLUCENT\n";
   if (mesh.grained()) all += "#define GRAINED\n";
@@ -431,7 +460,7 @@ const Program& Renderer::Impl::use_mesh(const Mesh& mesh, const std::string& def
   p.set("sheet", int(mesh.look.sheet));
   p.set("sheen", mesh.look.sheen);
   if (mesh.translucent()) {
-    const Vec3 albedo = linear_from_srgb(mesh.look.color_srgb);
+    const Vec3 albedo = paint.mean();
     const Vec3 reach = Vec3::Constant(0.3) + 0.7 * albedo / std::max(albedo.maxCoeff(), 1e-3);
     p.set("translucency", mesh.look.translucency);
     p.set("scatter", Vec3(mesh.look.scatter_m / shadow_depth_m * reach));
@@ -446,8 +475,32 @@ const Program& Renderer::Impl::use_mesh(const Mesh& mesh, const std::string& def
     p.set("grain_map", 4);
     targets.grain(mesh.look.woven).bind(4);
   }
+  if (batch) p.set("paint", paint.color);
+  if (paint.image) {
+    p.set("image", 5);
+    paint.image->texture.bind(5);
+  }
+  if (paint.normal_image) {
+    p.set("normal_image", 6);
+    paint.normal_image->texture.bind(6);
+  }
   p.set("object", int(&mesh - meshes.data()));
   return p;
+}
+
+// Material after material, each by a program that is given to with_program first.
+template <class WithProgram>
+void Renderer::Impl::draw_mesh(const Mesh& mesh, const std::string& defines,
+                               const WithProgram& with_program) {
+  const std::vector<DrawnMesh::Batch>& batches = mesh.card.drawn().batches;
+  if (batches.empty()) {
+    with_program(use_mesh(mesh, defines));
+    mesh.card.draw();
+  }
+  for (const DrawnMesh::Batch& batch : batches) {
+    with_program(use_mesh(mesh, defines, &batch));
+    mesh.card.draw(batch.first_corner, batch.corners);
+  }
 }
 
 // Drawn with its edges over it, a surface stands back by as much as its depth changes over half the width of
@@ -481,8 +534,7 @@ void Renderer::Impl::draw_opaque(bool passes) {
   for (Mesh& mesh : meshes) {
     if (!mesh.look.seen || mesh.transparent()) continue;
     stand_back_for_edges(mesh, look.multisampling ? 1 : look.supersampling);
-    use_mesh(mesh, passes ? "#define PASSES\n" : "");
-    mesh.card.draw();
+    draw_mesh(mesh, passes ? "#define PASSES\n" : "", [](const Program&) {});
   }
   glDisable(GL_POLYGON_OFFSET_FILL);
   plane_defines({});
@@ -528,8 +580,7 @@ void Renderer::Impl::draw_veils() {
     for (const Mesh& mesh : meshes) {
       if (!mesh.drawn() || !mesh.transparent()) continue;
       stand_back_for_edges(mesh, look.multisampling ? 1 : look.supersampling);
-      lists.set_uniforms(use_mesh(mesh, samples + veiled));
-      mesh.card.draw();
+      draw_mesh(mesh, samples + veiled, [&](const Program& program) { lists.set_uniforms(program); });
     }
     glDisable(GL_POLYGON_OFFSET_FILL);
     plane_defines({});
@@ -685,11 +736,29 @@ Renderer::Renderer(const Look& look) {
 }
 Renderer::~Renderer() = default;
 
-int Renderer::add_mesh(const Triangles& triangles, const Points& rest_positions, const MeshLook& look) {
+int Renderer::add_mesh(const Triangles& triangles, const Points& rest_positions, const MeshLook& look,
+                       const Appearance& appearance,
+                       const std::vector<std::shared_ptr<const Image8>>& images) {
   validate(look);
   limber::validate(SurfaceMesh{rest_positions, triangles}, fmt::format("mesh '{}'", look.name));
   impl_->context.make_current();
-  impl_->meshes.push_back({look, MeshOnCard(triangles, rest_positions, look.crease_angle_deg)});
+  if (!appearance.empty())
+    limber::validate(appearance, triangles.rows(), fmt::format("appearance of mesh '{}'", look.name));
+  LIMBER_CHECK(images.size() == appearance.images.size(), look.name, images.size(), appearance.images.size());
+  impl_->meshes.push_back({look, MeshOnCard(triangles, rest_positions, look.crease_angle_deg, appearance)});
+  Mesh& made = impl_->meshes.back();
+  made.materials = appearance.materials;
+  std::map<std::pair<int, bool>, ImageOnCard> on_card;  // an image once, as colors and as numbers
+  const auto put = [&](int image, bool colors) {
+    if (image < 0) return ImageOnCard{};
+    const auto [at, fresh] = on_card.try_emplace({image, colors});
+    if (fresh) at->second = image_on_card(*images[std::size_t(image)], colors);
+    return at->second;
+  };
+  for (const SurfaceMaterial& material : made.materials) {
+    made.images.push_back(put(material.image, true));
+    made.normal_images.push_back(put(material.normal_image, false));
+  }
   if (impl_->meshes.back().grained()) impl_->meshes.back().card.set_rest(rest_positions);
   return int(impl_->meshes.size()) - 1;
 }
@@ -726,7 +795,7 @@ void Renderer::set_positions(int number, const Points& positions, const Points& 
 
 void Renderer::set_colors(int number, const Points& colors_srgb) {
   Mesh& mesh = impl_->mesh_with(number, colors_srgb.rows(), true);
-  LIMBER_CHECK(colors_srgb.allFinite(), mesh.look.name);
+  LIMBER_CHECK(colors_srgb.allFinite() && mesh.card.drawn().batches.empty(), mesh.look.name);
   mesh.colors = colors_srgb.unaryExpr([](double c) { return linear_from_srgb(c); });
   tint(mesh);
 }

@@ -6,6 +6,7 @@
 #include <optional>
 #include <string>
 
+#include "core/appearance.h"
 #include "core/mesh.h"
 #include "render/camera.h"
 #include "render/image.h"
@@ -105,11 +106,16 @@ class Renderer {
 
   // Returns the mesh's number. It is shown at rest until set_positions. Throws InputError on a bad mesh or
   // look.
-  int add_mesh(const Triangles&, const Points& rest_positions, const MeshLook&);
+  // `appearance` takes the place of the look's color, but for triangles without a material; `images` are its
+  // own, decoded.
+  int add_mesh(const Triangles&, const Points& rest_positions, const MeshLook&,
+               const Appearance& appearance = {},
+               const std::vector<std::shared_ptr<const Image8>>& images = {});
   // normals (V × 3) are unit vectors, or empty: then computed. At creases they are always computed.
   void set_positions(int mesh, const Points& positions, const Points& normals = {});
 
   // One colour a vertex (V × 3, sRGB), in linear light in between; empty: the look's colour again.
+  // Not of a mesh with an appearance.
   void set_colors(int mesh, const Points& colors_srgb);
   // The share of the sky that each vertex does not see, 0 … 1, as occlusion.h finds it. It darkens the light
   // of sky and ground, not the key light. Empty: none.

@@ -479,6 +479,7 @@ BodySpec read_body(const Node& table, const Box& bounds) {
   body.max_stretch = maybe_number(table, "max_stretch");
   body.model = read_model(child(table, "model"), what);
   body.color_srgb = read_body_color(table, body.role);
+  body.texture = table.find("texture") ? flag(table, "texture") : !table.find("color");
   body.opacity = number(table, "opacity");
   body.look = table.find("look")                                            ? read_look(text(table, "look"))
               : body.kind == Kind::deformable && body.role != Role::scenery ? BodyLook::rubber

@@ -130,6 +130,7 @@ struct BodySpec {
   FixedSpec fixed;
   Vec3 velocity_m_s = Vec3::Zero(), angular_velocity_rad_s = Vec3::Zero();  // at the start
   Vec3 color_srgb = Vec3::Zero();                                           // 0 … 1
+  bool texture = true;  // the model's own colors are shown, where it has some
   BodyLook look = BodyLook::plain;
   double opacity = 1, roughness = 0.45, metallic = 0;
   int triangles = 0;  // scenery: its surface is simplified to about so many; 0: as it is

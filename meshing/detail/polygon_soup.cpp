@@ -30,6 +30,12 @@ void PolygonSoup::add_corner(int vertex) {
 
 void PolygonSoup::end_polygon() { first_corner.push_back(int(corners.size())); }
 
+int PolygonSoup::add_image(NamedImage image) {
+  const auto [at, fresh] = image_from_path.try_emplace(image.path, int(images.size()));
+  if (fresh) images.push_back(std::move(image));
+  return at->second;
+}
+
 void PolygonSoup::note_single_precision() {
   double farthest = 0;
   for (const Vec3& p : positions)

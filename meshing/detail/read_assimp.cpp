@@ -1,3 +1,5 @@
+#include <assimp/GltfMaterial.h>
+#include <assimp/material.h>
 #include <assimp/mesh.h>
 #include <assimp/scene.h>
 
@@ -5,6 +7,7 @@
 #include <assimp/Importer.hpp>
 #include <cmath>
 #include <cstring>
+#include <limits>
 #include <sstream>
 
 #include "core/error.h"
@@ -19,11 +22,61 @@ namespace {
 constexpr int cpu_seconds = 60;
 // A few nested instances can ask for more triangles than any memory holds.
 constexpr std::size_t most_vertices = 100'000'000;
+constexpr std::size_t most_embedded_bytes = 256 << 20;  // of all images within the file
 
 Eigen::Matrix4d matrix_of(const aiMatrix4x4& m) {
   Eigen::Matrix4d matrix;
   matrix << m.a1, m.a2, m.a3, m.a4, m.b1, m.b2, m.b3, m.b4, m.c1, m.c2, m.c3, m.c4, m.d1, m.d2, m.d3, m.d4;
   return matrix;
+}
+
+// Its color and images; those within the file come with their bytes.
+SurfaceMaterial material_of(const aiScene& scene, const aiMaterial& from, PolygonSoup& soup,
+                            std::size_t& embedded_bytes) {
+  SurfaceMaterial material{.name = from.GetName().C_Str()};
+  aiColor4D color(1, 1, 1, 1);
+  if (from.Get(AI_MATKEY_BASE_COLOR, color) != aiReturn_SUCCESS) from.Get(AI_MATKEY_COLOR_DIFFUSE, color);
+  material.color = Vec3(color.r, color.g, color.b);
+  const auto image = [&](std::initializer_list<aiTextureType> kinds) {
+    for (const aiTextureType kind : kinds) {
+      aiString path;
+      if (from.GetTexture(kind, 0, &path) != aiReturn_SUCCESS || path.length == 0) continue;
+      NamedImage named{.path = path.C_Str(), .bytes = {}};
+      if (const aiTexture* within = scene.GetEmbeddedTexture(path.C_Str())) {
+        if (within->mHeight != 0) {
+          soup.warnings.push_back("an image within the file is no PNG or JPEG, and is left out");
+          return -1;
+        }
+        const bool known = soup.has_image(named.path);
+        if (!known && (embedded_bytes += within->mWidth) > most_embedded_bytes) {
+          soup.warnings.push_back("the images within the file are larger than 256 MiB together; left out");
+          return -1;
+        }
+        if (!known) named.bytes.assign(reinterpret_cast<const char*>(within->pcData), within->mWidth);
+      }
+      return soup.add_image(std::move(named));
+    }
+    return -1;
+  };
+  material.image = image({aiTextureType_BASE_COLOR, aiTextureType_DIFFUSE});
+  material.normal_image = image({aiTextureType_NORMALS, aiTextureType_NORMAL_CAMERA});
+  return material;
+}
+
+// All corners have the coordinates of their vertex.
+void add_looks(const aiMesh& mesh, PolygonSoup& soup) {
+  const std::size_t before = soup.positions.size() - mesh.mNumVertices;
+  constexpr double none = std::numeric_limits<double>::quiet_NaN();
+  if (mesh.HasTextureCoords(0)) {
+    soup.uvs.resize(before, Eigen::Vector2d(none, none));
+    for (unsigned v = 0; v < mesh.mNumVertices; ++v)
+      soup.uvs.emplace_back(mesh.mTextureCoords[0][v].x, mesh.mTextureCoords[0][v].y);
+  }
+  if (mesh.HasVertexColors(0)) {
+    soup.vertex_colors.resize(before, Vec3::Ones());
+    for (unsigned v = 0; v < mesh.mNumVertices; ++v)
+      soup.vertex_colors.emplace_back(mesh.mColors[0][v].r, mesh.mColors[0][v].g, mesh.mColors[0][v].b);
+  }
 }
 
 void add_mesh(const aiMesh& mesh, const Eigen::Matrix4d& world_from_mesh, PolygonSoup& soup,
@@ -39,6 +92,7 @@ void add_mesh(const aiMesh& mesh, const Eigen::Matrix4d& world_from_mesh, Polygo
     const double rounding = stretch * 0x1p-24 * std::max({std::abs(p.x), std::abs(p.y), std::abs(p.z)});
     if (std::isfinite(rounding)) soup.rounding = std::max(soup.rounding, rounding);
   }
+  add_looks(mesh, soup);
   const bool mirrored = world_from_mesh.topLeftCorner<3, 3>().determinant() < 0;
   for (unsigned f = 0; f < mesh.mNumFaces; ++f) {
     const aiFace& face = mesh.mFaces[f];
@@ -54,6 +108,8 @@ void add_mesh(const aiMesh& mesh, const Eigen::Matrix4d& world_from_mesh, Polygo
       soup.add_corner(first + int(corner));
     }
     soup.end_polygon();
+    soup.polygon_material.push_back(mesh.mMaterialIndex < soup.materials.size() ? int(mesh.mMaterialIndex)
+                                                                                : -1);
   }
 }
 
@@ -64,6 +120,9 @@ PolygonSoup soup_of(const aiScene& scene) {
   };
   PolygonSoup soup;
   int lines_and_points = 0;
+  std::size_t embedded_bytes = 0;
+  for (unsigned m = 0; m < scene.mNumMaterials; ++m)
+    soup.materials.push_back(material_of(scene, *scene.mMaterials[m], soup, embedded_bytes));
   std::vector<Visit> stack;
   if (scene.mRootNode) stack.push_back({scene.mRootNode, Eigen::Matrix4d::Identity()});
   while (!stack.empty()) {
@@ -77,16 +136,21 @@ PolygonSoup soup_of(const aiScene& scene) {
     for (unsigned c = visit.node->mNumChildren; c-- > 0;)
       stack.push_back({visit.node->mChildren[c], world_from_node});
   }
+  if (!soup.uvs.empty()) {
+    constexpr double none = std::numeric_limits<double>::quiet_NaN();
+    soup.uvs.resize(soup.positions.size(), Eigen::Vector2d(none, none));
+    soup.corner_uv = soup.corners;
+  }
+  if (!soup.vertex_colors.empty()) soup.vertex_colors.resize(soup.positions.size(), Vec3::Ones());
   if (lines_and_points > 0)
     soup.warnings.push_back(fmt::format("{} lines and points were left out", lines_and_points));
   return soup;
 }
 
-template <class T>
-void append(std::string& bytes, const std::vector<T>& values) {
+void append(std::string& bytes, const auto& values) {  // a vector or a text
   const std::uint64_t size = values.size();
   bytes.append(reinterpret_cast<const char*>(&size), sizeof size);
-  bytes.append(reinterpret_cast<const char*>(values.data()), sizeof(T) * values.size());
+  bytes.append(reinterpret_cast<const char*>(values.data()), sizeof values[0] * values.size());
 }
 template <class T>
 std::vector<T> taken(std::string_view& bytes) {
@@ -98,14 +162,29 @@ std::vector<T> taken(std::string_view& bytes) {
   return values;
 }
 
+std::string text(std::string_view& bytes) {
+  const std::vector<char> letters = taken<char>(bytes);
+  return {letters.begin(), letters.end()};
+}
+
 std::string bytes_of(const PolygonSoup& soup) {
   std::string bytes;
   append(bytes, soup.positions);
   append(bytes, soup.corners);
   append(bytes, soup.first_corner);
   append(bytes, std::vector<double>{soup.rounding});
-  for (const std::string& warning : soup.warnings)
-    append(bytes, std::vector<char>(warning.begin(), warning.end()));
+  append(bytes, soup.uvs);
+  append(bytes, soup.corner_uv);
+  append(bytes, soup.vertex_colors);
+  append(bytes, soup.polygon_material);
+  append(bytes, std::vector<std::uint64_t>{soup.materials.size(), soup.images.size()});
+  for (const SurfaceMaterial& m : soup.materials) {
+    append(bytes, m.name);
+    append(bytes, std::vector<double>{m.color.x(), m.color.y(), m.color.z()});
+    append(bytes, std::vector<int>{m.image, m.normal_image});
+  }
+  for (const NamedImage& image : soup.images) append(bytes, image.path), append(bytes, image.bytes);
+  for (const std::string& warning : soup.warnings) append(bytes, warning);
   return bytes;
 }
 PolygonSoup soup_from(std::string_view bytes) {
@@ -114,10 +193,25 @@ PolygonSoup soup_from(std::string_view bytes) {
   soup.corners = taken<int>(bytes);
   soup.first_corner = taken<int>(bytes);
   soup.rounding = taken<double>(bytes).front();
-  while (!bytes.empty()) {
-    const std::vector<char> warning = taken<char>(bytes);
-    soup.warnings.emplace_back(warning.begin(), warning.end());
+  soup.uvs = taken<Eigen::Vector2d>(bytes);
+  soup.corner_uv = taken<int>(bytes);
+  soup.vertex_colors = taken<Vec3>(bytes);
+  soup.polygon_material = taken<int>(bytes);
+  const std::vector<std::uint64_t> counts = taken<std::uint64_t>(bytes);
+  for (std::uint64_t m = 0; m < counts[0]; ++m) {
+    SurfaceMaterial& material = soup.materials.emplace_back();
+    material.name = text(bytes);
+    const std::vector<double> color = taken<double>(bytes);
+    material.color = Vec3(color[0], color[1], color[2]);
+    const std::vector<int> images = taken<int>(bytes);
+    material.image = images[0], material.normal_image = images[1];
   }
+  for (std::uint64_t i = 0; i < counts[1]; ++i) {
+    NamedImage image{.path = text(bytes), .bytes = {}};
+    image.bytes = text(bytes);
+    soup.add_image(std::move(image));
+  }
+  while (!bytes.empty()) soup.warnings.push_back(text(bytes));
   return soup;
 }
 

@@ -200,25 +200,62 @@ void add_strips(const std::vector<int>& strip_vertices, PolygonSoup& soup) {
   }
 }
 
+// Which of the three parts of a color a property is, −1: none. Whole numbers count from 0 to their largest.
+int color_channel(const Property& property) {
+  constexpr std::array<std::array<std::string_view, 2>, 3> names{
+      {{"red", "diffuse_red"}, {"green", "diffuse_green"}, {"blue", "diffuse_blue"}}};
+  for (int c = 0; c < 3; ++c)
+    for (const std::string_view name : names[std::size_t(c)])
+      if (property.name == name && !property.length_type) return c;
+  return -1;
+}
+double full_scale(Type type) {
+  switch (type) {
+    case Type::i8:
+      return 127;
+    case Type::u8:
+      return 255;
+    case Type::i16:
+      return 32767;
+    case Type::u16:
+      return 65535;
+    case Type::i32:
+      return 2147483647;
+    case Type::u32:
+      return 4294967295;
+    case Type::f32:
+    case Type::f64:
+      return 1;
+  }
+  return 1;
+}
+
 void read_vertices(const Element& element, Values& values, PolygonSoup& soup, const std::string& file) {
   const std::array<std::string_view, 3> axes{"x", "y", "z"};
   for (const std::string_view axis : axes)
     if (std::none_of(element.properties.begin(), element.properties.end(),
                      [&](const Property& p) { return p.name == axis && !p.length_type; }))
       throw InputError(fmt::format("{}: the vertices of this PLY have no property \"{}\"", file, axis));
+  std::vector<int> channel_of;  // of each property
+  for (const Property& property : element.properties) channel_of.push_back(color_channel(property));
+  const auto has = [&](int c) { return std::count(channel_of.begin(), channel_of.end(), c) == 1; };
+  const bool colored = has(0) && has(1) && has(2);
   for (std::int64_t v = 0; v < element.count; ++v) {
     values.begin(element.name, v, element.count);
-    Vec3 position = Vec3::Zero();
-    for (const Property& property : element.properties) {
+    Vec3 position = Vec3::Zero(), color = Vec3::Ones();
+    for (std::size_t i = 0; i < element.properties.size(); ++i) {
+      const Property& property = element.properties[i];
       if (property.length_type) {
-        for (std::int64_t i = list_length(property, values); i > 0; --i) values.next(property.type);
+        for (std::int64_t n = list_length(property, values); n > 0; --n) values.next(property.type);
         continue;
       }
       const double value = values.next(property.type);
+      if (channel_of[i] >= 0) color[channel_of[i]] = linear_from_srgb(value / full_scale(property.type));
       for (int axis = 0; axis < 3; ++axis)
         if (property.name == axes[axis]) position[axis] = value;
     }
     soup.add_position(position);
+    if (colored) soup.vertex_colors.push_back(color);
   }
   if (values.binary() &&
       std::all_of(element.properties.begin(), element.properties.end(), [&](const Property& p) {

@@ -81,6 +81,13 @@ std::string_view TextScanner::next_word() {
   return word;
 }
 
+std::string_view TextScanner::rest_of_line() {
+  std::string_view rest = rest_of_line_;
+  rest_of_line_ = {};
+  rest.remove_prefix(std::min(rest.find_first_not_of(blanks), rest.size()));
+  return rest.substr(0, rest.find_last_not_of(blanks) + 1);
+}
+
 double TextScanner::next_number(const char* what) {
   const std::string_view word = next_word();
   double value = 0;

@@ -24,8 +24,9 @@ class TextScanner {
   // `comment` starts a comment that ends with the line; 0: there are none. Both must outlive the scanner.
   TextScanner(std::string_view text, std::string_view file, char comment);
 
-  bool next_line();              // to the next line that holds a word; false at the end of the text
-  std::string_view next_word();  // of this line; empty at its end
+  bool next_line();                 // to the next line that holds a word; false at the end of the text
+  std::string_view next_word();     // of this line; empty at its end
+  std::string_view rest_of_line();  // without the blanks round it; then the line is used up
   double next_number(const char* what);
   std::int64_t next_integer(const char* what);
 

@@ -2,7 +2,9 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <map>
 #include <numbers>
 #include <numeric>
 
@@ -96,8 +98,55 @@ std::vector<int> smoothing_groups(const Triangles& triangles, const Points& posi
 
 }  // namespace
 
-DrawnMesh order_for_drawing(const Triangles& triangles, const Points& rest_positions,
-                            double crease_angle_deg) {
+namespace {
+
+// What a vertex shows; corners that show something else are copies of it.
+using Shown = std::array<float, 5>;
+Shown shown_at(const Appearance& a, Eigen::Index corner) {
+  Shown shown{};
+  if (a.uv.rows() > 0) shown[0] = float(a.uv(corner, 0)), shown[1] = float(a.uv(corner, 1));
+  if (a.colors.rows() > 0)
+    for (int c = 0; c < 3; ++c) shown[std::size_t(2 + c)] = float(a.colors(corner, c));
+  return shown;
+}
+
+// `order`: of the triangles, sorted by material.
+void split_at_seams(const std::vector<int>& order, const Appearance& a, DrawnMesh& mesh) {
+  std::vector<Shown> shown(mesh.vertex_from_drawn.size());
+  std::vector<char> seen(shown.size(), false);
+  std::map<std::pair<std::uint32_t, Shown>, std::uint32_t> copies;
+  for (std::size_t i = 0; i < mesh.corners.size(); ++i) {
+    std::uint32_t& drawn = mesh.corners[i];
+    const Shown here = shown_at(a, 3 * Eigen::Index(order[i / 3]) + Eigen::Index(i % 3));
+    if (!seen[drawn]) shown[drawn] = here, seen[drawn] = true;
+    if (shown[drawn] == here) continue;
+    const auto [at, fresh] = copies.try_emplace({drawn, here}, std::uint32_t(shown.size()));
+    if (fresh) {
+      mesh.seam_copies.push_back(int(drawn));
+      mesh.vertex_from_drawn.push_back(mesh.vertex_from_drawn[drawn]);
+      mesh.at_crease.push_back(mesh.at_crease[drawn]);
+      shown.push_back(here), seen.push_back(true);
+    }
+    drawn = at->second;
+  }
+  for (const Shown& s : shown) {
+    if (a.uv.rows() > 0) mesh.uv.insert(mesh.uv.end(), {s[0], s[1]});
+    for (std::size_t c = 2; c < 5 && a.colors.rows() > 0; ++c)
+      mesh.colors.push_back(std::uint16_t(65535 * std::clamp(s[c], 0.f, 1.f) + 0.5f));
+    if (a.colors.rows() > 0) mesh.colors.push_back(65535);
+  }
+  for (std::size_t t = 0; t < order.size(); ++t) {
+    const int material = a.material_from_triangle[std::size_t(order[t])];
+    if (mesh.batches.empty() || mesh.batches.back().material != material)
+      mesh.batches.push_back({material, 3 * t, 0});
+    mesh.batches.back().corners += 3;
+  }
+}
+
+}  // namespace
+
+DrawnMesh order_for_drawing(const Triangles& triangles, const Points& rest_positions, double crease_angle_deg,
+                            const Appearance& appearance) {
   const bool split = crease_angle_deg < 180;
   const std::vector<int> group =
       split ? smoothing_groups(triangles, rest_positions, crease_angle_deg) : std::vector<int>();
@@ -106,7 +155,13 @@ DrawnMesh order_for_drawing(const Triangles& triangles, const Points& rest_posit
   mesh.corners.reserve(std::size_t(3 * triangles.rows()));
   std::vector<int> drawn_from_key(split ? group.size() : std::size_t(rest_positions.rows()), -1);
   std::vector<int> copies(std::size_t(rest_positions.rows()), 0);
-  for (const int t : triangles_along_morton_curve(triangles, rest_positions))
+  std::vector<int> order = triangles_along_morton_curve(triangles, rest_positions);
+  if (!appearance.empty())
+    std::stable_sort(order.begin(), order.end(), [&](int a, int b) {
+      return appearance.material_from_triangle[std::size_t(a)] <
+             appearance.material_from_triangle[std::size_t(b)];
+    });
+  for (const int t : order)
     for (int i = 0; i < 3; ++i) {
       const int vertex = triangles(t, i);
       int& drawn = drawn_from_key[split ? group[3 * t + i] : vertex];
@@ -122,6 +177,7 @@ DrawnMesh order_for_drawing(const Triangles& triangles, const Points& rest_posit
     if (mesh.at_crease[mesh.corners[3 * t]] || mesh.at_crease[mesh.corners[3 * t + 1]] ||
         mesh.at_crease[mesh.corners[3 * t + 2]])
       mesh.crease_triangles.push_back(t);
+  if (!appearance.empty()) split_at_seams(order, appearance, mesh);
   mesh.positions.resize(3 * mesh.vertex_from_drawn.size());
   mesh.normals.resize(3 * mesh.vertex_from_drawn.size());
   return mesh;
@@ -140,11 +196,16 @@ void deform(DrawnMesh& mesh, const Points& positions, const Points& normals) {
     else
       drawn_normals.row(d).setZero();
 
+  const Eigen::Index own = count - std::ssize(mesh.seam_copies);
   const auto add_area_vector = [&](int t) {
-    const std::uint32_t* c = &mesh.corners[std::size_t(3 * t)];
-    const auto p = [&](int i) { return Vec3(positions.row(mesh.vertex_from_drawn[c[i]])); };
+    std::array<std::uint32_t, 3> c;
+    for (std::size_t i = 0; i < 3; ++i) {
+      c[i] = mesh.corners[std::size_t(3 * t) + i];
+      if (c[i] >= own) c[i] = std::uint32_t(mesh.seam_copies[c[i] - std::size_t(own)]);
+    }
+    const auto p = [&](std::size_t i) { return Vec3(positions.row(mesh.vertex_from_drawn[c[i]])); };
     const Vec3f area = (p(1) - p(0)).cross(p(2) - p(0)).cast<float>();
-    for (int i = 0; i < 3; ++i)
+    for (std::size_t i = 0; i < 3; ++i)
       if (!given || mesh.at_crease[c[i]]) drawn_normals.row(c[i]) += area;
   };
   if (given)
@@ -156,6 +217,8 @@ void deform(DrawnMesh& mesh, const Points& positions, const Points& normals) {
       const float length = drawn_normals.row(d).norm();
       if (length > 0) drawn_normals.row(d) /= length;
     }
+  for (Eigen::Index d = own; d < count; ++d)
+    drawn_normals.row(d) = drawn_normals.row(mesh.seam_copies[std::size_t(d - own)]);
 }
 
 }  // namespace limber::render::detail

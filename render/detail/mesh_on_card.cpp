@@ -9,7 +9,7 @@ namespace limber::render::detail {
 
 namespace {
 
-enum Attribute : GLuint { at_position, at_normal, at_tint, at_scalar, at_rest };
+enum Attribute : GLuint { at_position, at_normal, at_tint, at_scalar, at_rest, at_uv, at_color };
 
 GLuint new_attribute(GLuint array, Attribute attribute, GLint components, GLenum type) {
   GLuint buffer = 0;
@@ -29,8 +29,9 @@ void upload(GLuint buffer, const Values& values) {
 
 }  // namespace
 
-MeshOnCard::MeshOnCard(const Triangles& triangles, const Points& rest_positions, double crease_angle_deg)
-    : drawn_(order_for_drawing(triangles, rest_positions, crease_angle_deg)),
+MeshOnCard::MeshOnCard(const Triangles& triangles, const Points& rest_positions, double crease_angle_deg,
+                       const Appearance& appearance)
+    : drawn_(order_for_drawing(triangles, rest_positions, crease_angle_deg, appearance)),
       vertices_(rest_positions.rows()) {
   glGenVertexArrays(1, &array_);
   position_buffer_ = new_attribute(array_, at_position, 3, GL_FLOAT);
@@ -40,6 +41,8 @@ MeshOnCard::MeshOnCard(const Triangles& triangles, const Points& rest_positions,
   glBindBuffer(GL_ELEMENT_ARRAY_BUFFER, corners);
   glBufferData(GL_ELEMENT_ARRAY_BUFFER, GLsizeiptr(drawn_.corners.size() * sizeof drawn_.corners[0]),
                drawn_.corners.data(), GL_STATIC_DRAW);
+  if (!drawn_.uv.empty()) upload(new_attribute(array_, at_uv, 2, GL_FLOAT), drawn_.uv);
+  if (!drawn_.colors.empty()) upload(new_attribute(array_, at_color, 4, GL_UNSIGNED_SHORT), drawn_.colors);
   set_positions(rest_positions, {});
 }
 

@@ -12,7 +12,7 @@ namespace limber::render::detail {
 
 class MeshOnCard {
  public:
-  MeshOnCard(const Triangles&, const Points& rest_positions, double crease_angle_deg);
+  MeshOnCard(const Triangles&, const Points& rest_positions, double crease_angle_deg, const Appearance& = {});
 
   void set_positions(const Points& positions, const Points& normals);
   // Linear colour and the share of the sky that is open, per row of the positions, (V × 4).

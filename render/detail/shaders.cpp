@@ -38,6 +38,14 @@ layout(location = 4) in vec3 rest_in;
 uniform float grains_a_metre;
 out vec3 rest;                   // in wavelengths of the grain's texture
 #endif
+#if defined IMAGE || defined NORMAL_IMAGE
+layout(location = 5) in vec2 uv_in;
+out vec2 uv;
+#endif
+#ifdef CORNER_COLORS
+layout(location = 6) in vec4 color_in;
+out vec3 corner_color;
+#endif
 uniform mat4 clip_from_world;
 uniform mat4 shadow_from_world;
 uniform vec3 toward_key;
@@ -63,6 +71,12 @@ void main() {
 #ifdef GRAINED
   rest = grains_a_metre * rest_in;
 #endif
+#if defined IMAGE || defined NORMAL_IMAGE
+  uv = uv_in;
+#endif
+#ifdef CORNER_COLORS
+  corner_color = color_in.rgb;
+#endif
 #if PLANES > 0
   for (int i = 0; i < PLANES; ++i) gl_ClipDistance[i] = dot(planes[i], vec4(position_in, 1.0));
 #endif
@@ -75,9 +89,26 @@ const char* const mesh_fragment_shader = R"(
 in vec3 position, normal, shadow_place;
 #ifdef TINTED
 in vec4 tint;                    // colour, and the share of the sky that is open
+#endif
+#ifdef PAINTED
+uniform vec3 paint;              // times the image and the corners' colours
+vec3 albedo;
+#elif defined TINTED
 #define albedo tint.rgb
 #else
 uniform vec3 albedo;
+#endif
+#if defined IMAGE || defined NORMAL_IMAGE
+in vec2 uv;
+#endif
+#ifdef IMAGE
+uniform sampler2D image;
+#endif
+#ifdef NORMAL_IMAGE
+uniform sampler2D normal_image;
+#endif
+#ifdef CORNER_COLORS
+in vec3 corner_color;
 #endif
 #ifdef PASSES
 in float scalar;
@@ -161,6 +192,22 @@ float key_visibility(vec3 n) {
 }
 #endif
 
+#ifdef NORMAL_IMAGE
+// The frame of the image on the surface from screen derivatives (Schüler, Normal mapping without precomputed tangents,
+// ShaderX5, 2006): across is the way in which u grows and v does not.
+vec3 bent_by_image(vec3 n) {
+  vec3 across = dFdx(position), upward = dFdy(position);
+  vec2 uv_across = dFdx(uv), uv_upward = dFdy(uv);
+  vec3 a = cross(upward, n), b = cross(n, across);
+  float side = dot(across, a) < 0.0 ? -1.0 : 1.0;
+  vec3 along_u = side * (a * uv_across.x + b * uv_upward.x), along_v = side * (a * uv_across.y + b * uv_upward.y);
+  float scale = inversesqrt(max(max(dot(along_u, along_u), dot(along_v, along_v)), 1e-30));
+  vec3 m = 2.0 * texture(normal_image, uv).xyz - 1.0;
+  m.xy *= gl_FrontFacing ? scale : -scale;
+  return normalize(m.x * along_u + m.y * along_v + max(m.z, 0.05) * n);
+}
+#endif
+
 #ifdef GRAINED
 // Bump mapping unparametrized surfaces on the GPU (Mikkelsen 2010), its heights' derivatives by the chain rule.
 vec3 bent(vec3 n) {
@@ -178,6 +225,18 @@ vec3 bent(vec3 n) {
 void main() {
   vec3 n = normalize(normal) * (gl_FrontFacing ? 1.0 : -1.0);
   vec3 smooth_n = n;
+#ifdef PAINTED
+  albedo = paint;
+#endif
+#ifdef IMAGE
+  albedo *= texture(image, uv).rgb;
+#endif
+#ifdef CORNER_COLORS
+  albedo *= corner_color;
+#endif
+#ifdef NORMAL_IMAGE
+  n = bent_by_image(n);
+#endif
 #ifdef GRAINED
   n = bent(n);
 #endif

@@ -2,7 +2,8 @@
 // white, matt surface square to the key light sends.
 //
 // Defines of mesh and depth: PLANES (how many cut it). Of the mesh: TINTED (a colour a vertex and its open
-// share of the sky), TRANSLUCENT, GRAINED (has its place at rest), PASSES, FLAT_INSIDE. Of mesh and lines:
+// share of the sky), PAINTED (a color of its own for what is drawn), and with it CORNER_COLORS, IMAGE and
+// NORMAL_IMAGE, TRANSLUCENT, GRAINED (has its place at rest), PASSES, FLAT_INSIDE. Of mesh and lines:
 // VEILED (what is drawn goes into lists: layer_lists.h). How samples are read: SAMPLER, INTEGER_SAMPLER,
 // SAMPLES (a pixel), FETCH(sampler, pixel, i); of a texel, SAMPLES_A_TEXEL and SAMPLE (the one being drawn).
 #pragma once

@@ -186,6 +186,7 @@ const std::vector<Row> rows{
     {"bodies[].max_volume_change", "bodies.cart.max_volume_change=0.2", world},
     {"bodies[].max_stretch", "bodies.cart.max_stretch=3", world},
     {"bodies[].color", "bodies.cart.color=\"#123456\"", film},
+    {"bodies[].texture", "bodies.cart.texture=false", film, "film.color_by=body"},
     {"bodies[].opacity", "bodies.veil.opacity=0.5", film},
     {"bodies[].look", "bodies.veil.look=skin", film},
     {"bodies[].roughness", "bodies.veil.roughness=0.6", film},
@@ -318,18 +319,14 @@ const std::vector<Row> rows{
     {"film.frames_per_second", "film.frames_per_second=6", search | film},
     {"film.speed", "film.speed=0.5", search | film},
     {"film.pace", "film.pace=contact", film},
-    {"film.pace_range", "film.pace_range=[0.5, 1]", film, "film.pace=contact"},
     {"film.length_s", "film.length_s=0.5", film, "film.pace=contact"},
     {"film.look", "film.look=dark", film},
     {"film.outlines", "film.outlines=true", film},
-    {"film.inset", "film.inset={ camera = \"side\" }", film},
     {"film.inset.camera", "film.inset.camera=side", film, "film.inset={ camera = \"main\" }"},
     {"film.inset.size", "film.inset.size=0.4", film, "film.inset={ camera = \"side\" }"},
-    {"film.title", "film.title={ text = \"A\" }", film},
     {"film.title.text", "film.title.text=B", film, "film.title={ text = \"A\" }"},
     {"film.title.duration_s", "film.title.duration_s=1", film, "film.title={ text = \"A\" }"},
     {"film.title.ground", "film.title.ground=plain", film, "film.title={ text = \"A\" }"},
-    {"film.end_card", "film.end_card={ text = \"A\" }", film},
     {"film.end_card.text", "film.end_card.text=B", film, "film.end_card={ text = \"A\" }"},
     {"film.end_card.duration_s", "film.end_card.duration_s=1", film, "film.end_card={ text = \"A\" }"},
     {"film.end_card.ground", "film.end_card.ground=plain", film, "film.end_card={ text = \"A\" }"},
@@ -358,6 +355,7 @@ const std::map<std::string, std::string> elsewhere{
     {"motions[].body", "likewise says which bodies move: below"},
     {"cameras[].name", "names a film"},
     {"film.panes", "where a wall is pressed: Story_slow"},
+    {"film.pace_range", "where the robot is touched: Story_slow"},
     {"film.end", "says how many frames there are, not what is on them"},
     {"goal.box_m", "instead of radius_m: below"},
     {"goal.shape.cage", "a file: below"},
@@ -421,7 +419,10 @@ TEST_F(Keys_slow, ChangeWhatTheyShapeAndNothingElse) {
   const std::string file = scene(stage);
   ASSERT_EQ(limber_program({"plan", file, "-o", out(), "--iterations", "3", "-q"}).code, exit_no_plan);
   const PlanFolder planned = read_plan_folder(out());
-  const std::vector<PreparedBody> prepared = read_bodies_of(planned, out());
+  std::vector<PreparedBody> prepared = read_bodies_of(planned, out());
+  Appearance& of_cart = prepared[2].appearance;  // as if its model had a color of its own
+  of_cart.material_from_triangle.assign(std::size_t(prepared[2].surface.triangles.rows()), 0);
+  of_cart.materials = {{.name = "green", .color = Vec3(0, 1, 0)}};
   const std::vector<SurfaceMesh> scenery = read_scenery(planned.scene, out());
   struct Identities {
     std::vector<Json> bodies;

@@ -120,5 +120,21 @@ TEST_F(ModelList, AModelIsItsBytesAndThoseOfTheFilesThatItNames) {
   EXPECT_EQ(files_named_in(read_file(model), model).size(), 2u);
 }
 
+TEST_F(ModelList, AnObjIsItsMaterialsAndTheirImagesToo) {
+  const std::string model = file("m/x.obj", "mtllib my.mtl\nusemtl a\n");
+  std::set<std::string> seen{content_of_model(model).content};
+  const auto is_new = [&] { return seen.insert(content_of_model(model).content).second; };
+  file("m/skin.png", "1");
+  EXPECT_FALSE(is_new()) << "nothing names it";
+  file("m/my.mtl", "newmtl a\nmap_Kd -clamp on C:\\work\\skin.png\n");
+  EXPECT_TRUE(is_new());
+  file("m/skin.png", "2");
+  EXPECT_TRUE(is_new());
+  fs::remove(folder / "m/skin.png");
+  EXPECT_TRUE(is_new());
+  file("m/other.png", "1");
+  EXPECT_FALSE(is_new());
+}
+
 }  // namespace
 }  // namespace limber::app

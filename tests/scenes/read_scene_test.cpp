@@ -714,6 +714,7 @@ TEST(Keys, EveryKeyChangesTheScene) {
     if (key.path.starts_with("film.inset.")) sets = {"film.inset={ camera = \"side\" }"};
     for (const std::string_view card : {"film.title", "film.end_card"})
       if (key.parent() == card) sets = {fmt::format("{}={{ text = \"Before\" }}", card)};
+    if (key.path == "bodies[].texture") sets = {"bodies.robot.color=\"#123456\""};  // a color turns it off
     if (key.path == "bodies[].pose.axis") sets = {"bodies.robot.pose.angle_deg=90"};
     if (key.parent() == "bodies[].parts[]")
       sets = {key.name() == "box_m"
@@ -820,7 +821,8 @@ std::string all_of(const Scene& s) {
                      body.cage.shells, m.model, m.youngs_modulus_pa, m.poisson_ratio, m.density_kg_m3,
                      m.damping_ratio, m.friction, m.mesh_independent, v(body.pose.position_m),
                      v(body.pose.axis), body.pose.angle_deg, body.pose.anchor, v(body.color_srgb));
-    t += fmt::format(" {} {} {} {}", body.opacity, body.roughness, body.metallic, body.max_volume_change);
+    t += fmt::format(" {} {} {} {} {}", body.texture, body.opacity, body.roughness, body.metallic,
+                     body.max_volume_change);
     t += fmt::format(" {}", int(body.deformation));
     t += fmt::format(" {} {}", body.fixed.walls, body.max_stretch.value_or(-1));
     t += v(body.velocity_m_s) + v(body.angular_velocity_rad_s);

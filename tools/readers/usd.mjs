@@ -22,11 +22,14 @@ const meshes = [], points = [];
 for (let i = 0; i < stage.numMeshes(); ++i) {
   const mesh = stage.getMesh(i), fields = specs[mesh.absPath + ".points"].fields;
   const samples = fields.timeSamples ?? { times: [], values: [] };
-  meshes.push({ name: mesh.primName, count: mesh.points.length / 3, times: samples.times,
-    scheme: specs[mesh.absPath + ".subdivisionScheme"].fields.default,
-    corners: Array.from(specs[mesh.absPath + ".faceVertexIndices"].fields.default),
+  const corners = Array.from(specs[mesh.absPath + ".faceVertexIndices"].fields.default);
+  // TinyUSDZ parts vertices at the seams of coordinates and colors: back to those of the file, corner by corner.
+  const shown = new Float32Array(fields.timeSamples ? samples.values[0].length : fields.default.length);
+  corners.forEach((v, i) => shown.set(mesh.points.slice(3 * mesh.faceVertexIndices[i], 3 * mesh.faceVertexIndices[i] + 3), 3 * v));
+  meshes.push({ name: mesh.primName, count: shown.length / 3, times: samples.times,
+    scheme: specs[mesh.absPath + ".subdivisionScheme"].fields.default, corners,
     extents: specs[mesh.absPath + ".extent"].fields.timeSamples?.values ?? [specs[mesh.absPath + ".extent"].fields.default] });
-  points.push(Float32Array.from(mesh.points));
+  points.push(shown);
   for (const value of fields.timeSamples ? samples.values : [fields.default]) points.push(Float32Array.from(value));
 }
 fs.writeFileSync(out, Buffer.concat(points.map((p) => Buffer.from(p.buffer))));

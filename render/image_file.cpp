@@ -1,0 +1,172 @@
+#include "render/image_file.h"
+
+#include <cstdio>
+// after cstdio, which it needs
+#include <jpeglib.h>
+#include <png.h>
+
+#include <csetjmp>
+#include <cstring>
+
+#include "core/error.h"
+#include "render/png_file.h"
+
+namespace limber::render {
+
+namespace {
+
+constexpr int most_scans = 200;  // of a progressive JPEG; more only cost time
+constexpr long most_jpeg_memory = 1L << 30;
+
+// An honest file has a thousandth of a row's bytes at least (PNG, by deflate), or a bit for each of its
+// blocks (JPEG): what says that it is huge and is not takes no memory.
+constexpr std::int64_t most_pixels_a_byte_of_png = 8 * 1100, most_pixels_a_byte_of_jpeg = 8 * 64;
+
+void require_size(std::int64_t width, std::int64_t height, std::int64_t most_pixels_a_byte,
+                  const std::string& bytes, const std::string& name) {
+  if (width > most_image_side || height > most_image_side || width * height > most_image_pixels)
+    throw InputError(fmt::format("\"{}\" has {} × {} pixels; at most {} a side and {} in all can be shown",
+                                 name, width, height, most_image_side, most_image_pixels));
+  if (width * height / most_pixels_a_byte > std::ssize(bytes))
+    throw InputError(
+        fmt::format("\"{}\": {} bytes cannot hold {} × {} pixels", name, bytes.size(), width, height));
+}
+
+// ── PNG
+
+struct Source {
+  const std::string& file;
+  std::size_t at = 0;
+};
+void take(png_structp png, png_bytep bytes, png_size_t size) {
+  auto& source = *static_cast<Source*>(png_get_io_ptr(png));
+  if (size > source.file.size() - source.at) png_error(png, "is cut short");
+  std::memcpy(bytes, source.file.data() + source.at, size);
+  source.at += size;
+}
+[[noreturn]] void keep_message(png_structp png, png_const_charp message) {
+  std::strncpy(static_cast<char*>(png_get_error_ptr(png)), message, JMSG_LENGTH_MAX - 1);
+  png_longjmp(png, 1);
+}
+void no_warning(png_structp, png_const_charp) {}
+
+// libpng leaves an error by longjmp, so nothing with a destructor may live in here.
+bool decode_png(png_structp png, png_infop info, Source* source, Image8* image) {
+  if (setjmp(png_jmpbuf(png))) return false;
+  png_set_read_fn(png, source, take);
+  png_read_info(png, info);
+  png_set_expand(png);
+  png_set_scale_16(png);
+  png_set_strip_alpha(png);
+  png_set_gray_to_rgb(png);
+  const int passes = png_set_interlace_handling(png);
+  png_read_update_info(png, info);
+  const std::size_t stride = std::size_t(3) * std::size_t(image->width);
+  if (png_get_rowbytes(png, info) != stride) return false;
+  for (int pass = 0; pass < passes; ++pass)
+    for (int y = 0; y < image->height; ++y) png_read_row(png, &image->rgb[std::size_t(y) * stride], nullptr);
+  png_read_end(png, nullptr);
+  return true;
+}
+
+Image8 from_png(const std::string& bytes, const std::string& name) {
+  const std::optional<PngInfo> whole = inspect_png_bytes(bytes);
+  if (!whole) throw InputError(fmt::format("\"{}\" is a PNG that is cut short or damaged", name));
+  require_size(whole->width, whole->height, most_pixels_a_byte_of_png, bytes, name);
+  Image8 image{whole->width, whole->height,
+               std::vector<std::uint8_t>(3 * std::size_t(whole->width) * std::size_t(whole->height))};
+  char message[JMSG_LENGTH_MAX] = "";
+  png_structp png = png_create_read_struct(PNG_LIBPNG_VER_STRING, message, keep_message, no_warning);
+  png_infop info = png ? png_create_info_struct(png) : nullptr;
+  Source source{bytes};
+  const bool done = info && decode_png(png, info, &source, &image);
+  png_destroy_read_struct(&png, &info, nullptr);
+  if (!done) throw InputError(fmt::format("\"{}\" is a PNG that cannot be read ({})", name, message));
+  return image;
+}
+
+// ── JPEG
+
+struct Errors {
+  jpeg_error_mgr manager;  // the first, so that one pointer is the other
+  std::jmp_buf back;
+  char message[JMSG_LENGTH_MAX];
+};
+[[noreturn]] void leave(j_common_ptr jpeg) {
+  auto* errors = reinterpret_cast<Errors*>(jpeg->err);
+  errors->manager.format_message(jpeg, errors->message);
+  std::longjmp(errors->back, 1);
+}
+// What libjpeg only warns of and fills with grey, as where a file is cut short, is damage.
+void leave_at_warning(j_common_ptr jpeg, int level) {
+  if (level < 0) leave(jpeg);
+}
+struct Progress {
+  jpeg_progress_mgr manager;
+};
+void count_scans(j_common_ptr jpeg) {
+  if (reinterpret_cast<j_decompress_ptr>(jpeg)->input_scan_number > most_scans) {
+    jpeg->err->msg_code = 0;
+    leave(jpeg);
+  }
+}
+
+enum class Step { header, pixels };
+
+// As decode_png. The picture has its size after the header.
+bool decode_jpeg(jpeg_decompress_struct* jpeg, Errors* errors, Progress* progress, const std::string* bytes,
+                 Step step, Image8* image) {
+  if (setjmp(errors->back)) return false;
+  if (step == Step::header) {
+    jpeg_create_decompress(jpeg);
+    jpeg->mem->max_memory_to_use = most_jpeg_memory;
+    progress->manager.progress_monitor = count_scans;
+    jpeg->progress = &progress->manager;
+    jpeg_mem_src(jpeg, reinterpret_cast<const unsigned char*>(bytes->data()), bytes->size());
+    jpeg_read_header(jpeg, TRUE);
+    jpeg->out_color_space = JCS_RGB;
+    return true;
+  }
+  jpeg_start_decompress(jpeg);
+  const std::size_t stride = std::size_t(3) * std::size_t(image->width);
+  while (jpeg->output_scanline < jpeg->output_height) {
+    JSAMPROW row = &image->rgb[std::size_t(jpeg->output_scanline) * stride];
+    jpeg_read_scanlines(jpeg, &row, 1);
+  }
+  jpeg_finish_decompress(jpeg);
+  return true;
+}
+
+Image8 from_jpeg(const std::string& bytes, const std::string& name) {
+  jpeg_decompress_struct jpeg{};
+  Errors errors{};
+  Progress progress{};
+  jpeg.err = jpeg_std_error(&errors.manager);
+  errors.manager.error_exit = leave;
+  errors.manager.emit_message = leave_at_warning;
+  struct Ending {
+    jpeg_decompress_struct& jpeg;
+    ~Ending() { jpeg_destroy_decompress(&jpeg); }
+  } const ending{jpeg};
+  Image8 image;
+  const auto require = [&](bool done) {
+    if (!done)
+      throw InputError(fmt::format("\"{}\" is a JPEG that cannot be read ({})", name, errors.message));
+  };
+  require(decode_jpeg(&jpeg, &errors, &progress, &bytes, Step::header, &image));
+  require_size(jpeg.image_width, jpeg.image_height, most_pixels_a_byte_of_jpeg, bytes, name);
+  image = {int(jpeg.image_width), int(jpeg.image_height),
+           std::vector<std::uint8_t>(3 * std::size_t(jpeg.image_width) * std::size_t(jpeg.image_height))};
+  require(decode_jpeg(&jpeg, &errors, &progress, &bytes, Step::pixels, &image));
+  return image;
+}
+
+}  // namespace
+
+Image8 decoded_image(const std::string& bytes, const std::string& name) {
+  if (bytes.starts_with("\x89PNG")) return from_png(bytes, name);
+  if (bytes.starts_with("\xff\xd8")) return from_jpeg(bytes, name);
+  throw InputError(fmt::format("\"{}\" is neither PNG nor JPEG", name));
+}
+
+}  // namespace limber::render
