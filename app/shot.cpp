@@ -555,7 +555,8 @@ Json Shot::contacts_in_picture(int frame) const {
   for (const fem::ContactForce& touch : touches_[std::size_t(moment_of(frame))]) {
     if (!touches_robot(touch)) continue;
     const Vec3 pixel = render::pixel_from_world(camera, touch.place_m, look_.width, look_.height);
-    contacts.push_back({pixel.x(), pixel.y(), pixel.z(), touch.force_n.norm()});
+    const int toucher = touch.body == world_.robot ? touch.other : touch.body;
+    contacts.push_back({pixel.x(), pixel.y(), pixel.z(), touch.force_n.norm(), toucher + 1});
   }
   return contacts;
 }

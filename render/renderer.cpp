@@ -357,12 +357,15 @@ void Renderer::Impl::shade_ground_maps() {
   fill(targets.ground_sky_map, sky_shade.columns, sky_shade.rows, sky_shade.blocked.data());
 }
 
-// What is below the ground is cut off, too, where the eye sees it from above.
+// What is below the ground is cut off, too, where the eye sees it from above. The undersides of veils, which
+// are seen through them, stay whole where they stand on it and sink in a little.
 std::vector<Plane> Renderer::Impl::planes_of(const Mesh& mesh) const {
   std::vector<Plane> planes = clip_planes;
+  Plane plane = ground_plane;
+  if (mesh.transparent()) plane[3] += 0.005 * stage_box.size().norm();
   bool below = false;
-  for_corners(mesh.card.box(), [&](const Vec3& c) { below |= ground_plane.dot(c.homogeneous()) < 0; });
-  if (ground_seen && below) planes.push_back(ground_plane);
+  for_corners(mesh.card.box(), [&](const Vec3& c) { below |= plane.dot(c.homogeneous()) < 0; });
+  if (ground_seen && below) planes.push_back(plane);
   return planes;
 }
 

@@ -273,6 +273,7 @@ TEST_F(Story_slow, PassesTellWhereTheRobotIsTouched) {
       EXPECT_GT(contact.at(2), near);
       EXPECT_LT(contact.at(2), far);
       EXPECT_GT(contact.at(3), 0);
+      EXPECT_EQ(contact.at(4), 0);  // a wall
     }
   }
 }

@@ -902,6 +902,24 @@ TEST(Renderer, BadLooksAreRefused) {
   EXPECT_THROW(renderer.add_mesh(box.triangles, box.positions, {"box"}), InputError);
 }
 
+// Through a veil its underside is seen: whole, not in flecks, where that dips in and out of the ground.
+TEST(Renderer, AVeilsUndersideStaysWholeWhereItSinksIntoTheGround) {
+  Look look = small_look();
+  look.ground_height_m = 0;
+  look.stage = Box{Vec3(-2, -2, 0), Vec3(2, 2, 2)};
+  const auto middle = [&](std::optional<double> height) {
+    Renderer renderer(look);
+    if (height) {
+      const double z = *height;
+      const SurfaceMesh sheet = quad_mesh({-1, -1, z}, {1, -1, z}, {1, 1, z}, {-1, 1, z});
+      renderer.add_mesh(sheet.triangles, sheet.positions, {.opacity = 0.45, .casts_shadow = false});
+    }
+    return color(renderer.draw_shown(camera_from({0, -5, 4})), 160, 120);
+  };
+  EXPECT_GT((middle(0.01) - middle({})).norm(), 10);
+  EXPECT_LT((middle(-0.01) - middle(0.01)).norm(), 2);
+}
+
 TEST(Renderer, AnEmptyStageIsBackground) {
   const Image image = Renderer(small_look()).draw(camera_from({0, -5, 2}));
   EXPECT_EQ(covered_pixels(image), 0);
