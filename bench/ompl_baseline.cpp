@@ -26,15 +26,15 @@
 #include <chrono>
 #include <cmath>
 
-#include "app/bench.h"
-#include "app/frame_list.h"
-#include "app/plan_folder.h"
-#include "app/scene_world.h"
 #include "core/error.h"
 #include "core/hash.h"
 #include "core/log.h"
 #include "core/progress.h"
 #include "core/threads.h"
+#include "limber/detail/bench/bench.h"
+#include "limber/detail/film/frame_list.h"
+#include "limber/detail/plan/plan_folder.h"
+#include "limber/detail/world/scene_world.h"
 
 namespace limber::app {
 namespace {

@@ -7,11 +7,11 @@
 #include <cstdio>
 #include <cstdlib>
 
-#include "app/plan_folder.h"
-#include "app/scene_world.h"
 #include "core/log.h"
 #include "core/threads.h"
-#include "limber/detail/problem.h"
+#include "limber/detail/interface/problem.h"
+#include "limber/detail/plan/plan_folder.h"
+#include "limber/detail/world/scene_world.h"
 
 namespace {
 

@@ -1,10 +1,11 @@
-# limber_module(NAME SOURCES … [CGAL_SOURCES …] [USES module …] [LINKS target …] [OWNS include-prefix …])
+# limber_module(NAME SOURCES … [CGAL_SOURCES …] [USES module …] [OPENS module …] [LINKS target …]
+#               [OWNS include-prefix …])
 #
-# A static library limber_NAME. USES are the modules whose public headers it may include (core always); OWNS are the
-# prefixes of third-party headers that only this module's .cpp files may include. CGAL_SOURCES are compiled one at a
-# time. The ctest `layering` reads what is said here and every #include in the tree.
+# A static library limber_NAME. USES are the modules whose public headers it may include (core always), OPENS those
+# whose detail/ it may include, too; OWNS are the prefixes of third-party headers that only this module's .cpp files may
+# include. CGAL_SOURCES are compiled one at a time. The ctest `layering` reads what is said here and every #include in the tree.
 function(limber_module NAME)
-  cmake_parse_arguments(M "" "" "SOURCES;CGAL_SOURCES;USES;LINKS;OWNS" ${ARGN})
+  cmake_parse_arguments(M "" "" "SOURCES;CGAL_SOURCES;USES;OPENS;LINKS;OWNS" ${ARGN})
   add_library(limber_${NAME} STATIC ${M_SOURCES})
   if(M_CGAL_SOURCES)
     add_library(limber_${NAME}_cgal OBJECT ${M_CGAL_SOURCES})
@@ -24,6 +25,7 @@ function(limber_module NAME)
   target_link_libraries(limber_${NAME} PUBLIC ${M_LINKS})
   set_property(GLOBAL APPEND PROPERTY LIMBER_MODULES ${NAME})
   set_property(GLOBAL PROPERTY LIMBER_USES_${NAME} "${used}")
+  set_property(GLOBAL PROPERTY LIMBER_OPENS_${NAME} "${M_OPENS}")
   set_property(GLOBAL PROPERTY LIMBER_OWNS_${NAME} "${M_OWNS}")
 endfunction()
 
@@ -67,8 +69,9 @@ function(limber_write_module_map FILE)
   set(text "set(modules ${modules})\n")
   foreach(module ${modules})
     get_property(uses GLOBAL PROPERTY LIMBER_USES_${module})
+    get_property(opens GLOBAL PROPERTY LIMBER_OPENS_${module})
     get_property(owns GLOBAL PROPERTY LIMBER_OWNS_${module})
-    string(APPEND text "set(uses_${module} ${uses})\nset(owns_${module} ${owns})\n")
+    string(APPEND text "set(uses_${module} ${uses})\nset(opens_${module} ${opens})\nset(owns_${module} ${owns})\n")
   endforeach()
   file(GENERATE OUTPUT ${FILE} CONTENT "${text}")
 endfunction()

@@ -1,16 +1,16 @@
 #include "limber/mesh.h"
 
-#include "app/model_content.h"
-#include "app/prepare.h"
+#include "limber/detail/body/model_content.h"
+#include "limber/detail/body/prepare.h"
 #include "core/error.h"
 #include "core/hash.h"
 #include "core/json_text.h"
 #include "core/lock.h"
 #include "core/log.h"
 #include "core/mesh_files.h"
-#include "limber/detail/arrays.h"
-#include "limber/detail/body.h"
-#include "limber/detail/working_for.h"
+#include "limber/detail/interface/arrays.h"
+#include "limber/detail/interface/body.h"
+#include "limber/detail/interface/working_for.h"
 
 namespace limber {
 

@@ -2,9 +2,9 @@
 
 #include <algorithm>
 
-#include "app/commands.h"
+#include "limber/detail/commands.h"
 #include "core/error.h"
-#include "limber/detail/working_for.h"
+#include "limber/detail/interface/working_for.h"
 
 namespace limber {
 

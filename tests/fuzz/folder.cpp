@@ -2,10 +2,6 @@
 
 #include <fstream>
 
-#include "app/commands.h"
-#include "app/manifest.h"
-#include "app/plan_folder.h"
-#include "app/scene_world.h"
 #include "core/contact_shape_file.h"
 #include "core/hash.h"
 #include "core/log.h"
@@ -13,6 +9,10 @@
 #include "core/progress.h"
 #include "core/words.h"
 #include "ffd/binding_file.h"
+#include "limber/detail/commands.h"
+#include "limber/detail/plan/manifest.h"
+#include "limber/detail/plan/plan_folder.h"
+#include "limber/detail/world/scene_world.h"
 #include "meshing/contact_shape.h"
 #include "plan/plan_file.h"
 #include "tests/core/temporary_folder.h"

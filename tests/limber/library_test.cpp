@@ -6,7 +6,7 @@
 
 #include "core/mesh_files.h"
 #include "limber/limber.h"
-#include "tests/app/program.h"
+#include "tests/cli/program.h"
 
 namespace limber {
 namespace {

@@ -1,0 +1,520 @@
+// A scene to begin with, from a folder of models in one frame: what a producer of scenes edits further.
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+
+#include "core/error.h"
+#include "core/log.h"
+#include "core/progress.h"
+#include "imaging/label_map.h"
+#include "limber/detail/authoring/layout.h"
+#include "limber/detail/authoring/line_of_sight.h"
+#include "limber/detail/authoring/part_models.h"
+#include "limber/detail/commands.h"
+#include "limber/detail/world/scene_world.h"
+#include "meshing/cage.h"
+#include "meshing/contact_shape.h"
+#include "meshing/import.h"
+#include "scenes/anatomy.h"
+#include "scenes/models.h"
+#include "scenes/scene.h"
+
+namespace limber::app {
+
+namespace {
+
+constexpr const char* endings[] = {".obj", ".off", ".ply", ".stl", ".glb", ".gltf", ".dae", ".fbx"};
+
+constexpr int bone_tets = 500;
+// What is thinner, of its diagonal, is a sheet, as a diaphragm: no coarse cage is near it, so it is only
+// seen.
+constexpr double least_thickness = 0.02;
+// The largest of these shares of its true size is taken at which the organs come apart within that reach, a
+// share of all organs' diagonal.
+constexpr double scale_step = 0.05, least_scale = 0.3;
+constexpr double reach = 0.03;
+constexpr double room = 0.005;  // between two surfaces, as a share of the robot's size: so near they push
+// Good enough to part organs by; a plan takes the usual ones.
+constexpr meshing::ContactShapeSettings rough{.cells = 48, .most_cells = 64, .most_nodes = 300'000};
+constexpr int most_triangles_seen_through = 30'000;
+constexpr int points_looked_at = 150;  // of the robot
+
+struct Organ {
+  std::string name, file;
+  SurfaceMesh surface;  // as in the file
+  Box box;              // metres, in our axes, of its true size
+  double volume_m3 = 0, thickness_m = 0;
+  bool see_through = false, bone = false;
+  int pieces = 1;
+  // Of its true size and at its true place; none when seen through.
+  TetMesh cage;
+  std::shared_ptr<const ContactShape> shape;
+  Vec3 way_m = Vec3::Zero();  // from there
+};
+
+// Where a model of the folder is, at its true size.
+void to_our_frame(const NewSceneOptions& options, Points& positions) {
+  scenes::BodySpec body;
+  scenes::FileModel model;
+  model.scale = options.scale;
+  model.up = scenes::axis_named(options.up), model.front = scenes::axis_named(options.front);
+  body.model = model;
+  body.pose.anchor = "origin";
+  scenes::transform(scenes::world_from_model(body, positions, false), positions);
+}
+
+// Throws InputError where a name that was given is none of the folder's.
+void check_names(const NewSceneOptions& options, const std::vector<std::string>& names) {
+  for (const auto& [flag, list] : {std::pair("--only", &options.only),
+                                   {"--see-through", &options.see_through},
+                                   {"--rigid", &options.rigid}})
+    for (const std::string& wanted : *list)
+      if (std::count(names.begin(), names.end(), wanted) == 0)
+        throw InputError(fmt::format("{} {}: {} has no such model; there are: {}", flag, wanted,
+                                     options.from.string(), fmt::join(names, ", ")));
+}
+
+std::vector<Organ> read_organs(const NewSceneOptions& options) {
+  std::vector<fs::path> files;
+  for (const auto& entry : fs::directory_iterator(options.from))
+    if (std::count(std::begin(endings), std::end(endings), entry.path().extension().string()) > 0)
+      files.push_back(entry.path());
+  std::sort(files.begin(), files.end());
+  if (files.empty())
+    throw InputError(fmt::format("{}: holds no model ({})", options.from.string(), fmt::join(endings, ", ")));
+  std::vector<std::string> names;
+  for (const fs::path& file : files) names.push_back(file.stem().string());
+  check_names(options, names);
+  std::vector<Organ> organs;
+  for (std::size_t i = 0; i < files.size(); ++i) {
+    if (!options.only.empty() && std::count(options.only.begin(), options.only.end(), names[i]) == 0)
+      continue;
+    throw_if_stopped();
+    log::info("reading {}", files[i].string());
+    Organ organ;
+    organ.name = names[i], organ.file = files[i].filename().string();
+    const meshing::ImportedModel model = meshing::import_model(files[i], {.count_self_intersections = false});
+    organ.surface = model.surface;
+    Points positions = organ.surface.positions;
+    to_our_frame(options, positions);
+    organ.box = bounding_box(positions);
+    const SurfaceMesh placed{positions, organ.surface.triangles};
+    organ.volume_m3 = std::abs(volume(placed));
+    organ.thickness_m = 2 * organ.volume_m3 / area(placed);
+    organ.pieces = int(model.left.components);
+    const scenes::PartKind kind = scenes::anatomy_of(organ.name).kind;
+    organ.see_through = kind == scenes::PartKind::hull,
+    organ.bone = kind == scenes::PartKind::bone || scenes::is_of_ribcage(organ.name);
+    for (const auto& [list, flag] :
+         {std::pair(&options.see_through, &organ.see_through), {&options.rigid, &organ.bone}})
+      if (std::count(list->begin(), list->end(), organ.name) > 0) *flag = true;
+    organs.push_back(std::move(organ));
+  }
+  return organs;
+}
+
+// Of two bones, or two things seen through, that fill the same place one is enough: the one of fewer pieces,
+// then of fewer triangles.
+void leave_out_doubles(std::vector<Organ>& organs, std::vector<std::string>& notes) {
+  const auto same_place = [](const Organ& a, const Organ& b) {
+    const double tolerance_m = 0.01 * a.box.diagonal();
+    return a.see_through == b.see_through && a.bone == b.bone && (a.see_through || a.bone) &&
+           (a.box.lower - b.box.lower).norm() < tolerance_m &&
+           (a.box.upper - b.box.upper).norm() < tolerance_m;
+  };
+  const auto effort = [](const Organ& organ) {
+    return std::pair(organ.pieces, organ.surface.triangles.rows());
+  };
+  for (std::size_t a = 0; a < organs.size(); ++a)
+    for (std::size_t b = a + 1; b < organs.size();) {
+      if (!same_place(organs[a], organs[b])) {
+        ++b;
+        continue;
+      }
+      if (effort(organs[b]) < effort(organs[a])) std::swap(organs[a], organs[b]);
+      notes.push_back(fmt::format("{} is left out: it is where {} is", organs[b].name, organs[a].name));
+      organs.erase(organs.begin() + std::ptrdiff_t(b));
+    }
+}
+
+void make_cage(const NewSceneOptions& options, Organ& organ) {
+  throw_if_stopped();
+  SurfaceMesh surface = organ.surface;
+  to_our_frame(options, surface.positions);
+  organ.cage = meshing::build_cage(surface, {}, {.tets = organ.bone ? bone_tets : options.tets}).mesh;
+  ContactShape shape = meshing::make_contact_shape(surface, organ.cage, rough);
+  if (!shape.usable)  // as in a scene: touched at its cage
+    shape = meshing::make_contact_shape({organ.cage.positions, boundary_triangles(organ.cage.tets)},
+                                        organ.cage, rough);
+  organ.shape = std::make_shared<const ContactShape>(std::move(shape));
+}
+
+// About a point.
+std::shared_ptr<const ContactShape> scaled(const ContactShape& shape, const Vec3& center, double scale) {
+  ContactShape copy = shape;
+  copy.field.lower_m = center + scale * (shape.field.lower_m - center);
+  copy.field.cell_m *= scale, copy.field.unit_m *= scale;
+  copy.samples.positions_m =
+      ((copy.samples.positions_m.rowwise() - center.transpose()) * scale).rowwise() + center.transpose();
+  return std::make_shared<const ContactShape>(std::move(copy));
+}
+
+// About its own middle, and moved by its way.
+TetMesh placed(const Organ& organ, double scale) {
+  TetMesh cage = organ.cage;
+  const Vec3 center = organ.box.center();
+  cage.positions = ((cage.positions.rowwise() - center.transpose()) * scale).rowwise() +
+                   (center + organ.way_m).transpose();
+  return cage;
+}
+
+std::vector<std::size_t> simulated(const std::vector<Organ>& organs) {
+  std::vector<std::size_t> indices;
+  for (std::size_t i = 0; i < organs.size(); ++i)
+    if (!organs[i].see_through) indices.push_back(i);
+  return indices;
+}
+
+bool move_apart(std::vector<Organ>& organs, double scale, double room_m, double reach_m) {
+  std::vector<LaidBody> bodies;
+  for (const std::size_t i : simulated(organs))
+    bodies.push_back({scaled(*organs[i].shape, organs[i].box.center(), scale), organs[i].bone});
+  const auto ways = ways_apart(std::move(bodies), room_m, reach_m);
+  if (!ways) return false;
+  std::size_t next = 0;
+  for (const std::size_t i : simulated(organs)) organs[i].way_m += (*ways)[next++];
+  return true;
+}
+
+double longest(const std::vector<Organ>& organs, const std::string& name) {
+  return std::find_if(organs.begin(), organs.end(), [&](const Organ& organ) { return organ.name == name; })
+      ->box.size()
+      .maxCoeff();
+}
+
+// The largest scale at which all come apart.
+double come_apart(const NewSceneOptions& options, std::vector<Organ>& organs) {
+  Box all;
+  for (const std::size_t i : simulated(organs))
+    if (!organs[i].bone) all.include(organs[i].box);
+  for (int step = 0;; ++step) {
+    const double scale = options.shrink - scale_step * step;
+    if (scale < least_scale)
+      throw InputError(
+          fmt::format("{}: at {:g} of their size the organs still do not come apart; take fewer with "
+                      "--only",
+                      options.from.string(), scale + scale_step));
+    log::info("parting the organs at {:.2f} of their size", scale);
+    const double room_m = room * scale * longest(organs, options.robot);
+    if (move_apart(organs, scale, room_m, reach * all.diagonal())) return scale;
+  }
+}
+
+std::string vector_text(const Vec3& v) {
+  return fmt::format("[{:.4g}, {:.4g}, {:.4g}]", v.x(), v.y(), v.z());
+}
+
+std::string body_text(const Organ& organ, const NewSceneOptions& options, double scale) {
+  const bool robot = organ.name == options.robot;
+  const Vec3 center = organ.box.center() + organ.way_m;
+  std::string text = fmt::format("\n[[bodies]]\nname = \"{}\"\nrole = \"{}\"\n", organ.name,
+                                 organ.see_through ? "scenery"
+                                 : robot           ? "robot"
+                                                   : "obstacle");
+  if (organ.bone && !organ.see_through) text += "kind = \"rigid\"\n";
+  text += fmt::format("model = {{ file = \"{}\", scale = {:g}, up = \"{}\", front = \"{}\" }}\n", organ.file,
+                      options.scale * (organ.see_through ? 1 : scale), options.up, options.front);
+  text += fmt::format("pose = {{ position_m = [{:.7g}, {:.7g}, {:.7g}], anchor = \"center\" }}", center.x(),
+                      center.y(), center.z());
+  if (organ.way_m.norm() > 0) text += fmt::format("   # {:.2g} m from its true place", organ.way_m.norm());
+  text += "\n";
+  const scenes::Anatomy& usual = scenes::anatomy_of(organ.name);
+  if (organ.see_through) {
+    const bool hull = usual.kind == scenes::PartKind::hull;
+    text += fmt::format("color = \"{}\"\nopacity = {}\n",
+                        organ.bone ? "#efe6d0"
+                        : hull     ? "#c98f70"
+                                   : usual.color,
+                        organ.bone ? 0.35
+                        : hull     ? 0.22
+                                   : 0.15);
+    if (organ.surface.triangles.rows() > most_triangles_seen_through)
+      text += fmt::format("triangles = {}\n", most_triangles_seen_through);
+    return text;
+  }
+  text += fmt::format("cage = {{ tets = {} }}\n", organ.bone ? bone_tets : options.tets);
+  if (organ.bone) return text + "color = \"#e8dfc8\"\nlook = \"bone\"\n";
+  text += fmt::format(
+      "material = {{ youngs_modulus_pa = {:g}, poisson_ratio = 0.45, density_kg_m3 = {:g}, friction = 0.05 "
+      "}}\n",
+      usual.youngs_modulus_pa, usual.density_kg_m3);
+  text += fmt::format("color = \"{}\"\nlook = \"tissue\"\n", usual.color);
+  if (robot) return text;
+  const Vec3 half = 0.5 * scale * organ.box.size();
+  const Vec3 lower(center.x() - 2 * half.x(), center.y() - 2 * half.y(), center.z() - 2 * half.z()),
+      upper(center.x() - 0.5 * half.x(), center.y() + 2 * half.y(), center.z() + 2 * half.z());
+  return text + fmt::format("fixed = [{{ box_m = [{}, {}] }}]   # its back\n", vector_text(lower),
+                            vector_text(upper));
+}
+
+const Vec3& direction_of(const std::string& goal) {
+  static const std::map<std::string, Vec3> directions{{"front", Vec3::UnitX()}, {"back", -Vec3::UnitX()},
+                                                      {"left", Vec3::UnitY()},  {"right", -Vec3::UnitY()},
+                                                      {"up", Vec3::UnitZ()},    {"down", -Vec3::UnitZ()}};
+  return directions.at(goal);
+}
+
+Vec3 center_of_mass(const TetMesh& cage) {
+  Vec3 sum = Vec3::Zero();
+  double all = 0;
+  for (Eigen::Index t = 0; t < cage.tets.rows(); ++t) {
+    const auto corner = [&](int i) -> Vec3 { return cage.positions.row(cage.tets(t, i)); };
+    const double share = signed_volume(corner(0), corner(1), corner(2), corner(3));
+    sum += share / 4 * (corner(0) + corner(1) + corner(2) + corner(3)), all += share;
+  }
+  return sum / all;
+}
+
+// How far the robot goes along `direction` until it is past all that lies in its way, and at least one and a
+// half times its length there and once its largest.
+double way_to_goal(const std::vector<Organ>& organs, const Organ& robot, double scale,
+                   const Vec3& direction) {
+  const Box box = bounding_box(placed(robot, scale).positions);
+  const Vec3 along = direction.cwiseAbs();
+  const double from = direction.dot(box.center()) - along.dot(box.size()) / 2;
+  const double length = scale * along.dot(robot.box.size());
+  double way =
+      std::max(1.5 * length, scale * robot.box.size().maxCoeff());  // the goal's radius is 0.4 of that
+  for (const std::size_t i : simulated(organs)) {
+    if (&organs[i] == &robot) continue;
+    const Box other = bounding_box(placed(organs[i], scale).positions);
+    const Vec3 gap = (other.center() - box.center()).cwiseAbs() - (other.size() + 1.25 * box.size()) / 2;
+    bool in_the_way = true;
+    for (int c = 0; c < 3; ++c) in_the_way &= along[c] > 0 || gap[c] < 0;
+    const double end = direction.dot(other.center()) + along.dot(other.size()) / 2;
+    if (in_the_way) way = std::max(way, end - from + 0.1 * length);
+  }
+  return way;
+}
+
+struct Views {
+  Vec3 best, side;  // from the scene to the camera
+};
+
+// Directions from which most of the robot is seen past the other organs, at the start, on the way and at the
+// goal: of those from before the body, or from above it, and of those square to the way.
+Views views_of(const std::vector<Organ>& organs, const Organ& robot, double scale, const Vec3& way) {
+  std::vector<SurfaceMesh> hiding;
+  for (const std::size_t i : simulated(organs)) {
+    if (&organs[i] == &robot) continue;
+    const TetMesh cage = placed(organs[i], scale);
+    hiding.push_back({cage.positions, boundary_triangles(cage.tets)});
+  }
+  const Points all = placed(robot, scale).positions;
+  const Eigen::Index step = std::max<Eigen::Index>(1, all.rows() / points_looked_at);
+  constexpr int stops = 4;  // of the way
+  Points points(stops * (all.rows() / step), 3);
+  for (Eigen::Index p = 0; p < points.rows(); ++p)
+    points.row(p) = all.row(p / stops * step) + double(p % stops) / (stops - 1) * way.transpose();
+  // A way that leads to or from the eye looks short.
+  const auto worth = [&](const Vec3& direction) {
+    return share_in_sight(points, direction, hiding) -
+           0.4 * std::abs(direction.normalized().dot(way.normalized()));
+  };
+  const auto best_of = [&](const std::vector<Vec3>& directions) {
+    return *std::max_element(directions.begin(), directions.end(),
+                             [&](const Vec3& a, const Vec3& b) { return worth(a) < worth(b); });
+  };
+  std::vector<Vec3> before;
+  for (const double to_the_left : {-1.5, -1.0, -0.6, -0.3, 0.3, 0.6, 1.0, 1.5})
+    for (const double up : {0.15, 0.35, 0.7}) before.push_back({1, to_the_left, up});
+  Vec3 across = way.cross(Vec3::UnitZ());
+  if (across.norm() < 1e-9 * way.norm()) across = Vec3::UnitY();
+  across.normalize();
+  const Vec3 up(0, 0, 0.12);
+  return {best_of(before), best_of({across + up, up - across})};
+}
+
+std::string scene_text(const std::vector<Organ>& organs, const NewSceneOptions& options, double scale) {
+  const Organ& robot = *std::find_if(organs.begin(), organs.end(),
+                                     [&](const Organ& organ) { return organ.name == options.robot; });
+  const TetMesh robot_cage = placed(robot, scale);
+  const Vec3 size = scale * robot.box.size(), start = center_of_mass(robot_cage);
+  const Vec3 direction = direction_of(options.goal);
+  const Vec3 goal = start + way_to_goal(organs, robot, scale, direction) * direction;
+  Box bounds;
+  for (const std::size_t i : simulated(organs)) {
+    // Bones do not move, and may reach out.
+    const Box box = organs[i].bone ? Box{organs[i].box.center(), organs[i].box.center()}
+                                   : bounding_box(placed(organs[i], scale).positions);
+    const Vec3 more = Vec3::Constant(0.3 * size.maxCoeff());
+    bounds.include(box.lower - more), bounds.include(box.upper + more);
+  }
+  bounds.include(goal + 1.5 * size), bounds.include(goal - 1.5 * size);
+  // At 5 m/s² a body of a metre is pushed for 0.2 to 1 s at a time; times go with the root of the length.
+  const double length = size.maxCoeff(), time = std::sqrt(length);
+  const double mass = std::pow(scale, 3) * robot.volume_m3 * scenes::anatomy_of(robot.name).density_kg_m3;
+  const std::string of_true_size = scale < 1
+                                       ? fmt::format("{:g} of its true size, about its own middle", scale)
+                                       : std::string("of its true size");
+  const std::string description = fmt::format("{} moves to the {} among {} bodies", robot.name, options.goal,
+                                              simulated(organs).size() - 1);
+  std::string text = fmt::format(
+      "# Made by limber scene new. Every organ is {}.\n"
+      "# In an atlas some are a little in one another: those stand off their true places, so that no two "
+      "touch at "
+      "the\n"
+      "# start. Materials are usual ones. Edit what is to be otherwise: docs/scene.md has all keys.\n"
+      "name = \"{}\"\ndescription = \"{}\"\n\n[world]\nbounds_m = [{}, "
+      "{}]\ngravity_m_s2 = [0, 0, 0]\n",
+      of_true_size, options.out.stem().string(), description, vector_text(bounds.lower),
+      vector_text(bounds.upper));
+  for (const Organ& organ : organs) text += body_text(organ, options, scale);
+  text +=
+      fmt::format("\n[goal]\ncenter_of_mass_m = {}\nradius_m = {:.3g}\n", vector_text(goal), 0.4 * length);
+  text += fmt::format(
+      "\n[planner]\npreset = \"fast\"\nmax_force_n = {:.2g}\nduration_s = [{:.2g}, {:.2g}]\n"
+      "control_point_radius_m = {:.2g}\nsettle_speed_m_s = {:.2g}\n",
+      5 * mass, 0.2 * time, time, 0.35 * length, 0.02 * time);
+  const Views views = views_of(organs, robot, scale, goal - start);
+  const std::string subject = fmt::format("fov_deg = 24\nsubject = \"{}\"\nfill = 0.45\n", robot.name);
+  text += fmt::format("\n[camera]   # from where most of the way is seen\ndirection = {}\n{}",
+                      vector_text(views.best), subject);
+  text += fmt::format("\n[[cameras]]\nname = \"side\"\ndirection = {}\n{}", vector_text(views.side), subject);
+  text += fmt::format("\n[[cameras]]\nname = \"follow\"\nfollow = \"{}\"\ndirection = {}\nfov_deg = 24\n",
+                      robot.name, vector_text(views.best));
+  text += "\n[[cameras]]\nname = \"whole\"\ndirection = [1, -0.5, 0.3]\nfov_deg = 24\n";
+  text += fmt::format(
+      "\n[film]\nframes_per_second = 30\nspeed = {:.2g}   # slow motion: what is small moves "
+      "quickly\nbounds_lines = false\nclock = true\ncaption = \"{}\"\n",
+      std::clamp(time, 0.05, 1.0), description);
+  return text;
+}
+
+// The bodies as limber plan will prepare them, as far as a world asks for them.
+std::vector<PreparedBody> bodies_of(const scenes::Scene& scene, const std::vector<Organ>& organs) {
+  std::vector<PreparedBody> bodies;
+  for (const scenes::BodySpec& body : scene.bodies) {
+    throw_if_stopped();
+    const Organ& organ =
+        *std::find_if(organs.begin(), organs.end(), [&](const Organ& o) { return o.name == body.name; });
+    SurfaceMesh surface = organ.surface;
+    scenes::transform(scenes::world_from_model(body, surface.positions, false), surface.positions);
+    PreparedBody& prepared = bodies.emplace_back();
+    prepared.cage = meshing::build_cage(surface, {}, {.tets = body.cage.tets}).mesh;
+    prepared.contact = meshing::make_contact_shape(surface, prepared.cage, rough);
+    prepared.surface = std::move(surface);
+  }
+  return bodies;
+}
+
+// The scene, after a look at what limber plan would say to it.
+scenes::Scene laid_out(const NewSceneOptions& options, const std::vector<Organ>& organs, double scale) {
+  try {
+    scenes::Scene scene = scenes::read_scene(scene_text(organs, options, scale), options.out.string());
+    build_world(scene, bodies_of(scene, organs));
+    return scene;
+  } catch (const InputError& error) {
+    throw InputError(
+        fmt::format("no scene is made of these ({} is {:.3g} m long with --scale {:g}; is that right?): {}",
+                    options.robot, longest(organs, options.robot), options.scale, error.what()));
+  }
+}
+
+}  // namespace
+
+namespace {
+
+// `where` is how the scene calls the folder: its models' names begin with that.
+Outcome scene_of_folder(const NewSceneOptions& options, const std::string& where,
+                        std::vector<std::string> notes) {
+  std::vector<Organ> organs = read_organs(options);
+  std::vector<std::string> deformable;
+  for (Organ& organ : organs) {
+    if (organ.thickness_m < least_thickness * organ.box.diagonal() && !organ.see_through && !organ.bone) {
+      organ.see_through = true;
+      notes.push_back(
+          fmt::format("{} is only seen: it is a sheet, {:.2g} m thick", organ.name, organ.thickness_m));
+    }
+    if (!organ.see_through && !organ.bone) deformable.push_back(organ.name);
+  }
+  if (std::count(deformable.begin(), deformable.end(), options.robot) == 0)
+    throw InputError(
+        fmt::format("--robot {}: {} has no such soft body (bones, hulls and sheets are none); there are: {}",
+                    options.robot, options.from.string(), fmt::join(deformable, ", ")));
+  for (Organ& organ : organs) organ.file = where + organ.file;
+  if (options.only.empty()) leave_out_doubles(organs, notes);
+  log::info("making cages");
+  for (Organ& organ : organs)
+    if (!organ.see_through) make_cage(options, organ);
+  const double scale = come_apart(options, organs);
+  const scenes::Scene scene = laid_out(options, organs, scale);
+  write_file(options.out, scene.text);
+  const std::string next =
+      fmt::format("limber run {}{} -o DIR", options.out.string(),
+                  where.empty() ? fmt::format(" --data {}", options.from.string()) : std::string());
+  Json moved_m = Json::object();
+  std::string text = fmt::format("{}: {} bodies at {:g} of their size, {} only seen\n", options.out.string(),
+                                 scene.bodies.size(), scale, scene.scenery.size());
+  for (const Organ& organ : organs)
+    if (const double way = organ.way_m.norm(); way > 0) {
+      moved_m[organ.name] = way;
+      text += fmt::format("  {} stands {:.1f} mm off its true place\n", organ.name, 1e3 * way);
+    }
+  for (const std::string& note : notes) text += fmt::format("  {}\n", note);
+  text += fmt::format("next: {}\n", next);
+  return {exit_done,
+          {{"scene", options.out.string()},
+           {"bodies", scene.bodies.size()},
+           {"scenery", scene.scenery.size()},
+           {"scale", scale},
+           {"moved_m", moved_m},
+           {"notes", notes},
+           {"next", next}},
+          text};
+}
+
+// Models are made beside the scene, which is then of those.
+Outcome scene_of_parts(NewSceneOptions options) {
+  const NewSceneOptions usual;
+  if (options.scale != usual.scale || options.up != usual.up || options.front != usual.front)
+    throw InputError(
+        fmt::format("{}: says itself where up is and how long a unit; leave --scale, --up and --front out",
+                    options.from.string()));
+  const std::string name = options.out.stem().string() + "_models";
+  const fs::path folder = options.out.parent_path() / name;
+  PartModels made = make_part_models({options.from, options.labels, options.only}, folder);
+  options.from = folder, options.only.clear();
+  try {
+    return scene_of_folder(options, name + "/", std::move(made.notes));
+  } catch (...) {
+    std::error_code none;
+    fs::remove_all(folder, none);
+    throw;
+  }
+}
+
+}  // namespace
+
+Outcome new_scene(const NewSceneOptions& options) {
+  if (fs::exists(options.out))
+    throw InputError(
+        fmt::format("{}: is there already; choose another name, or remove it", options.out.string()));
+  if (options.up.back() == options.front.back())
+    throw InputError(fmt::format("--up {} and --front {} are the same axis; a body's front is across it",
+                                 options.up, options.front));
+  const bool scan = !fs::is_directory(options.from);
+  if (scan && !imaging::is_label_map(options.from))
+    throw InputError(fmt::format("{}: is neither a folder of models nor a label map (NIfTI or NRRD)",
+                                 options.from.string()));
+  if (!scan && !options.labels.empty())
+    throw InputError(fmt::format("--labels names the labels of a scan, and {} is a folder; leave it out",
+                                 options.from.string()));
+  if (scan || is_atlas(options.from)) return scene_of_parts(options);
+  return scene_of_folder(options, "", {});
+}
+
+}  // namespace limber::app

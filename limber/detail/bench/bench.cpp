@@ -1,0 +1,265 @@
+#include "limber/detail/bench/bench.h"
+
+#include <unistd.h>
+
+#include <chrono>
+#include <cmath>
+#include <map>
+#include <set>
+
+#include "core/content_hash.h"
+#include "core/error.h"
+#include "core/hash.h"
+#include "core/json_shape.h"
+#include "core/json_text.h"
+#include "core/log.h"
+#include "core/progress.h"
+#include "core/temporary_files.h"
+#include "core/threads.h"
+#include "core/version.h"
+#include "limber/detail/commands.h"
+#include "limber/detail/film/frame_list.h"
+#include "limber/detail/plan/diagnosis.h"
+#include "limber/detail/plan/plan_folder.h"
+#include "limber/detail/world/analysis.h"
+#include "limber/detail/world/scene_world.h"
+
+namespace limber::app {
+
+namespace {
+
+// A scene under a preset: all that its runs share. Stays where it is, for the system knows its bodies.
+struct Setup {
+  Setup(const BenchOptions& bench, const std::string& scene_given, const std::string& preset)
+      : options(options_of(bench, scene_given, preset)),
+        scene(read_scene(options)),
+        bodies(prepare_bodies(scene, bench.data, bench.out / scene.name, bench.store)),
+        world(build_world(scene, bodies)),
+        system(world, bodies, goal_rules_of(scene)) {}
+  Setup(const Setup&) = delete;
+
+  static PlanOptions options_of(const BenchOptions& bench, const std::string& scene,
+                                const std::string& preset) {
+    PlanOptions options;
+    options.scene = {scene, bench.sets, bench.data};
+    options.preset = preset;
+    options.iterations = bench.iterations;
+    options.time_limit_s = bench.time_limit_s;
+    options.in_flight = bench.in_flight;
+    return options;
+  }
+
+  PlanOptions options;
+  scenes::Scene scene;
+  std::vector<PreparedBody> bodies;
+  fem::World world;
+  FemSystem system;
+};
+
+// All that a run's result depends on.
+Json identity_of(const Setup& setup, const plan::Settings& settings, const std::string& program) {
+  Hasher scene;
+  scene.text(setup.scene.text);
+  for (const std::string& set : setup.scene.sets) scene.text(set);
+  Json shaping = plan::json_of(settings);
+  shaping.erase("in_flight");
+  return {{"version", version},
+          {"program", program},
+          {"scene_hash", hex(scene.digest())},
+          {"system_hash", hex(setup.system.hash())},
+          {"settings", shaping}};
+}
+
+Json volume_figures(const fem::World& world, const MotionFigures& figures) {
+  Json bodies = Json::object();
+  for (std::size_t b = 0; b < world.bodies.size(); ++b) {
+    if (!world.bodies[b].moving) continue;
+    const auto within = [&](double percent) {
+      return std::count_if(figures.frames.begin(), figures.frames.end(), [&](const FrameFigures& frame) {
+        return std::abs(frame.bodies[b].volume_change) <= 0.01 * percent;
+      });
+    };
+    bodies[world.bodies[b].name] = {{"largest_percent", 100 * figures.largest_volume_change[b]},
+                                    {"frames", figures.frames.size()},
+                                    {"within_3_percent", within(3)},
+                                    {"within_5_percent", within(5)},
+                                    {"within_6_percent", within(6)},
+                                    {"within_10_percent", within(10)}};
+  }
+  return bodies;
+}
+
+// Every tenth of a second, to the millimetre: enough to see which way the robot went.
+Json robot_path(const Setup& setup, const plan::Trajectory& path) {
+  Json places = Json::array();
+  const double millimetre = 1000;
+  for (double f = 0; f < double(path.frames.size()); f += std::max(1.0, path.frames_per_second / 10)) {
+    const Vec3 place = setup.system.robot_center(path.frames[std::size_t(f)]);
+    Json& list = places.emplace_back(Json::array());
+    for (const double x : place) list.push_back(std::round(millimetre * x) / millimetre);
+  }
+  return places;
+}
+
+Json record_of(const Setup& setup, const plan::Plan& plan, const Json& identity) {
+  const MotionFigures figures =
+      measure_motion(setup.world, setup.bodies, plan.trajectory, setup.system.surfaces());
+  std::string explanation = plan::explain(plan);
+  if (!plan.solved()) explanation += " " + diagnose(setup.world, setup.system, plan).text;
+  char host[256] = "unknown";
+  ::gethostname(host, sizeof host - 1);
+  Json record{{"scene", setup.scene.name},         {"preset", setup.scene.planner.preset},
+              {"seed", plan.settings.seed},        {"solved", plan.solved()},
+              {"explanation", explanation},        {"nodes", plan.tree.size()},
+              {"distance_m", plan.best_distance_m}};
+  record.update(plan::json_of(plan.statistics));
+  record.update(
+      {{"motion_s", double(plan.trajectory.end.step) * setup.world.dt_s},
+       {"robot_path_m", robot_path(setup, plan.trajectory)},
+       {"volume", volume_figures(setup.world, figures)},
+       {"deepest_penetration_percent", 100 * figures.deepest_penetration_m / figures.robot_size_m}});
+  record.update(json_of(figures));
+  record.update({{"tree_hash", hex(plan::hash_of(plan.tree))},
+                 {"trajectory_hash", hex(plan::hash_of(plan.trajectory))},
+                 {"threads", thread_count()},
+                 {"host", host},
+                 {"identity", identity}});
+  return record;
+}
+
+// Whether the run is done; throws InputError when the file is of another run.
+bool is_done(const fs::path& file, const Json& identity) {
+  if (!fs::exists(file)) return false;
+  const Json record = read_json(file);
+  if (!record.is_object() || !record.contains("identity"))
+    throw InputError(fmt::format("{}: is not a record of limber bench; remove it", file.string()));
+  const Json& there = record.at("identity");
+  require_like(there, {{"program", ""}, {"scene_hash", ""}}, Keys::those_there, file.string() + ": identity",
+               "remove the file");
+  if (there == identity) return true;
+  std::string what = "other settings";
+  if (there.value("program", "") != identity.at("program")) what = "another build of limber";
+  if (there.value("scene_hash", "") != identity.at("scene_hash"))
+    what = "another text of the scene, or other --set";
+  throw InputError(fmt::format("{}: was made with {}; take another folder with -o, or remove {}",
+                               file.string(), what, file.parent_path().string()));
+}
+
+// Runs what is missing; what was finished stays, whatever comes after.
+void run_all(const BenchOptions& options, const std::vector<std::string>& presets) {
+  const std::vector<int> seeds = parse_seeds(options.seeds);
+  const std::size_t scenes = options.scenes.size(), a_seed = scenes * presets.size();
+  std::vector<int> runs(seeds.size() * a_seed);
+  for (std::size_t i = 0; i < runs.size(); ++i) runs[i] = int(i);
+  runs = chunk_of(runs, options.chunk);
+
+  make_folder(options.out / "runs");
+  remove_abandoned(options.out / "runs");
+  const std::string& program = program_hash();  // two builds do not make one benchmark
+  std::map<std::size_t, Setup> setups;          // by scene and preset
+  std::map<std::string, std::string> scene_from_name;
+  std::int64_t done = 0;
+  Progress progress("bench", std::int64_t(runs.size()));
+  for (const int run : runs) {
+    // Seed after seed, so that any part of the runs has all scenes and presets in it.
+    const std::size_t which = std::size_t(run) % a_seed;
+    const std::string& given = options.scenes[which / presets.size()];
+    Setup& setup = setups.try_emplace(which, options, given, presets[which % presets.size()]).first->second;
+    if (scene_from_name.try_emplace(setup.scene.name, given).first->second != given)
+      throw InputError(fmt::format("{} and {}: are both scenes with the name \"{}\"; rename one",
+                                   scene_from_name[setup.scene.name], given, setup.scene.name));
+    setup.options.seed = seeds[std::size_t(run) / a_seed];
+    const plan::Settings settings = settings_of(setup.scene, setup.options);
+    const std::string label =
+        fmt::format("{}.{}.{}", setup.scene.name, setup.scene.planner.preset, settings.seed);
+    const fs::path file = options.out / "runs" / (label + ".json");
+    const Json identity = identity_of(setup, settings, program);
+    if (!is_done(file, identity)) {
+      try {
+        const plan::Plan plan = plan::plan(setup.system, settings);
+        if (plan.ending == plan::Ending::stopped) throw_if_stopped();
+        const Json record = record_of(setup, plan, identity);
+        write_file(file, text_of(record) + "\n");
+        log::info("{}: {} after {} iterations, {:.2f} CPU s", label, plan.solved() ? "solved" : "not solved",
+                  plan.statistics.iterations, plan.statistics.cpu_s);
+      } catch (const InternalError&) {
+        log::warn("this run failed; to see it again: limber plan {} --preset {} --seed {} -o DIR{}", given,
+                  setup.scene.planner.preset, settings.seed,
+                  options.sets.empty() ? "" : fmt::format(" --set {}", fmt::join(options.sets, " --set ")));
+        throw;
+      }
+    }
+    progress.update(++done, label);
+  }
+}
+
+std::string date_now() {
+  const std::time_t now = std::chrono::system_clock::to_time_t(std::chrono::system_clock::now());
+  std::tm utc{};
+  ::gmtime_r(&now, &utc);
+  char text[32] = "";
+  std::strftime(text, sizeof text, "%Y-%m-%d %H:%M:%S", &utc);
+  return text;
+}
+
+// One file a scene: OMPL's log knows one experiment each. Several get the scene's name before the extension.
+std::vector<fs::path> write_ompl_logs(const RunRecords& records, const fs::path& path) {
+  std::map<std::string, RunRecords> scenes;
+  for (const Json& record : records) scenes[record.at("scene").get<std::string>()].push_back(record);
+  std::vector<fs::path> written;
+  for (const auto& [name, of_scene] : scenes) {
+    fs::path file = path;
+    if (scenes.size() > 1)
+      file.replace_filename(fmt::format("{}.{}{}", path.stem().string(), name, path.extension().string()));
+    write_file(file, ompl_log(of_scene, date_now()));
+    written.push_back(file);
+  }
+  return written;
+}
+
+}  // namespace
+
+Outcome bench(const BenchOptions& options) {
+  if (options.merge.empty()) {
+    if (options.scenes.empty()) throw InputError("bench: name one scene at least, or folders with --merge");
+    if (options.out.empty()) throw InputError("bench: say with -o where the records go");
+    const std::vector<std::string> presets =
+        options.presets.empty() ? std::vector<std::string>{""} : options.presets;
+    if (std::set(presets.begin(), presets.end()).size() != presets.size() ||
+        std::set(options.scenes.begin(), options.scenes.end()).size() != options.scenes.size())
+      throw InputError("bench: a scene or preset is named twice; name each once");
+    try {
+      run_all(options, presets);
+    } catch (const Interrupted&) {
+      log::info("{}: the finished runs are kept; the same command goes on", options.out.string());
+      throw;
+    }
+  } else if (!options.scenes.empty()) {
+    throw InputError("bench: --merge runs nothing, so it takes no scene; leave one of the two out");
+  }
+  const RunRecords records =
+      read_records(options.merge.empty() ? std::vector<fs::path>{options.out} : options.merge);
+  Json report = report_of(records);
+  std::string text = text_of_report(report);
+  // Machines that share a folder would write this file at the same time; --merge makes it for them.
+  if (!options.out.empty() && options.chunk.empty()) {
+    make_folder(options.out);
+    std::string lines;
+    for (const Json& record : records) lines += text_of(record) + "\n";
+    write_file(options.out / "runs.jsonl", lines);
+    write_file(options.out / "bench.html", page_of_bench(records, report));
+    report["runs"] = (options.out / "runs.jsonl").string();
+    report["page"] = (options.out / "bench.html").string();
+    text += fmt::format("{} runs in {}, curves and tables in {}\n", records.size(),
+                        (options.out / "runs.jsonl").string(), (options.out / "bench.html").string());
+  }
+  if (options.ompl_log) {
+    for (const fs::path& file : write_ompl_logs(records, *options.ompl_log)) {
+      report["ompl_logs"].push_back(file.string());
+      text += fmt::format("OMPL's log {}\n", file.string());
+    }
+  }
+  return {exit_done, report, text};
+}
+
+}  // namespace limber::app

@@ -1,0 +1,286 @@
+#include <atomic>
+#include <chrono>
+#include <mutex>
+#include <thread>
+
+#include "core/error.h"
+#include "core/events.h"
+#include "core/hash.h"
+#include "core/job.h"
+#include "core/lock.h"
+#include "core/log.h"
+#include "core/progress.h"
+#include "core/temporary_files.h"
+#include "core/threads.h"
+#include "limber/detail/commands.h"
+#include "limber/detail/film/frame_list.h"
+#include "limber/detail/film/shot.h"
+#include "limber/detail/plan/manifest.h"
+#include "limber/detail/plan/plan_folder.h"
+#include "limber/detail/world/scene_world.h"
+#include "render/film.h"
+#include "render/png_file.h"
+
+namespace limber::app {
+
+namespace {
+
+struct Failure {
+  int frame;
+  std::string why;
+};
+
+// Where the pictures of a frame are: 0007.png, and of its passes 0007.depth.png and so on.
+struct FrameFiles {
+  fs::path folder;
+  fs::path of(int frame, const std::string& pass = "") const {
+    return folder / fmt::format("{:04}{}{}.png", frame, pass.empty() ? "" : ".", pass);
+  }
+};
+
+// The frame's own file last: where it is good, its passes are there.
+void write(const Picture& picture, const FrameFiles& files, int frame, const std::string& hash) {
+  const auto put = [&](const std::string& pass, const auto& any) {
+    std::visit(
+        [&](const auto& image) {
+          render::write_png(files.of(frame, pass), image, {{"limber-hash", hash}});
+        },
+        any);
+  };
+  for (const auto& [pass, image] : picture.passes) put(pass, image);
+  put("", picture.frame);
+}
+
+// Paints the frames on all threads. A frame that fails does not stop the others; a full disk does.
+std::vector<Failure> paint_all(const Shot& shot, const std::vector<int>& frames, const FrameFiles& files) {
+  std::vector<Failure> failures;
+  std::atomic<std::size_t> next{0}, done{0};
+  std::exception_ptr fatal;
+  std::mutex mutex;
+  Progress progress("render", std::int64_t(frames.size()));
+  Job* const job = current_job();
+  const auto work = [&] {
+    const WorkingFor working(job);
+    try {
+      Shot::Painter painter(shot);
+      while (stop_signal() == 0) {
+        const std::size_t i = next++;
+        if (i >= frames.size()) break;
+        const auto began = std::chrono::steady_clock::now();
+        Json event{{"event", "frame"}, {"frame", frames[i]}};
+        try {
+          event["hash"] = shot.hash_of(frames[i]);
+          write(painter.paint(frames[i]), files, frames[i], event["hash"]);
+        } catch (const InputError& error) {
+          event = {{"event", "frame_failed"}, {"frame", frames[i]}, {"error", error.what()}};
+          const std::lock_guard lock(mutex);
+          failures.push_back({frames[i], error.what()});
+        }
+        const std::lock_guard lock(mutex);
+        progress.update(std::int64_t(++done));
+        event["seconds"] = std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count();
+        event["done"] = done.load(), event["total"] = frames.size();
+        events::tell(event);
+      }
+    } catch (...) {
+      const std::lock_guard lock(mutex);
+      fatal = std::current_exception();
+      next = frames.size();
+    }
+  };
+  std::vector<std::jthread> workers;
+  const int count = std::min(thread_count(), int(frames.size()));
+  for (int t = 1; t < count; ++t) workers.emplace_back(work);
+  work();
+  workers.clear();
+  if (fatal) std::rethrow_exception(fatal);
+  return failures;
+}
+
+// The plan's scene, filmed otherwise. What would change the motion is refused.
+scenes::Scene filmed_as(const scenes::Scene& planned, const std::vector<std::string>& sets) {
+  for (const std::string& set : sets) {
+    const std::string key = set.substr(0, set.find('='));
+    const auto last = key.substr(key.rfind('.') + 1);
+    const bool look =
+        key.starts_with("bodies.") &&
+        (last == "color" || last == "texture" || last == "opacity" || last == "look" || last == "roughness" ||
+         last == "metallic" || (last == "deformation" && all_touched_at_cages(planned)));
+    const bool film = key.starts_with("film.") && key != "film.speed" && key != "film.frames_per_second";
+    if (!look && !film && key != "cameras" && !key.starts_with("camera.") && !key.starts_with("cameras."))
+      throw InputError(fmt::format(
+          "--set {}: the motion is planned already; what can be set here are film (but speed and "
+          "frames_per_second), camera, cameras, and color, texture, opacity, look, roughness and metallic "
+          "of bodies (and "
+          "deformation, where all are touched at their cages); "
+          "for the rest plan anew with limber plan",
+          set));
+  }
+  std::vector<std::string> all = planned.sets;
+  all.insert(all.end(), sets.begin(), sets.end());
+  return scenes::read_scene(planned.text, planned.name, all, planned.script);
+}
+
+std::string told(const Json& time) {
+  const double slowest = time["speed"][0], quickest = time["speed"][1], left_out_s = time["left_out_s"];
+  std::string text = fmt::format("{:.1f} s of film show {:.2f} s of the motion, at {}× its speed",
+                                 time["seconds"].get<double>(), time["motion_s"].get<double>(),
+                                 slowest == quickest ? fmt::format("{:.3g}", slowest)
+                                                     : fmt::format("{:.2g} to {:.2g}", slowest, quickest));
+  if (left_out_s > 0)
+    text += fmt::format("; the last {:.2f} s, in which nothing is seen to move, are left out", left_out_s);
+  return text + "\n";
+}
+
+std::string suffix_of(const RenderOptions& options) {
+  const std::string name = !options.name.empty()      ? options.name
+                           : options.camera == "main" ? ""
+                                                      : options.camera;
+  for (const char c : name)
+    if (!std::isalnum(static_cast<unsigned char>(c)) && c != '_' && c != '-')
+      throw InputError(fmt::format("--as {}: a name has letters, digits, _ and - only", name));
+  return name.empty() ? "" : "-" + name;
+}
+
+}  // namespace
+
+Outcome render(const RenderOptions& options) {
+  const std::string suffix = suffix_of(options);
+  PlanFolder planned = read_plan_folder(options.folder);
+  planned.scene = filmed_as(planned.scene, options.sets);
+  const scenes::Scene& scene = planned.scene;
+  const std::vector<PreparedBody> bodies = read_bodies_of(planned, options.folder);
+  const std::vector<SurfaceMesh> scenery = read_scenery(scene, options.folder);
+  const fem::World world = world_of(planned, bodies);
+  const scenes::FilmSpec& film = scene.film;
+  const auto size =
+      options.size.empty() ? std::pair(film.width_px, film.height_px) : parse_size(options.size);
+  const Output output{options.bits, options.passes};
+  const Shot shot(scene, options.camera, planned.plan, world, bodies, scenery, size, output);
+  const int frame_count = shot.frames();
+
+  int left_out = 0;
+  std::vector<int> wanted = chunk_of(parse_frames(options.frames, frame_count, &left_out), options.chunk);
+  if (left_out > 0)
+    log::warn("--frames {}: {} frames beyond the last, {}, are left out", options.frames, left_out,
+              frame_count - 1);
+  const fs::path folder = options.folder / ("frames" + suffix);
+  make_folder(folder);
+  const FolderLock lock(options.folder, FolderLock::shared);
+  remove_abandoned(folder), remove_abandoned(options.folder);
+  const FrameFiles files{folder};
+  const auto is_good = [&](int frame) {
+    const std::string hash = shot.hash_of(frame);
+    return render::frame_hash(files.of(frame)) == hash &&
+           std::all_of(options.passes.begin(), options.passes.end(), [&](const std::string& pass) {
+             return render::frame_hash(files.of(frame, pass)) == hash;
+           });
+  };
+  if (!options.passes.empty()) write_json(folder / "passes.json", shot.key_of_passes());
+
+  std::vector<int> missing = wanted;
+  if (options.resume) std::erase_if(missing, is_good);
+  const fs::path video = options.video.value_or(options.folder / ("film" + suffix + ".mp4"));
+  const auto comes_or_is_there = [&](int frame) {
+    return std::binary_search(wanted.begin(), wanted.end(), frame) || is_good(frame);
+  };
+  bool will_be_complete = true;
+  for (int f = 0; f < frame_count && will_be_complete; ++f) will_be_complete = comes_or_is_there(f);
+  if (will_be_complete) render::require_film_possible(film.frames_per_second, video);
+  events::tell({{"event", "frames"}, {"wanted", wanted.size()}, {"kept", wanted.size() - missing.size()}});
+  const double cpu_before = cpu_seconds();
+  const std::vector<Failure> failures = paint_all(shot, missing, files);
+  const double cpu_s = cpu_seconds() - cpu_before;
+  throw_if_stopped();
+  for (const Failure& failure : failures) log::warn("frame {}: {}", failure.frame, failure.why);
+
+  Json result{{"frames", frame_count},
+              {"wanted", wanted.size()},
+              {"painted", missing.size() - failures.size()},
+              {"failed", failures.size()},
+              {"size", {size.first, size.second}},
+              {"camera", options.camera},
+              {"time", shot.time_told()},
+              {"trajectory_hash", hex(plan::hash_of(planned.plan.trajectory))},
+              {"cpu_s", cpu_s},
+              {"folder", folder.string()}};
+  std::string text =
+      fmt::format("{} of {} frames in {}: {} painted, {} kept, {} failed; {:.2f} CPU s\n", wanted.size(),
+                  frame_count, folder.string(), missing.size() - failures.size(),
+                  wanted.size() - missing.size(), failures.size(), cpu_s) +
+      told(result["time"]);
+
+  std::vector<fs::path> paths;
+  for (int f = 0; f < frame_count; ++f) paths.push_back(files.of(f));
+  bool complete = true;
+  for (int f = 0; f < frame_count && complete; ++f) complete = is_good(f);
+  if (complete) {
+    const fs::path sheet = options.folder / ("sheet" + suffix + ".png");
+    std::vector<fs::path> shown;
+    std::vector<std::string> captions;
+    for (const int of_motion :
+         render::spread_over(shot.frames_of_motion(), film.sheet_columns * film.sheet_rows)) {
+      const int f = shot.frames_before() + of_motion;
+      shown.push_back(files.of(f));
+      captions.push_back(fmt::format("{:.2f} s", shot.time_s(f)));
+    }
+    render::write_png(sheet, render::contact_sheet(shown, captions, {.columns = film.sheet_columns}));
+    render::make_film(paths, film.frames_per_second, video);
+    events::tell({{"event", "film"}, {"file", video.string()}});
+    // Frames of an earlier, longer motion would only confuse.
+    for (int f = frame_count; fs::remove(files.of(f)); ++f) {
+    }
+    result["film"] = video.string(), result["sheet"] = sheet.string();
+    text += fmt::format("film {}, contact sheet {}\n", video.string(), sheet.string());
+  } else if (failures.empty()) {
+    text += "no film yet: not all frames are there\n";
+  }
+  update_manifest(options.folder, "render" + suffix, result);
+  return {failures.empty() ? exit_done : exit_frames_failed, result, text};
+}
+
+namespace {
+
+// The same plan under a scene that differs in what it looks like alone.
+void film_otherwise(const fs::path& folder, const PlanFolder& planned, const scenes::Scene& scene) {
+  const std::vector<PreparedBody> bodies = read_bodies_of(planned, folder);
+  const fem::World world = build_world(scene, bodies, State(planned.plan.tree.states[0]).positions);
+  const MotionFigures figures = measure_motion(world, planned.plan.trajectory);
+  for (const auto& [name, bytes] : pictures_of(scene, world, planned.plan, figures))
+    write_file(folder / name, bytes);
+  // Last, so that a run after one that was killed films otherwise again.
+  write_plan_folder(folder, planned.plan, scene, bodies, planned.summary);
+}
+
+}  // namespace
+
+Outcome run(const PlanOptions& plan_options, const RenderOptions& render_options) {
+  const scenes::Scene scene = read_scene(plan_options);
+  if (render_options.frames.empty() && render_options.chunk.empty())
+    render::require_film_possible(scene.film.frames_per_second, render_options.video.value_or("film.mp4"));
+  require_letters(scene.film);
+  make_folder(plan_options.out);
+  FolderLock lock(plan_options.out, FolderLock::alone);
+  Outcome planned;
+  if (plan_is_up_to_date(plan_options, scene)) {
+    log::info("{}: up to date", (plan_options.out / "plan.npz").string());
+    const PlanFolder folder = read_plan_folder(plan_options.out);
+    planned = {folder.plan.solved() ? exit_done : exit_no_plan, folder.summary, ""};
+    if (folder.scene.text != scene.text || folder.scene.sets != scene.sets)  // it may be filmed otherwise
+      film_otherwise(plan_options.out, folder, scene);
+  } else {
+    planned = plan(plan_options, scene);
+  }
+  lock.share();
+  RenderOptions options = render_options;
+  options.folder = plan_options.out;
+  options.resume = true;
+  const Outcome rendered = render(options);
+  Outcome both{rendered.exit_code != exit_done ? rendered.exit_code : planned.exit_code,
+               {},
+               planned.text + rendered.text};
+  both.json["plan"] = planned.json, both.json["render"] = rendered.json;
+  return both;
+}
+
+}  // namespace limber::app

@@ -1,0 +1,73 @@
+// What Scene, Problem and Plan of the interface hold.
+#pragma once
+
+#include <memory>
+#include <mutex>
+#include <vector>
+
+#include "limber/detail/plan/plan_folder.h"
+#include "limber/detail/world/scene_world.h"
+#include "limber/scene.h"
+
+namespace limber {
+
+struct Scene::Impl {
+  scenes::Scene scene;
+  std::vector<std::filesystem::path> data;
+};
+
+namespace detail {
+
+// A folder that goes with it, if it is a temporary one.
+class WorkFolder {
+ public:
+  // Empty: a temporary one. Throws DiskError.
+  explicit WorkFolder(std::filesystem::path);
+  ~WorkFolder();
+  WorkFolder(const WorkFolder&) = delete;
+  WorkFolder& operator=(const WorkFolder&) = delete;
+  const std::filesystem::path& path() const { return path_; }
+
+ private:
+  bool temporary_;  // made, and removed, by us
+  std::filesystem::path path_;
+};
+
+}  // namespace detail
+
+struct Problem::Impl {
+  Scene scene;
+  detail::WorkFolder folder;
+  std::vector<app::PreparedBody> prepared;
+  std::vector<Body> bodies;
+  fem::World world;
+  app::FemSystem system;      // without a goal: what rollouts need
+  std::size_t state_numbers;  // of positions, and of velocities
+
+  // Scratch memory of threads that step, kept between calls.
+  mutable std::mutex mutex = {};
+  mutable std::vector<std::unique_ptr<plan::Propagator>> idle = {};
+
+  // Prepares what is not up to date.
+  Impl(const Scene&, const std::filesystem::path& work_folder);
+  // Of a plan in its folder.
+  Impl(const app::PlanFolder&, const std::filesystem::path& folder);
+
+ private:
+  Impl(const Scene&, const std::filesystem::path& work_folder,
+       std::vector<app::PreparedBody> (*prepare)(const Scene::Impl&, const std::filesystem::path&),
+       const std::vector<float>& start_positions);
+};
+
+struct Plan::Impl {
+  Problem problem;
+  plan::Plan plan;
+  Json extra = {};
+  Json summary = {};  // of a plan that was read; else null
+
+  mutable std::once_flag measured = {};
+  mutable app::MotionFigures figures = {};
+  const app::MotionFigures& motion_figures() const;
+};
+
+}  // namespace limber

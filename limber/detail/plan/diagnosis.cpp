@@ -1,0 +1,78 @@
+#include "limber/detail/plan/diagnosis.h"
+
+#include <fmt/format.h>
+
+#include "fem/observe.h"
+#include "plan/passage.h"
+
+namespace limber::app {
+
+namespace {
+
+// What pushes the robot back from the goal, hardest first: −1 a wall, −2 nothing.
+struct Block {
+  int body = -2;
+  double force_n = 0;  // against the way to the goal
+};
+
+Block block_at(const fem::World& world, const State& state, const Vec3& way) {
+  Block block;
+  for (const fem::PairForce& pair : fem::pair_forces(fem::contact_forces(world, state))) {
+    if ((pair.body != world.robot && pair.other != world.robot) || pair.body == pair.other) continue;
+    const Vec3 on_robot = pair.body == world.robot ? pair.force_n : Vec3(-pair.force_n);
+    const double against = -on_robot.dot(way);
+    if (against <= block.force_n) continue;
+    block = {pair.body == world.robot ? pair.other : pair.body, against};
+  }
+  return block;
+}
+
+}  // namespace
+
+Diagnosis diagnose(const fem::World& world, const FemSystem& system, const plan::Plan& plan) {
+  Diagnosis d;
+  const State state = plan.tree.states[std::size_t(plan.best_node)];
+  const plan::Goal goal = plan::settings_of_leg(plan.settings, plan.leg()).goal;
+  const Vec3 shift = system.on_leg(plan.leg()).goal_shift(state);
+  const Vec3 to_goal = goal.center_of_mass_m + shift - system.robot_center(state);
+  const Block block = block_at(world, state, to_goal.normalized());
+  if (block.body == -2) {
+    d.json["blocked_by"] = nullptr;
+    d.text = "Nothing pushes the robot back there.";
+  } else {
+    const std::string name = block.body < 0 ? "a wall" : world.bodies[std::size_t(block.body)].name;
+    d.json["blocked_by"] = name;
+    d.json["blocking_force_n"] = block.force_n;
+    d.text = fmt::format(
+        "There {} pushes the robot back from the goal with {:.3g} N; the largest force allowed is {:.3g} N.",
+        name, block.force_n, plan.settings.max_force_n);
+  }
+
+  const plan::Statistics& statistics = plan.statistics;
+  if (2 * statistics.rejected > statistics.iterations)
+    d.text +=
+        " Most pushes led to states that are refused: a tet is inverted, a body's volume has changed by more "
+        "than its max_volume_change, or the goal is lost; try a larger max_volume_change or a smaller "
+        "max_force_n.";
+
+  const plan::Workspace space = system.workspace();
+  const State from = plan.tree.states[std::size_t(plan.legs.back().root)];
+  const double passage = plan::widest_passage_m(space, system.robot_center(from), goal);
+  d.json["widest_rigid_passage_m"] = passage;
+  d.json["robot_inner_radius_m"] = space.robot_radius_m;
+  if (passage < 0)
+    d.text += fmt::format(
+        " Rigid bodies and walls, where they stand at the start, leave no way to the goal even for a point "
+        "(openings under {:.2g} m are not seen).",
+        space.cell_m);
+  else if (passage < space.robot_radius_m)
+    d.text += fmt::format(
+        " Between rigid bodies and walls it can only pass by squeezing: the widest way lets a ball of radius "
+        "{:.3g} m through, and it holds one of {:.3g} m.",
+        passage, space.robot_radius_m);
+  else
+    d.text += " Rigid bodies and walls leave it a way that is wide enough.";
+  return d;
+}
+
+}  // namespace limber::app

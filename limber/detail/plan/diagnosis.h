@@ -1,0 +1,19 @@
+// Why no plan was found, as far as can be known: what stands in the way at the nearest node, and whether
+// rigid geometry forbids it.
+#pragma once
+
+#include <string>
+
+#include "core/json.h"
+#include "limber/detail/world/fem_system.h"
+#include "plan/search.h"
+
+namespace limber::app {
+
+struct Diagnosis {
+  std::string text;  // sentences that follow plan::explain's
+  Json json;
+};
+Diagnosis diagnose(const fem::World&, const FemSystem&, const plan::Plan&);
+
+}  // namespace limber::app

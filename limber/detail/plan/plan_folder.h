@@ -1,0 +1,100 @@
+// plan.npz with what it takes to rebuild its world: the scene's text, the edits made to it, and the hashes of
+// the bodies.
+#pragma once
+
+#include <map>
+#include <vector>
+
+#include "limber/detail/body/body.h"
+#include "limber/detail/commands.h"
+#include "limber/detail/world/analysis.h"
+#include "limber/detail/world/fem_system.h"
+#include "plan/search.h"
+#include "scenes/scene.h"
+
+namespace limber::app {
+
+struct PlanFolder {
+  plan::Plan plan;
+  scenes::Scene scene;
+  Json summary;             // as `limber plan --json` printed it
+  std::uint64_t file_hash;  // of plan.npz
+  Json cage_hashes;         // by body name
+  std::string version;      // of the limber that wrote it
+  bool sealed;              // as plan::PlanFile
+};
+
+void write_plan_folder(const fs::path& folder, const plan::Plan&, const scenes::Scene&,
+                       const std::vector<PreparedBody>&, const Json& summary);
+
+// Measures the plan's motion, writes plan.npz, volume.svg and the manifest, and says all that there is to
+// say; after a stop signal writes it unmeasured. `extra` goes into the summary, `extra_text` among its lines.
+Outcome keep_plan(const fs::path& folder, const scenes::Scene&, const std::vector<PreparedBody>&,
+                  const fem::World&, const FemSystem&, plan::Plan&, const Json& extra,
+                  const std::string& extra_text);
+
+// The same of a motion that is measured already.
+Outcome keep_measured_plan(const fs::path& folder, const scenes::Scene&, const std::vector<PreparedBody>&,
+                           const fem::World&, const FemSystem&, const plan::Plan&, const MotionFigures&,
+                           const Json& extra, const std::string& extra_text);
+
+// Of what a signal ended nothing is measured, so that it ends at once: no figures, no pictures.
+inline bool is_unmeasured(const plan::Plan& plan) {
+  return !plan.measured || (plan.simulation && plan.simulation->ending == plan::Simulation::stopped);
+}
+
+// All of a summary that follows from the plan: not what the dynamics cost, nor what came after the search.
+Json facts_of(const plan::Plan&, const fem::World&, const FemSystem&, const MotionFigures&);
+
+// The pictures that lie beside plan.npz, name → bytes.
+std::map<std::string, std::string> pictures_of(const scenes::Scene&, const fem::World&, const plan::Plan&,
+                                               const MotionFigures&);
+
+// Throws InputError when plan.npz is missing, damaged, or not limber's.
+PlanFolder read_plan_folder(const fs::path& folder);
+
+// The same of a plan that was searched: throws InputError where the folder holds a simulation.
+PlanFolder read_searched_folder(const fs::path& folder);
+
+// The same, for what knows but motions from the scene's start: `what` says who.
+PlanFolder read_folder_from_the_start(const fs::path& folder, const std::string& what);
+
+// Whether it begins as a frame of another folder (its summary's "from"), not at the scene's start.
+bool begins_elsewhere(const PlanFolder&);
+
+// The system that the folder's motion is of, from where it began; of a simulation without a goal.
+FemSystem system_of(const PlanFolder&, const fem::World&, const std::vector<PreparedBody>&);
+
+// The first entry of plan.npz that limber would write otherwise, or not at all; "" where there is none.
+std::string odd_entry(const fs::path& folder, const PlanFolder&, const std::vector<PreparedBody>&);
+
+// Throws InputError where the plan's states, controls or frame times are none of this world: what follows
+// would reach beyond its nodes, or replay without end.
+void require_of_world(const plan::Plan&, const fem::World&, const fs::path& folder);
+
+// The world of its scene, begun as the plan begins: bodies that overlap there are not parted once more.
+fem::World world_of(const PlanFolder&, const std::vector<PreparedBody>&);
+
+// The bodies of the plan's scene. Throws InputError when a cage has changed since the plan was made.
+std::vector<PreparedBody> read_caged_bodies_of(const PlanFolder&, const fs::path& folder);
+
+// The bodies that the plan was made with. Throws InputError when one has changed since, or the plan is not of
+// their world.
+std::vector<PreparedBody> read_bodies_of(const PlanFolder&, const fs::path& folder);
+
+// What `limber plan` finds before it keeps it: a search, or several, and what makes their path better.
+// `extra` and `extra_text` as of keep_plan. `earlier` and its summary: the plan that this one goes on from.
+struct Found {
+  plan::Plan plan;
+  Json extra;
+  std::string extra_text;
+};
+Found find_plan(const scenes::Scene&, const FemSystem&, const PlanOptions&,
+                std::optional<plan::Plan> earlier = std::nullopt, const Json& earlier_summary = {});
+
+scenes::Scene read_scene(const PlanOptions&);
+plan::Settings settings_of(const scenes::Scene&, const PlanOptions&);
+Outcome plan(const PlanOptions&, const scenes::Scene&);
+bool plan_is_up_to_date(const PlanOptions&, const scenes::Scene&);
+
+}  // namespace limber::app

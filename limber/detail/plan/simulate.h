@@ -1,0 +1,26 @@
+// A motion that begins where another one was.
+#pragma once
+
+#include "limber/detail/plan/plan_folder.h"
+
+namespace limber::app {
+
+// Frame `frame` of the plan or simulation in `folder`, as plan.npz has it, positions and velocities bit for
+// bit: of each body that moves in both worlds, at the step nearest to the time of that frame. Bodies that the
+// other world lacks, or holds, are where the scene has them, kinematic ones where their keyframes have them
+// then. Throws InputError where there is no such frame, nothing that can be pushed here can be there, a body
+// has another cage there, or a kinematic body was elsewhere.
+State start_from(const fs::path& folder, const PlanFolder& other, int frame, const scenes::Scene&,
+                 const fem::World&);
+
+struct Beginning {
+  std::optional<State> start;  // nothing: the scene's
+  Json from;                   // what the summary tells of it; null likewise
+};
+// `from` may be empty, then there is no frame; the summary is of a motion in `out`. Throws as start_from.
+Beginning beginning_of(const fs::path& from, std::optional<int> frame, const fs::path& out,
+                       const scenes::Scene&, const fem::World&);
+// Throws InputError where they are one: what begins there would write over it.
+void require_other_folder(const fs::path& from, const fs::path& out);
+
+}  // namespace limber::app

@@ -1,0 +1,340 @@
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include "core/error.h"
+#include "core/progress.h"
+#include "core/random.h"
+#include "limber/detail/commands.h"
+#include "limber/detail/plan/plan_folder.h"
+#include "limber/detail/verify/promises.h"
+#include "limber/detail/verify/verify_plan.h"
+#include "limber/detail/world/analysis.h"
+#include "limber/detail/world/fem_system.h"
+#include "limber/detail/world/scene_world.h"
+#include "plan/course.h"
+#include "plan/follow.h"
+#include "plan/shortcut.h"
+
+namespace limber::app {
+
+namespace {
+
+constexpr int most_worlds = 4;
+// Streams of random numbers: worlds, and after them perturbations of forces.
+constexpr std::uint64_t first_world_stream = std::uint64_t(1) << 61;
+
+// What became of one perturbed replay.
+struct Fate {
+  int world = 0;
+  bool reaches = false;
+  const char* end = "";
+  double distance_m = 0, speed_m_s = 0, duration_s = 0;
+  Vec3 end_center_m = Vec3::Zero();
+  double volume_change = 0, penetration_m = 0;
+  double least_stretch = 1, largest_stretch = 1, overlap_m = 0, self_overlap_m = 0;
+  double asked_n = 0, force_n = 0;  // the largest that a control asked for, and that acted
+  std::vector<std::string> broken;  // of the promises that `limber verify` looks at
+};
+
+double factor(Rng& rng, double share) { return 1 + share * rng.uniform(-1, 1); }
+
+// Every body with its own factors; a part keeps its ratio to the rest of its body.
+scenes::Scene with_other_materials(scenes::Scene scene, double share, Rng rng) {
+  for (scenes::BodySpec& body : scene.bodies) {
+    const double stiffness = factor(rng, share), density = factor(rng, share), friction = factor(rng, share);
+    body.material.youngs_modulus_pa *= stiffness;
+    body.material.density_kg_m3 *= density;
+    body.material.friction = std::min(2.0, body.material.friction * friction);
+    for (scenes::PartSpec& part : body.parts) {
+      if (part.youngs_modulus_pa) *part.youngs_modulus_pa *= stiffness;
+      if (part.density_kg_m3) *part.density_kg_m3 *= density;
+    }
+  }
+  return scene;
+}
+
+// What acts is not what a control asks for.
+struct Error {
+  double by = 1, angle = 0;
+  Vec3 direction = Vec3::UnitX();
+};
+
+// One for each control, and one for what comes after them.
+std::vector<Error> errors(std::size_t controls, const RobustOptions& options, Rng rng) {
+  std::vector<Error> all(controls + 1);
+  for (Error& error : all) {
+    error.by = factor(rng, options.force_share);
+    error.angle = rng.uniform(0, options.force_deg) * M_PI / 180;
+    error.direction = rng.direction();
+  }
+  return all;
+}
+
+Vec3f turned(const Vec3f& force, double angle, const Vec3& random) {
+  const Vec3 f = force.cast<double>();
+  Vec3 across = random - f * (random.dot(f) / std::max(f.squaredNorm(), 1e-300));
+  if (across.norm() > 0) across.normalize();
+  return (f * std::cos(angle) + across * (f.norm() * std::sin(angle))).cast<float>();
+}
+
+Control with(const Error& error, Control control) {
+  control.force_n = turned(control.force_n, error.angle, error.direction) * float(error.by);
+  control.max_force_n *= float(error.by);
+  return control;
+}
+
+// Without a settle nobody looks whether the robot rests.
+const char* name_of(plan::Course::Result result, bool settles) {
+  switch (result) {
+    case plan::Course::rests_in_goal:
+      return settles ? "at rest in the goal" : "in the goal";
+    case plan::Course::diverged:
+      return "the dynamics diverged";
+    default:
+      return settles ? "not at rest in the goal" : "not in the goal";
+  }
+}
+
+// Whether each leg ended in its goal; how fast the robot was there is not asked.
+bool reaches_all_via(const plan::Plan& plan, const FemSystem& system, const plan::Course& course,
+                     const plan::Guide& guide, const std::vector<int>& before_legs) {
+  for (std::size_t leg = 1; leg < before_legs.size(); ++leg) {
+    const auto count =
+        std::size_t(std::lower_bound(guide.control.begin(), guide.control.end(), before_legs[leg]) -
+                    guide.control.begin());
+    if (count > course.states.size()) return false;
+    const State& state = count == 0 ? course.from : course.states[count - 1];
+    const Vec3 shift = system.on_leg(int(leg) - 1).goal_shift(state);
+    if (!plan::holds(plan.settings.via[leg - 1].goal, system.robot_center(state) - shift)) return false;
+  }
+  return true;
+}
+
+// The plan in its own world, as the perturbed ones are given it.
+struct Planned {
+  const PlanFolder& folder;
+  const std::vector<PreparedBody>& bodies;
+  plan::Guide guide;
+};
+
+// The perturbations [first, last) in one world, in lanes: followed, or open loop.
+std::vector<Fate> replay(const Planned& planned, const RobustOptions& options, bool follows,
+                         const scenes::Scene& scene, int world_number, int first, int last) {
+  const plan::Plan& plan = planned.folder.plan;
+  const fem::World world = build_world(scene, planned.bodies, State(plan.tree.states[0]).positions);
+  const FemSystem system(world, goal_rules_of(scene));
+  const plan::Follower follower(system, plan.settings, planned.guide);
+  const plan::Guide& guide = follower.guide();
+  std::vector<plan::Course> courses;
+  std::vector<double> asked(std::size_t(last - first));
+  for (int i = first; i < last; ++i) {
+    const std::size_t controls = guide.control.empty() ? 0 : std::size_t(guide.control.back()) + 1;
+    const std::vector<Error> of_control = errors(controls, options, Rng(options.seed, std::uint64_t(i)));
+    plan::Course& course = courses.emplace_back();
+    course.from = system.start();
+    double& most = asked[std::size_t(i - first)];
+    const auto acting = [&guide, of_control, &most](std::size_t piece, const Control& control) {
+      most = std::max(most, double(largest_force(control)));
+      return with(
+          piece < guide.control.size() ? of_control[std::size_t(guide.control[piece])] : of_control.back(),
+          control);
+    };
+    if (follows)
+      course.next = [&follower, acting](const State& state) -> std::optional<Control> {
+        if (follower.is_over(state)) return std::nullopt;
+        return acting(follower.piece_at(state), follower.next(state));
+      };
+    else
+      for (std::size_t piece = 0; piece < guide.pieces.size(); ++piece)
+        course.controls.push_back(acting(piece, guide.pieces[piece]));
+  }
+  plan::run(system, plan.settings, courses,
+            {.settle = plan::CourseOptions::anywhere, .keep_frames = true, .ask_acceptable = false});
+  const std::vector<int> before_legs = plan::controls_before_legs(plan);
+  std::vector<Fate> fates;
+  for (std::size_t i = 0; i < courses.size(); ++i) {
+    plan::Course& course = courses[i];
+    const bool goes_by = reaches_all_via(plan, system, course, guide, before_legs);
+    const plan::Trajectory path{course.controls, 0, plan.settings.frames_per_second, std::move(course.frames),
+                                course.end};
+    const MotionFigures figures = measure_motion(world, planned.bodies, path);
+    Fate& fate = fates.emplace_back();
+    fate.world = world_number;
+    fate.reaches = course.result == plan::Course::rests_in_goal && goes_by;
+    fate.end = goes_by ? name_of(course.result, plan.settings.settle.max_duration_s > 0) : "a via is missed";
+    fate.end_center_m = system.robot_center(course.end);
+    fate.distance_m =
+        (fate.end_center_m - system.goal_shift(course.end) - plan.settings.goal.center_of_mass_m).norm();
+    fate.speed_m_s = system.mean_speed(course.end);
+    fate.duration_s = course.costs.duration_s;
+    fate.volume_change =
+        *std::max_element(figures.largest_volume_change.begin(), figures.largest_volume_change.end());
+    fate.penetration_m = figures.deepest_penetration_m;
+    fate.least_stretch = figures.least_stretch, fate.largest_stretch = figures.largest_stretch;
+    fate.overlap_m = figures.deepest_overlap_m, fate.self_overlap_m = figures.deepest_self_overlap_m;
+    fate.asked_n = asked[i], fate.force_n = figures.largest_force_n;
+    Promises table;
+    check_shapes(figures, world, table);
+    for (const Json& row : table.rows())
+      if (!row.at("kept").get<bool>()) fate.broken.push_back(row.at("promise"));
+  }
+  return fates;
+}
+
+Json json_of(const Fate& f) {
+  return {{"world", f.world},
+          {"reaches", f.reaches},
+          {"end", f.end},
+          {"distance_m", f.distance_m},
+          {"speed_m_s", f.speed_m_s},
+          {"duration_s", f.duration_s},
+          {"end_center_m", {f.end_center_m.x(), f.end_center_m.y(), f.end_center_m.z()}},
+          {"largest_volume_change_percent", 100 * f.volume_change},
+          {"deepest_penetration_m", f.penetration_m},
+          {"least_stretch", f.least_stretch},
+          {"largest_stretch", f.largest_stretch},
+          {"deepest_overlap_m", f.overlap_m},
+          {"deepest_self_overlap_m", f.self_overlap_m},
+          {"largest_force_asked_n", f.asked_n},
+          {"largest_force_n", f.force_n},
+          {"broken_promises", f.broken}};
+}
+
+}  // namespace
+
+namespace {
+
+// The same worlds and errors, followed or open loop.
+struct Tally {
+  std::vector<Fate> fates;
+  int reached = 0, keep_all = 0;
+  double spread_m = 0, farthest_m = 0;
+  Fate worst;  // of each figure
+  std::map<std::string, int> broken;
+};
+
+Tally tally_of(std::vector<Fate> fates, const Vec3& planned_end) {
+  Tally tally;
+  Fate& worst = tally.worst;
+  for (const Fate& f : fates) {
+    tally.reached += f.reaches, tally.keep_all += f.broken.empty();
+    const double apart = (f.end_center_m - planned_end).norm();
+    tally.spread_m += apart * apart / double(fates.size());
+    tally.farthest_m = std::max(tally.farthest_m, apart);
+    worst.volume_change = std::max(worst.volume_change, f.volume_change);
+    worst.penetration_m = std::max(worst.penetration_m, f.penetration_m);
+    worst.least_stretch = std::min(worst.least_stretch, f.least_stretch);
+    worst.largest_stretch = std::max(worst.largest_stretch, f.largest_stretch);
+    worst.overlap_m = std::max(worst.overlap_m, f.overlap_m);
+    worst.self_overlap_m = std::max(worst.self_overlap_m, f.self_overlap_m);
+    worst.asked_n = std::max(worst.asked_n, f.asked_n), worst.force_n = std::max(worst.force_n, f.force_n);
+    for (const std::string& promise : f.broken) ++tally.broken[promise];
+  }
+  tally.spread_m = std::sqrt(tally.spread_m);
+  tally.fates = std::move(fates);
+  return tally;
+}
+
+Json json_of(const Tally& tally) {
+  const Fate& worst = tally.worst;
+  Json rows = Json::array();
+  for (const Fate& fate : tally.fates) rows.push_back(json_of(fate));
+  return {{"reached", tally.reached},
+          {"share_reached", double(tally.reached) / double(tally.fates.size())},
+          {"end_spread_m", tally.spread_m},
+          {"end_farthest_m", tally.farthest_m},
+          {"largest_volume_change_percent", 100 * worst.volume_change},
+          {"deepest_penetration_m", worst.penetration_m},
+          {"least_stretch", worst.least_stretch},
+          {"largest_stretch", worst.largest_stretch},
+          {"deepest_overlap_m", worst.overlap_m},
+          {"deepest_self_overlap_m", worst.self_overlap_m},
+          {"largest_force_asked_n", worst.asked_n},
+          {"largest_force_n", worst.force_n},
+          {"keep_all_promises", tally.keep_all},
+          {"broken_promises", tally.broken},
+          {"replays", rows}};
+}
+
+std::string text_of(const Tally& tally, const RobustOptions& options, const plan::Settings& settings) {
+  std::string text =
+      "  world  end                      from the goal  speed       lasts   volume  stretch      overlap   "
+      "penetration  force    promises\n";
+  for (const Fate& f : tally.fates)
+    text += fmt::format(
+        "  {:5}  {:23}  {:8.3f} m     {:.4f} m/s  {:5.2f} s  {:5.2f} %  {:.2f} … {:.2f}  {:.4f} m  {:.4f} m  "
+        "   "
+        "{:5.4g} N  {}\n",
+        f.world, f.end, f.distance_m, f.speed_m_s, f.duration_s, 100 * f.volume_change, f.least_stretch,
+        f.largest_stretch, std::max(f.overlap_m, f.self_overlap_m), f.penetration_m, f.asked_n,
+        f.broken.empty() ? "kept" : fmt::format("{} broken", f.broken.size()));
+  const Fate& worst = tally.worst;
+  text += fmt::format(
+      "{} of {} {} in the goal (materials ± {:g} %, forces ± {:g} %, turned by up to {:g} degrees, "
+      "seed {})\n"
+      "  end          {:.3f} m from the plan's (root mean square), at most {:.3f} m\n"
+      "  volume       changes by at most {:.2f} %\n"
+      "  stretch      within {:.3f} and {:.3f}\n"
+      "  surfaces     overlap at most {:.4f} m, in themselves {:.4f} m\n"
+      "  penetration  at most {:.4f} m\n"
+      "  force        asked for at most {:.4g} of {:.4g} N; what acted {:.4g} N\n"
+      "  promises     all kept in {} of {}\n",
+      tally.reached, tally.fates.size(), settings.settle.max_duration_s > 0 ? "come to rest" : "end",
+      100 * options.material_share, 100 * options.force_share, options.force_deg, options.seed,
+      tally.spread_m, tally.farthest_m, 100 * worst.volume_change, worst.least_stretch, worst.largest_stretch,
+      worst.overlap_m, worst.self_overlap_m, worst.penetration_m, worst.asked_n, settings.max_force_n,
+      worst.force_n, tally.keep_all, tally.fates.size());
+  for (const auto& [promise, times] : tally.broken)
+    text += fmt::format("    broken in {}: {}\n", times, promise);
+  return text;
+}
+
+}  // namespace
+
+Outcome robust(const RobustOptions& options) {
+  const NothingToKeep nothing_to_keep;
+  const PlanFolder planned = read_folder_from_the_start(options.folder, "limber robust");
+  if (!planned.plan.solved())
+    throw InputError(
+        fmt::format("{}: its plan does not reach the goal, so there is nothing to perturb; plan on with "
+                    "limber plan --resume",
+                    options.folder.string()));
+  const std::vector<PreparedBody> bodies = read_bodies_of(planned, options.folder);
+  const fem::World world = world_of(planned, bodies);
+  const FemSystem system(world, goal_rules_of(planned.scene));
+  const plan::Trajectory& path = planned.plan.trajectory;
+  const Planned own{planned, bodies, plan::guide_of(system, planned.plan.settings, path)};
+  const Vec3 planned_end = system.robot_center(path.end);
+
+  const int n = options.perturbations, worlds = std::min(n, most_worlds);
+  const auto tally = [&](bool follows) {
+    std::vector<Fate> fates;
+    for (int w = 0; w < worlds; ++w) {
+      throw_if_stopped();
+      const scenes::Scene scene = with_other_materials(
+          planned.scene, options.material_share, Rng(options.seed, first_world_stream + std::uint64_t(w)));
+      const std::vector<Fate> of_world =
+          replay(own, options, follows, scene, w, w * n / worlds, (w + 1) * n / worlds);
+      fates.insert(fates.end(), of_world.begin(), of_world.end());
+    }
+    return tally_of(std::move(fates), planned_end);
+  };
+  const Tally open_loop = tally(false);
+  Json json{{"perturbations", n},
+            {"seed", options.seed},
+            {"material_share", options.material_share},
+            {"force_share", options.force_share},
+            {"force_deg", options.force_deg},
+            {"max_force_n", planned.plan.settings.max_force_n}};
+  json.update(json_of(open_loop));
+  std::string text = text_of(open_loop, options, planned.plan.settings);
+  if (options.follow) {
+    const Tally followed = tally(true);
+    json["followed"] = json_of(followed);
+    text = "open loop\n" + text + "followed\n" + text_of(followed, options, planned.plan.settings);
+  }
+  return {exit_done, json, text};
+}
+
+}  // namespace limber::app

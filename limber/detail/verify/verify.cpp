@@ -1,0 +1,139 @@
+#include "limber/detail/verify/verify.h"
+
+#include "core/error.h"
+#include "core/hash.h"
+#include "core/progress.h"
+#include "limber/detail/commands.h"
+#include "limber/detail/verify/promises.h"
+#include "limber/detail/verify/verify_body.h"
+#include "limber/detail/verify/verify_plan.h"
+#include "limber/detail/world/scene_world.h"
+#include "scenes/library.h"
+
+namespace limber::app {
+
+namespace {
+
+// What scene it is that all is derived from.
+std::string text_of_scene(const Json& scene) {
+  if (scene.is_null()) return "";
+  std::string edits;
+  for (const Json& set : scene.at("sets")) edits += " --set " + set.get<std::string>();
+  return fmt::format("a plan of scene {} (hash of its text {}){}\n", scene.at("name").get<std::string>(),
+                     scene.at("hash").get<std::string>(), edits.empty() ? "" : ", edited by" + edits);
+}
+
+Outcome outcome_of(const Promises& table, const Json& motion, const Json& scene) {
+  std::string text = text_of_scene(scene);
+  for (const Json& r : table.rows())
+    text += fmt::format("  {:6}  {:48}  {}\n", r.at("kept").get<bool>() ? "kept" : "BROKEN",
+                        r.at("promise").get<std::string>(), r.at("value").get<std::string>());
+  for (const Json& r : table.measured())
+    text += fmt::format("  {:8}{:48}  {}\n", "found", r.at("what").get<std::string>(),
+                        r.at("value").get<std::string>());
+  if (!motion.is_null())
+    text += fmt::format(
+        "largest strain {:.3f} ({}), strongest contact {:.1f} N ({})\n",
+        motion.at("largest_strain").get<double>(), motion.at("largest_strain_of").get<std::string>(),
+        motion.at("largest_contact_force_n").get<double>(), motion.at("contact_between").get<std::string>());
+  text += table.all_kept() ? "every promise is kept\n" : "not every promise is kept\n";
+  return {table.all_kept() ? exit_done : exit_defect,
+          {{"all_kept", table.all_kept()},
+           {"promises", table.rows()},
+           {"measured", table.measured()},
+           {"motion", motion},
+           {"scene", scene}},
+          text};
+}
+
+// Each body by itself, and whether it is the scene's.
+void check_bodies(const fs::path& folder, const scenes::Scene& scene, const std::vector<PreparedBody>& bodies,
+                  const VerifyDepth& depth, Promises& table) {
+  const bool is_trusted = depth.trusted.has_value();
+  const std::vector<fs::path> data = is_trusted ? depth.trusted->data : std::vector<fs::path>{};
+  for (std::size_t b = 0; b < bodies.size(); ++b) {
+    const scenes::BodySpec& body = scene.bodies[b];
+    const Origin origin = origin_of(scene, body, data, bodies[b]);
+    check_origin(body.name, origin, is_trusted, table);
+    check_body(body.name, bodies[b], body_folder(folder, body), origin.made_cage, depth.remake, table);
+  }
+}
+
+}  // namespace
+
+Outcome verify_plan(const fs::path& folder, const PlanFolder& planned,
+                    const std::vector<PreparedBody>& bodies, const fem::World& world, MotionFigures& figures,
+                    const VerifyDepth& depth) {
+  const std::optional<TrustedScene>& trusted = depth.trusted;
+  const NothingToKeep nothing_to_keep;
+  Promises table;
+  scenes::Scene scene = planned.scene;
+  if (trusted) {
+    const std::string wrong = scene.text != trusted->scene.text   ? "its text is another"
+                              : scene.sets != trusted->scene.sets ? "its edits by --set are others"
+                                                                  : "";
+    table.row("the plan is of the scene " + trusted->name, wrong.empty(), wrong);
+    scene.folder = trusted->scene.folder;
+  }
+  const std::vector<fs::path> data = trusted ? trusted->data : std::vector<fs::path>{};
+  check_bodies(folder, scene, bodies, depth, table);
+  for (const scenes::BodySpec& body : scene.scenery)
+    check_origin(body.name, origin_of_scenery(scene, body, data, folder), trusted.has_value(), table);
+  check_goal_cage(goal_cage_of(scene, data, bodies), trusted.has_value(), table);
+  check_plan(folder, planned, bodies, world, figures, table);
+  check_pictures(folder, planned, world, figures, table);
+  return outcome_of(
+      table, json_of(figures),
+      {{"name", scene.name}, {"hash", hex(hash_of(std::string_view(scene.text)))}, {"sets", scene.sets}});
+}
+
+Outcome verify(const VerifyOptions& options) {
+  const fs::path& folder = options.folder;
+  if (!fs::is_directory(folder))
+    throw InputError(fmt::format("{}: is not a folder; name a work folder of limber", folder.string()));
+  const bool scene_is_named = !options.scene.scene.empty();
+  if (!scene_is_named && !(options.scene.sets.empty() && options.scene.data.empty()))
+    throw InputError("--set and --data are of the scene that --scene names, and none is named");
+  if (fs::exists(folder / "plan.npz")) {
+    std::optional<TrustedScene> trusted;
+    if (scene_is_named)
+      trusted = {options.scene.scene,
+                 scenes::read_scene_file(scenes::find_scene(options.scene.scene), options.scene.sets),
+                 options.scene.data};
+    const PlanFolder planned = read_plan_folder(folder);
+    const std::vector<PreparedBody> bodies = read_caged_bodies_of(planned, folder);
+    const VerifyDepth depth{trusted, options.remake};
+    try {
+      require_of_world(planned.plan, world_of(planned, bodies), folder);
+    } catch (const InputError&) {
+      // A body that is not the scene's weighs something else, and then nothing of the plan fits: what is to
+      // be named is the body.
+      Promises table;
+      scenes::Scene scene = planned.scene;
+      if (trusted) scene.folder = trusted->scene.folder;
+      check_bodies(folder, scene, bodies, depth, table);
+      if (table.all_kept()) throw;
+      return outcome_of(table, {}, {});
+    }
+    const fem::World world = build_world(planned.scene, bodies);
+    MotionFigures figures;
+    const Outcome outcome = verify_plan(folder, planned, bodies, world, figures, depth);
+    if (options.observables) write_observables(*options.observables, world, figures);
+    return outcome;
+  }
+  if (fs::exists(folder / "report.json")) {
+    if (options.observables || scene_is_named)
+      throw InputError(
+          fmt::format("{}: holds no plan, so there is nothing to observe, and no scene; leave --observables "
+                      "and --scene out",
+                      folder.string()));
+    Promises table;
+    check_body("body", read_body(folder), folder, std::nullopt, options.remake, table);
+    return outcome_of(table, {}, {});
+  }
+  throw InputError(
+      fmt::format("{}: holds neither plan.npz nor report.json; make them with limber run or limber prepare",
+                  folder.string()));
+}
+
+}  // namespace limber::app

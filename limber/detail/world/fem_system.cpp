@@ -1,0 +1,339 @@
+#include "limber/detail/world/fem_system.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "core/hash.h"
+#include "core/progress.h"
+#include "core/threads.h"
+#include "fem/batch.h"
+#include "fem/observe.h"
+#include "limber/detail/world/workspace.h"
+
+namespace limber::app {
+
+namespace {
+
+constexpr int preferred_lanes = 16;
+// Goes up where the laws of motion or of what a search refuses change: plans made before are of another
+// world.
+constexpr int edition = 2;
+constexpr int widths[] = {1, 4, 8, 16};
+
+// Nothing where nothing happens by itself.
+void add_script(const fem::World& world, Hasher& hasher) {
+  for (const fem::Force& force : world.forces) {
+    hasher.text("force").value(force.body).value(force.first_step).value(force.end_step);
+    hasher.matrix(force.force_n).value(force.mass_kg);
+    for (const int n : force.nodes) hasher.value(n);
+  }
+  for (const fem::Body& body : world.bodies) {
+    if (!body.velocity_m_s.isZero(0) || !body.angular_velocity_rad_s.isZero(0))
+      hasher.text("velocity").text(body.name).matrix(body.velocity_m_s).matrix(body.angular_velocity_rad_s);
+    if (body.track.keyframes.empty()) continue;
+    hasher.text("track").text(body.name).matrix(body.track.pivot_m);
+    for (const fem::Keyframe& k : body.track.keyframes)
+      hasher.value(k.at_s).matrix(k.position_m).matrix(k.turn_rad);
+  }
+}
+
+std::uint64_t hash_of(const fem::World& world) {
+  Hasher hasher;
+  hasher.text("edition").value(edition);
+  hasher.value(world.robot).matrix(world.bounds_m.lower).matrix(world.bounds_m.upper).value(int(world.walls));
+  hasher.matrix(world.goal_shape_m);
+  hasher.matrix(world.gravity_m_s2).value(world.dt_s).value(world.contact_dt_s).value(world.rest_speed_m_s);
+  for (const double offset : world.surfaces64.offset) hasher.value(offset);
+  if (!world.part_overlaps) hasher.text("overlaps are refused");
+  if (std::isfinite(world.max_overlap_m)) hasher.value(world.max_overlap_m);
+  if (!world.parting.pairs.empty())
+    for (const float x : world.start_positions) hasher.value(x);
+  for (const fem::Body& body : world.bodies) {
+    const fem::Material& m = body.material;
+    hasher.value(limber::hash_of(body.cage))
+        .value(int(m.model))
+        .value(int(body.moving))
+        .value(int(body.kind))
+        .value(int(body.self_contact))
+        .value(int(body.phong));
+    for (const double v : {m.youngs_modulus_pa, m.poisson_ratio, m.density_kg_m3, m.damping_ratio, m.friction,
+                           body.stiffness_share, body.max_volume_change, body.max_stretch})
+      hasher.value(v);
+    for (const auto* of_tets : {&body.youngs_modulus_from_tet_pa, &body.density_from_tet_kg_m3})
+      for (const double v : *of_tets) hasher.value(v);
+    for (const bool fixed : body.fixed) hasher.value(int(fixed));
+    if (body.shape) hasher.value(limber::hash_of(*body.shape));
+  }
+  add_script(world, hasher);
+  return hasher.digest();
+}
+
+}  // namespace
+
+// A hundredth of a second to some tenths, in the largest worlds.
+constexpr std::int64_t steps_between_questions = 8;
+
+class FemSystem::Propagator final : public plan::Propagator {
+ public:
+  explicit Propagator(const FemSystem& system) : system_(system) {}
+  ~Propagator() override {
+    const std::lock_guard lock(system_.mutex_);
+    for (const auto& batch : batches_)
+      if (batch) system_.cost_ += batch->cost();
+  }
+
+  void propagate(std::span<plan::Rollout> rollouts) override {
+    work_.resize(rollouts.size());
+    for (std::size_t i = 0; i < rollouts.size(); ++i)
+      work_[i].start = rollouts[i].from, work_[i].control = rollouts[i].control;
+    fem::propagate(batch_for(int(rollouts.size())), work_);
+    for (std::size_t i = 0; i < rollouts.size(); ++i) {
+      rollouts[i].ok = work_[i].outcome.status == fem::RunStatus::ok;
+      rollouts[i].clear = work_[i].clear;
+      rollouts[i].to = std::move(work_[i].end);
+    }
+  }
+
+  void run(plan::Supply& supply, int look_every) override {
+    while (true) {
+      std::vector<plan::Rollout*> first;
+      const int lanes = std::min(supply.at_once(), preferred_lanes);
+      while (int(first.size()) < lanes)
+        if (plan::Rollout* rollout = supply.next())
+          first.push_back(rollout);
+        else
+          break;
+      if (first.empty()) return;
+      run(batch_for(first.size() == 1 ? 1 : lanes), std::move(first), supply, look_every);
+    }
+  }
+
+ private:
+  void run(fem::Batch& batch, std::vector<plan::Rollout*> in_lane, plan::Supply& supply, int look_every) {
+    const auto load = [&](std::size_t lane) {
+      batch.load(int(lane), *in_lane[lane]->from, in_lane[lane]->control);
+    };
+    in_lane.resize(std::size_t(batch.lanes()), nullptr);
+    for (std::size_t lane = 0; lane < in_lane.size(); ++lane)
+      if (in_lane[lane]) load(lane);
+    const auto now = [&](std::size_t lane) {
+      return in_lane[lane]->from->step + taken(batch, *in_lane[lane], lane);
+    };
+    std::vector<std::int64_t> shown(in_lane.size());  // the step at which the lane's state is, next
+    for (bool any = true; any;) {
+      std::int64_t steps = look_every;
+      for (std::size_t lane = 0; lane < in_lane.size(); ++lane)
+        if (in_lane[lane]) {
+          shown[lane] = supply.next_shown(now(lane));
+          steps = std::min({steps, look_every - taken(batch, *in_lane[lane], lane) % std::int64_t(look_every),
+                            shown[lane] - now(lane), std::int64_t(batch.steps_left(int(lane)))});
+        }
+      for (std::int64_t done = 0; done < steps;) {
+        done += batch.advance(int(std::min(steps - done, steps_between_questions)));
+        if (!supply.wanted()) return give_back(batch, in_lane, supply);
+      }
+      for (std::size_t lane = 0; lane < in_lane.size(); ++lane) {
+        if (!in_lane[lane]) continue;
+        plan::Rollout& rollout = *in_lane[lane];
+        const int steps_taken = taken(batch, rollout, lane);
+        if (batch.steps_left(int(lane)) > 0) {
+          if (goes_on(batch, int(lane), rollout, supply, steps_taken % look_every == 0,
+                      now(lane) == shown[lane]))
+            continue;
+          batch.stop(int(lane));
+          rollout.control.steps = steps_taken;
+        }
+        batch.store(int(lane), rollout.to);
+        rollout.ok = batch.outcome(int(lane)).status == fem::RunStatus::ok;
+        rollout.clear = !rollout.ok || batch.is_clear(int(lane));
+        in_lane[lane] = nullptr;
+        supply.done(rollout);
+      }
+      any = false;
+      for (std::size_t lane = 0; lane < in_lane.size(); ++lane) {
+        if (!in_lane[lane] && (in_lane[lane] = supply.next())) load(lane);
+        any = any || in_lane[lane];
+      }
+    }
+  }
+
+  static void give_back(fem::Batch& batch, const std::vector<plan::Rollout*>& in_lane, plan::Supply& supply) {
+    for (std::size_t lane = 0; lane < in_lane.size(); ++lane) {
+      if (!in_lane[lane]) continue;
+      batch.stop(int(lane));
+      in_lane[lane]->ok = false;
+      supply.done(*in_lane[lane]);
+    }
+  }
+
+  bool goes_on(fem::Batch& batch, int lane, plan::Rollout& rollout, plan::Supply& supply, bool look_due,
+               bool state_due) {
+    if (look_due) {
+      const plan::Look seen = look(batch, lane, rollout.control.steps - batch.steps_left(lane));
+      // Numbers that are none stay so: it has diverged, and nobody need look.
+      const bool finite = seen.center.allFinite() && seen.velocity.allFinite() && seen.goal_shift.allFinite();
+      if (!finite || !supply.goes_on(rollout, seen)) return false;
+    }
+    if (!state_due) return true;
+    batch.peek(lane, peeked_);
+    rollout.clear = batch.is_clear(lane);
+    return supply.goes_on(rollout, peeked_);
+  }
+
+  // The smallest that has so many lanes, if any: idle lanes cost as much as busy ones.
+  fem::Batch& batch_for(int lanes) {
+    const auto width = std::lower_bound(std::begin(widths), std::end(widths) - 1, lanes);
+    auto& batch = batches_[std::size_t(width - std::begin(widths))];
+    if (!batch) batch.emplace(system_.world_, *width);
+    return *batch;
+  }
+
+  static int taken(const fem::Batch& batch, const plan::Rollout& rollout, std::size_t lane) {
+    return rollout.control.steps - batch.steps_left(int(lane));
+  }
+
+  plan::Look look(const fem::Batch& batch, int lane, int steps) const {
+    const fem::Batch::Motion robot = batch.motion(lane, system_.world_.robot);
+    plan::Look look{steps, robot.center_m, robot.velocity_m_s};
+    if (system_.goal_.body >= 0)
+      look.goal_shift = batch.motion(lane, system_.goal_.body).center_m - system_.goal_body_start_m_;
+    if (const GoalRules& last = system_.last_->goal_; last.lost_below_m)
+      look.lost = batch.motion(lane, last.body).lowest_m < *last.lost_below_m;
+    return look;
+  }
+
+  const FemSystem& system_;
+  std::array<std::optional<fem::Batch>, std::size(widths)> batches_;
+  std::vector<fem::Rollout> work_;
+  State peeked_;
+};
+
+FemSystem::FemSystem(const fem::World& world, const GoalRules& goal, std::optional<State> start)
+    : FemSystem(world, goal, std::move(start), hash_of(world)) {}
+
+FemSystem::FemSystem(const fem::World& world, const GoalRules& goal, std::optional<State> start,
+                     std::uint64_t hash_of_world)
+    : world_(world),
+      given_start_(std::move(start)),
+      goal_(goal),
+      goal_body_start_m_(Vec3::Zero()),
+      hash_(hash_of_world) {
+  if (goal.body >= 0) goal_body_start_m_ = fem::center_of_mass_m(world, fem::start_state(world), goal.body);
+  Hasher hasher;
+  hasher.value(hash_);
+  for (const int body : {goal.body, goal.above, goal.below, goal.clear_of}) hasher.value(body);
+  for (const auto& rule : {goal.lost_below_m, goal.turn_tolerance_deg, goal.shape_tolerance_m})
+    hasher.value(int(rule.has_value())).value(rule.value_or(0));
+  for (const GoalRules& rules : goal.via) {
+    via_.push_back(std::unique_ptr<FemSystem>(new FemSystem(world, rules, given_start_, hash_of_world)));
+    via_.back()->last_ = this;
+    hasher.value(via_.back()->hash());
+  }
+  if (given_start_) hasher.value(limber::hash_of(*given_start_));
+  hash_ = hasher.digest();
+}
+
+FemSystem::FemSystem(const fem::World& world, const std::vector<PreparedBody>& bodies, const GoalRules& goal,
+                     std::optional<State> start)
+    : FemSystem(world, goal, std::move(start)) {
+  surfaces_ = std::make_shared<const Surfaces>(world, bodies);
+  surface_size_m_ = bounding_box(bodies[std::size_t(world.robot)].surface.positions).size().maxCoeff();
+  for (const auto& via : via_) via->surfaces_ = surfaces_, via->surface_size_m_ = surface_size_m_;
+}
+
+State FemSystem::start() const { return given_start_ ? *given_start_ : fem::start_state(world_); }
+Vec3 FemSystem::robot_center(const State& state) const {
+  return fem::center_of_mass_m(world_, state, world_.robot);
+}
+Vec3 FemSystem::robot_velocity(const State& state) const {
+  return fem::center_velocity_m_s(world_, state, world_.robot);
+}
+double FemSystem::robot_mass_kg() const { return world_.bodies[std::size_t(world_.robot)].mass_kg; }
+double FemSystem::mean_speed(const State& state) const {
+  return fem::mean_speed_m_s(world_, state, world_.robot);
+}
+int FemSystem::robot_nodes() const { return world_.bodies[std::size_t(world_.robot)].node_count(); }
+Box FemSystem::sample_bounds() const { return world_.bounds_m; }
+double FemSystem::dt_s() const { return world_.dt_s; }
+std::uint64_t FemSystem::hash() const { return hash_; }
+bool FemSystem::acceptable(const State& state) const {
+  if (const GoalRules& last = last_->goal_; last.lost_below_m) {
+    const fem::Body& body = world_.bodies[std::size_t(last.body)];
+    for (int n = body.first_node; body.moving && n < body.first_node + body.node_count(); ++n)
+      if (double(state.positions[std::size_t(3 * n + 2)]) < *last.lost_below_m) return false;
+  }
+  return fem::is_sound(world_, state);
+}
+std::size_t FemSystem::first_refused(std::span<const State> frames) const {
+  if (!surfaces_ || !world_.touches_on_surfaces()) return frames.size();
+  const SeenLimits limits;
+  const std::size_t at_once = 8 * std::size_t(thread_count());
+  std::vector<SeenFrame> seen(frames.size());
+  const auto overlaps = [&](const SeenFrame& frame) {
+    return frame.overlap_m > limits.overlap * surface_size_m_ ||
+           frame.self_overlap_m > limits.self_overlap * surface_size_m_;
+  };
+  for (std::size_t from = 0; from < frames.size(); from += at_once) {
+    const std::size_t to = std::min(from + at_once, frames.size());
+    parallel_for(int(to - from), [&](int i) {
+      throw_if_stopped();
+      seen[from + std::size_t(i)] = surfaces_->at(frames[from + std::size_t(i)]);
+    });
+    for (std::size_t f = from; f < to; ++f)
+      if (overlaps(seen[f])) return f;
+  }
+  // Of one leg alone: what presses in a motion of several does so in its own leg, too.
+  keep_what_presses(seen);
+  const auto gapes = [&](const SeenFrame& frame) {
+    return std::any_of(frame.gaps.begin(), frame.gaps.end(), [&](const SeenFrame::Gap& gap) {
+      return gap.at_contact_m >= limits.worst_gap * surface_size_m_;
+    });
+  };
+  return std::size_t(std::find_if(seen.begin(), seen.end(), gapes) - seen.begin());
+}
+const plan::System& FemSystem::on_leg(int leg) const {
+  return leg < int(via_.size()) ? static_cast<const plan::System&>(*via_[std::size_t(leg)]) : *this;
+}
+bool FemSystem::goal_holds(const State& state) const {
+  if (goal_.turn_tolerance_deg && fem::turn_from_goal_shape_deg(world_, state) > *goal_.turn_tolerance_deg)
+    return false;
+  if (goal_.shape_tolerance_m && fem::distance_from_goal_shape_m(world_, state) > *goal_.shape_tolerance_m)
+    return false;
+  const auto height = [&](int body, bool top) {
+    const Points places = fem::body_positions(world_, state, body);
+    return top ? places.col(2).maxCoeff() : places.col(2).minCoeff();
+  };
+  if (goal_.above >= 0 && height(world_.robot, false) <= height(goal_.above, true)) return false;
+  if (goal_.below >= 0 && height(world_.robot, true) >= height(goal_.below, false)) return false;
+  if (goal_.clear_of < 0) return true;
+  for (const fem::ContactForce& c : fem::contact_forces(world_, state))
+    if ((c.body == goal_.clear_of && c.other == world_.robot) ||
+        (c.other == goal_.clear_of && c.body == world_.robot))
+      return false;
+  return true;
+}
+Vec3 FemSystem::goal_shift(const State& state) const {
+  if (goal_.body < 0) return Vec3::Zero();
+  return fem::center_of_mass_m(world_, state, goal_.body) - goal_body_start_m_;
+}
+plan::Measures FemSystem::measures(const State& state) const {
+  return {fem::elastic_energy_j(world_, state), fem::largest_volume_change(world_, state)};
+}
+Vec3 FemSystem::goal_velocity(const State& state) const {
+  return goal_.body < 0 ? Vec3::Zero() : fem::center_velocity_m_s(world_, state, goal_.body);
+}
+plan::Workspace FemSystem::workspace() const { return workspace_of(world_, given_start_); }
+int FemSystem::lanes() const { return preferred_lanes; }
+std::unique_ptr<plan::Propagator> FemSystem::make_propagator() const {
+  return std::make_unique<Propagator>(*this);
+}
+fem::Cost FemSystem::cost() const {
+  fem::Cost sum;
+  for (const auto& via : via_) sum += via->cost();
+  const std::lock_guard lock(mutex_);
+  sum += cost_;
+  return sum;
+}
+
+}  // namespace limber::app

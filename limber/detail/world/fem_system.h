@@ -1,0 +1,76 @@
+// What the planner may ask of the soft bodies: the adapter from fem::World to plan::System.
+#pragma once
+
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <vector>
+
+#include "fem/cost.h"
+#include "fem/world.h"
+#include "limber/detail/world/seen.h"
+#include "plan/system.h"
+
+namespace limber::app {
+
+// What a goal asks for besides the place of the robot's centre of mass. Bodies by index, −1: none.
+struct GoalRules {
+  int body = -1;                       // takes the goal along; −1: the goal stays where it is
+  std::optional<double> lost_below_m;  // the goal is lost once that body's lowest node is below this height
+  std::optional<double> turn_tolerance_deg;  // the robot is turned as fem::World::goal_shape_m is
+  std::optional<double> shape_tolerance_m;   // no node is farther from its place in that shape
+  int above = -1, below = -1;                // the whole robot is higher, lower than all of this body
+  int clear_of = -1;                         // no contact with this body pushes the robot
+  std::vector<GoalRules> via;                // of the goals before it, likewise; lost_below_m is of the last
+};
+
+class FemSystem final : public plan::System {
+ public:
+  // The world must outlive it. Begins where the world does, or in a state of the caller's.
+  explicit FemSystem(const fem::World& world, const GoalRules& = {},
+                     std::optional<State> start = std::nullopt);
+  // For searches: ways are refused on which surfaces are deeper in one another, or in themselves, or press
+  // one another through a wider gap, than SeenLimits has it, where contact is on them. The bodies must
+  // outlive it.
+  FemSystem(const fem::World&, const std::vector<PreparedBody>&, const GoalRules&,
+            std::optional<State> start = std::nullopt);
+
+  State start() const override;
+  Vec3 robot_center(const State&) const override;
+  Vec3 robot_velocity(const State&) const override;
+  double robot_mass_kg() const override;
+  double mean_speed(const State&) const override;
+  int robot_nodes() const override;
+  Box sample_bounds() const override;
+  double dt_s() const override;
+  std::uint64_t hash() const override;
+  bool acceptable(const State&) const override;  // it is sound, and the goal is not lost
+  bool goal_holds(const State&) const override;
+  const System& on_leg(int) const override;
+  Vec3 goal_shift(const State&) const override;
+  plan::Measures measures(const State&) const override;
+  Vec3 goal_velocity(const State&) const override;
+  plan::Workspace workspace() const override;
+  int lanes() const override;
+  std::unique_ptr<plan::Propagator> make_propagator() const override;
+  fem::Cost cost() const;  // of all propagators that have ended
+  std::size_t first_refused(std::span<const State> frames) const override;
+  const Surfaces* surfaces() const { return surfaces_.get(); }  // nullptr where it was given no bodies
+
+ private:
+  class Propagator;
+  FemSystem(const fem::World&, const GoalRules&, std::optional<State> start, std::uint64_t hash_of_world);
+  const fem::World& world_;
+  std::optional<State> given_start_;
+  GoalRules goal_;
+  std::vector<std::unique_ptr<FemSystem>> via_;
+  const FemSystem* last_ = this;  // on the leg to the last goal: what is lost to it is lost
+  Vec3 goal_body_start_m_;
+  std::uint64_t hash_;
+  std::shared_ptr<const Surfaces> surfaces_;
+  double surface_size_m_ = 0;  // of the robot's
+  mutable std::mutex mutex_;
+  mutable fem::Cost cost_;
+};
+
+}  // namespace limber::app

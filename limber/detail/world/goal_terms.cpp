@@ -1,0 +1,87 @@
+#include "limber/detail/world/goal_terms.h"
+
+#include <fmt/format.h>
+
+#include "fem/observe.h"
+
+namespace limber::app {
+
+namespace {
+
+GoalTerm place_term(const scenes::Goal& goal, const fem::World& world, const State& state) {
+  Vec3 shift = Vec3::Zero();
+  if (goal.moves_with >= 0)
+    shift = fem::center_of_mass_m(world, state, goal.moves_with) -
+            fem::center_of_mass_m(world, fem::start_state(world), goal.moves_with);
+  const Vec3 center = fem::center_of_mass_m(world, state, world.robot) - shift, aim = goal.center_of_mass_m;
+  const std::string moved = goal.moves_with >= 0 ? ", moved along" : "";
+  if (goal.box_m) {
+    // How far outside, along the axis on which that is most.
+    const double outside =
+        std::max((goal.box_m->lower - center).maxCoeff(), (center - goal.box_m->upper).maxCoeff());
+    return {"centre of mass in its box" + moved, outside <= 0,
+            fmt::format("{:.3f} m {}", std::abs(outside), outside <= 0 ? "inside" : "outside")};
+  }
+  const double distance = (center - aim).norm();
+  return {fmt::format("centre of mass within {:g} m of ({:g} {:g} {:g}){}", goal.radius_m, aim.x(), aim.y(),
+                      aim.z(), moved),
+          distance <= goal.radius_m, fmt::format("{:.3f} m from it", distance)};
+}
+
+// All of `higher` over all of `lower`, by their nodes.
+GoalTerm over_term(const fem::World& world, const State& state, int higher, int lower, std::string asked) {
+  const double air = fem::body_positions(world, state, higher).col(2).minCoeff() -
+                     fem::body_positions(world, state, lower).col(2).maxCoeff();
+  return {std::move(asked), air > 0,
+          fmt::format("{:.3f} m {}", std::abs(air), air > 0 ? "apart" : "too little")};
+}
+
+}  // namespace
+
+std::vector<GoalTerm> terms_of(const scenes::Scene& scene, const scenes::Goal& goal, const fem::World& world,
+                               const State& state) {
+  std::vector<GoalTerm> terms{place_term(goal, world, state)};
+  const auto name = [&](int body) { return scene.bodies[std::size_t(body)].name; };
+  if (goal.above >= 0)
+    terms.push_back(
+        over_term(world, state, world.robot, goal.above, "whole robot above " + name(goal.above)));
+  if (goal.below >= 0)
+    terms.push_back(
+        over_term(world, state, goal.below, world.robot, "whole robot below " + name(goal.below)));
+  if (goal.clear_of >= 0) {
+    int contacts = 0;
+    for (const fem::PairForce& pair : fem::pair_forces(fem::contact_forces(world, state)))
+      if (std::minmax(pair.body, pair.other) == std::minmax(world.robot, goal.clear_of))
+        contacts += pair.contacts;
+    terms.push_back(
+        {"no contact with " + name(goal.clear_of), contacts == 0, fmt::format("{} contacts", contacts)});
+  }
+  if (goal.shape && goal.shape->turn_tolerance_deg) {
+    const double most = *goal.shape->turn_tolerance_deg, turn = fem::turn_from_goal_shape_deg(world, state);
+    terms.push_back({fmt::format("turned within {:g} degrees of the shape asked for", most), turn <= most,
+                     fmt::format("{:.2f} degrees", turn)});
+  }
+  if (goal.shape && goal.shape->tolerance_m) {
+    const double most = *goal.shape->tolerance_m, off = fem::distance_from_goal_shape_m(world, state);
+    terms.push_back({fmt::format("every node within {:g} m of the shape asked for", most), off <= most,
+                     fmt::format("{:.4f} m", off)});
+  }
+  return terms;
+}
+
+GoalTerm rest_term(const scenes::Scene& scene, const fem::World& world, const State& state) {
+  const double most = scene.planner.settle_speed_m_s, speed = fem::mean_speed_m_s(world, state, world.robot);
+  return {fmt::format("at rest, slower than {:g} m/s", most), speed < most, fmt::format("{:.4f} m/s", speed)};
+}
+
+GoalTerm loss_term(const scenes::Scene& scene, const fem::World& world, const State& state) {
+  const scenes::Goal& goal = scene.goal;
+  if (!goal.lost_below_m) return {"", true, ""};
+  const double least = *goal.lost_below_m,
+               lowest = fem::body_positions(world, state, goal.moves_with).col(2).minCoeff();
+  return {fmt::format("not lost: {} nowhere below {:g} m", scene.bodies[std::size_t(goal.moves_with)].name,
+                      least),
+          lowest >= least, fmt::format("lowest {:.3f} m", lowest)};
+}
+
+}  // namespace limber::app

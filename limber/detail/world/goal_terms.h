@@ -1,0 +1,29 @@
+// What a goal asks for, term by term: read from the scene and measured in the world, apart from the planner's
+// own test of a goal (limber/detail/world/fem_system.h) and from what a plan says of itself.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "fem/world.h"
+#include "scenes/scene.h"
+
+namespace limber::app {
+
+struct GoalTerm {
+  std::string asked;  // "centre of mass within 0.3 m of (3.2 1 1)"
+  bool met;
+  std::string found;
+};
+
+// The place of the centre of mass (moved along with goal.moves_with since the start), and then turn, shape,
+// above, below and clear_of, as far as the goal asks for them. Speed is not looked at.
+std::vector<GoalTerm> terms_of(const scenes::Scene&, const scenes::Goal&, const fem::World&, const State&);
+
+// Of the robot: its nodes' mean speed is below planner.settle_speed_m_s.
+GoalTerm rest_term(const scenes::Scene&, const fem::World&, const State&);
+
+// With goal.lost_below_m: whether the goal is there still.
+GoalTerm loss_term(const scenes::Scene&, const fem::World&, const State&);
+
+}  // namespace limber::app

@@ -1,0 +1,309 @@
+// What the keys of film and cameras, and the flags of `limber render`, do to the pictures.
+#include <gmock/gmock.h>
+
+#include <cmath>
+#include <map>
+#include <set>
+#include <sstream>
+
+#include "limber/detail/plan/plan_folder.h"
+#include "render/png_file.h"
+#include "tests/cli/program.h"
+
+namespace limber::app {
+namespace {
+
+using testing::HasSubstr;
+
+// One plan for all of them.
+class Filmed : public Program {
+ protected:
+  void SetUp() override {
+    const Result planned = limber_program({"plan", scene(text()), "-o", out(), "--json"});
+    ASSERT_EQ(planned.code, exit_done) << planned.err;
+    frames = planned.json().at("frames");
+  }
+  virtual std::string text() const { return small_scene; }
+  // Frame 3 under these flags.
+  render::Image8 frame_3(std::vector<std::string> flags) const {
+    std::vector<std::string> words{"render", out(), "--frames", "3", "--as", "try"};
+    words.insert(words.end(), flags.begin(), flags.end());
+    const Result result = limber_program(words);
+    EXPECT_EQ(result.code, exit_done) << result.err;
+    return render::read_png(picture("0003.png"));
+  }
+  fs::path picture(const std::string& name) const { return fs::path(out()) / "frames-try" / name; }
+  int frames = 0;
+};
+using Filmed_slow = Filmed;  // stays out of the sanitizer runs
+
+TEST_F(Filmed_slow, EveryKeyOfTheFilmChangesThePicture) {
+  const render::Image8 plain = frame_3({});
+  for (const char* set :
+       {"film.color_by=strain",     "film.color_by=volume",       "film.color_by=speed",
+        "film.cages=true",          "film.forces=true",           "film.path=true",
+        "film.tree=true",           "film.side_by_side=true",     "film.clock=true",
+        "film.caption=Hello",       "film.bounds_lines=false",    "film.background=#102030",
+        "film.transparent=true",    "camera.turn_deg=90",         "camera.follow=robot",
+        "camera.direction=[1,0,0]", "bodies.robot.color=#00ff00", "bodies.robot.opacity=0.5",
+        "bodies.robot.metallic=1",  "bodies.robot.roughness=0.1", "film.scale_bar=true",
+        "film.look=dark",           "film.look=clinical",         "film.look=paper",
+        "bodies.robot.look=tissue", "bodies.robot.look=fabric"})
+    EXPECT_NE(frame_3({"--set", set}), plain) << set;
+  EXPECT_EQ(frame_3({}), plain);
+  EXPECT_NE(frame_3({"--set", "bodies.robot.deformation=phong"}),
+            frame_3({"--set", "bodies.robot.deformation=linear"}));
+}
+
+// Wherever the bodies are in the picture, no letter is on them.
+TEST_F(Filmed_slow, WordsStandWhereNoBodyIs) {
+  std::set<std::pair<bool, bool>> corners;
+  for (const double x : {-1.0, 1.0})
+    for (const double z : {-1.0, 1.0}) {
+      const std::string camera = fmt::format(
+          "cameras=[{{ name = \"near\", keyframes = [{{ at = 0, eye_m = [{0}, -4, {1}], target_m = [{0}, 1, "
+          "{1}] }}] }}]",
+          2 + 2.3 * x, 0.45 + 1.1 * z);
+      const std::vector<std::string> plain{"--camera", "near",   "--set", camera,
+                                           "--passes", "object", "--set", "film.bounds_lines=false"};
+      std::vector<std::string> with_words = plain;
+      with_words.insert(with_words.end(), {"--set", "film.caption=Hello", "--set", "film.clock=true"});
+      const render::Image8 before = frame_3(plain);
+      const render::Raster16 object = render::read_png_16(picture("0003.object.png"));
+      const render::Image8 after = frame_3(with_words);
+      int words = 0, on_body = 0;
+      double middle_x = 0, middle_y = 0;
+      for (std::size_t i = 0; i < object.levels.size(); ++i) {
+        if (std::equal(&before.rgb[3 * i], &before.rgb[3 * i] + 3, &after.rgb[3 * i])) continue;
+        ++words, on_body += object.levels[i] != 0;
+        middle_x += double(i % std::size_t(before.width)), middle_y += double(i / std::size_t(before.width));
+      }
+      ASSERT_GT(words, 20);
+      EXPECT_EQ(on_body, 0) << camera;
+      corners.insert({middle_x / words < before.width / 2.0, middle_y / words < before.height / 2.0});
+    }
+  EXPECT_GT(corners.size(), 1u) << "bodies stood in the way of none";
+}
+
+TEST_F(Filmed_slow, WhatWouldChangeTheMotionIsRefused) {
+  for (const char* set : {"film.frames_per_second=10", "film.speed=0.5", "planner.seed=3", "goal.radius_m=1",
+                          "bodies.robot.material.density_kg_m3=7"}) {
+    const Result refused = limber_program({"render", out(), "--set", set});
+    EXPECT_EQ(refused.code, exit_bad_input);
+    EXPECT_THAT(refused.err, HasSubstr("the motion is planned already")) << set;
+  }
+  EXPECT_THAT(limber_program({"render", out(), "--camera", "left"}).err, HasSubstr("there are: main"));
+  EXPECT_THAT(limber_program({"render", out(), "--set", "film.caption=心"}).err,
+              HasSubstr("no letters for 心"));
+  EXPECT_THAT(limber_program({"render", out(), "--as", "../x"}).err, HasSubstr("letters, digits"));
+  EXPECT_THAT(limber_program({"render", out(), "--passes", "scalar"}).err, HasSubstr("film.color_by=strain"));
+  EXPECT_THAT(limber_program({"render", out(), "--bits", "16", "--set", "film.clock=true"}).err,
+              HasSubstr("film.clock=false"));
+}
+
+// The range of colours is that of the whole motion, so a part of the frames, or a chunk, has the same.
+TEST_F(Filmed_slow, AFrameIsTheSameByItself) {
+  const render::Image8 alone = frame_3({"--set", "film.color_by=strain"});
+  ASSERT_EQ(limber_program({"render", out(), "--as", "whole", "--set", "film.color_by=strain"}).code,
+            exit_done);
+  EXPECT_EQ(render::read_png(fs::path(out()) / "frames-whole" / "0003.png"), alone);
+  EXPECT_TRUE(fs::exists(fs::path(out()) / "film-whole.mp4"));
+  EXPECT_TRUE(fs::exists(fs::path(out()) / "sheet-whole.png"));
+  EXPECT_FALSE(fs::exists(fs::path(out()) / "film.mp4"));
+}
+
+TEST_F(Filmed_slow, PassesAgreeWithOneAnother) {
+  frame_3({"--passes", "depth,normal,object,scalar", "--bits", "16", "--set", "film.color_by=volume"});
+  const render::Raster16 depth = render::read_png_16(picture("0003.depth.png")),
+                         normal = render::read_png_16(picture("0003.normal.png")),
+                         object = render::read_png_16(picture("0003.object.png")),
+                         scalar = render::read_png_16(picture("0003.scalar.png"));
+  ASSERT_EQ(depth.channels, 1);
+  ASSERT_EQ(normal.channels, 3);
+  ASSERT_EQ(object.channels, 1);
+  ASSERT_EQ(scalar.channels, 2);
+  std::set<int> seen;
+  for (std::size_t i = 0; i < depth.levels.size(); ++i) {
+    const int number = object.levels[i] / 257;  // 8 bit
+    seen.insert(number);
+    EXPECT_EQ(depth.levels[i] == 65535, number == 0) << i;
+    EXPECT_EQ(scalar.levels[2 * i + 1], number == 0 ? 0 : 65535);
+    double length = 0;
+    for (std::size_t c = 0; c < 3; ++c) length += std::pow(normal.levels[3 * i + c] / 32767.5 - 1, 2);
+    EXPECT_NEAR(length, number == 0 ? 0 : 1, 0.01);
+  }
+  EXPECT_EQ(seen, (std::set<int>{0, 1, 2}));
+  const Json key = read_json(picture("passes.json"));
+  EXPECT_EQ(key.at("objects"), Json({"", "robot", "block"}));
+  const double low = key.at("scalar").at("range").at(0), high = key.at("scalar").at("range").at(1);
+  EXPECT_EQ(low, -high);
+  EXPECT_GT(high, 0);
+}
+
+TEST_F(Filmed_slow, TheSubjectFillsItsShareOfThePicture) {
+  ASSERT_EQ(limber_program({"render", out(), "--as", "try", "--passes", "object", "--set",
+                            "camera.subject=robot", "--set", "camera.fill=0.6", "--set",
+                            "camera.direction=[0,0,1]", "--set", "film.bounds_lines=false"})
+                .code,
+            exit_done);
+  int left = 1 << 20, right = -1, top = 1 << 20, bottom = -1, width = 0, height = 0;
+  for (int f = 0; f < frames; ++f) {
+    const render::Raster16 object = render::read_png_16(picture(fmt::format("{:04}.object.png", f)));
+    width = object.width, height = object.height;
+    for (int y = 0; y < height; ++y)
+      for (int x = 0; x < width; ++x)
+        if (object.levels[std::size_t(y) * std::size_t(width) + std::size_t(x)] == 257)
+          left = std::min(left, x), right = std::max(right, x + 1), top = std::min(top, y),
+          bottom = std::max(bottom, y + 1);
+  }
+  EXPECT_NEAR(std::max(double(right - left) / width, double(bottom - top) / height), 0.6, 0.01);
+  EXPECT_THAT(limber_program({"render", out(), "--set", "camera.subject=robt"}).err,
+              HasSubstr("robot, block"));
+}
+
+TEST_F(Filmed_slow, AFrameWithoutItsPassIsNotWhole) {
+  const std::vector<std::string> words{"render", out(), "--resume", "--json", "--passes", "depth"};
+  ASSERT_EQ(limber_program(words).json().at("painted"), frames);
+  EXPECT_EQ(limber_program(words).json().at("painted"), 0);
+  fs::remove(fs::path(out()) / "frames" / "0002.depth.png");
+  EXPECT_EQ(limber_program(words).json().at("painted"), 1);
+}
+
+class SlowMotion_slow : public Filmed {
+  std::string text() const override {
+    std::string edited = replaced("frames_per_second = 5\n", "frames_per_second = 5\nspeed = 0.5\n");
+    return edited.replace(edited.find("seed = 1"), 8, "seed = 3") +
+           "[[cameras]]\nname = \"above\"\ndirection = [0, 0, 1]\n"
+           "[[bodies]]\nname = \"veil\"\nrole = \"scenery\"\nopacity = 0.4\n"
+           "model = { sphere = { diameter_m = 1.5 } }\npose = { position_m = [2, 1, 1] }\n";
+  }
+};
+
+TEST_F(SlowMotion_slow, HasTwiceTheFramesOfTheSameMotion) {
+  const Result normal = limber_program({"plan", scene(), "-o", out("normal"), "--seed", "3", "--json"});
+  const int usual = normal.json().at("frames");
+  EXPECT_NEAR(frames, 2 * usual, 1);
+}
+
+TEST_F(SlowMotion_slow, SceneryIsSeenAndOtherCamerasHaveTheirOwnFilm) {
+  const render::Image8 seen = frame_3({});
+  EXPECT_NE(frame_3({"--set", "bodies.veil.color=#00ff00"}), seen);
+  const Result above = limber_program({"render", out(), "--camera", "above", "--frames", "3"});
+  ASSERT_EQ(above.code, exit_done) << above.err;
+  EXPECT_NE(render::read_png(fs::path(out()) / "frames-above" / "0003.png"), seen);
+  fs::remove(fs::path(out()) / "scenery" / "veil.ply");
+  const Result broken = limber_program({"render", out()});
+  EXPECT_EQ(broken.code, exit_bad_input);
+  EXPECT_THAT(broken.err, HasSubstr("limber plan"));
+}
+
+class WithoutScenery_slow : public Filmed {
+ protected:
+  std::string text() const override {
+    return small_scene + std::string(
+                             "[[bodies]]\nname = \"veil\"\nrole = \"scenery\"\n"
+                             "model = { file = \"nowhere.obj\" }\n");
+  }
+};
+
+TEST_F(WithoutScenery_slow, AModelThatIsNotFoundIsLeftOutAndTheRestIsAsWithoutIt) {
+  const render::Image8 seen = frame_3({});
+  const Result proved = limber_program({"verify", out()});
+  EXPECT_EQ(proved.code, exit_done) << proved.out << proved.err;
+  EXPECT_EQ(proved.err, "");
+  const Result again = limber_program({"plan", scene(text()), "-o", out()});
+  EXPECT_THAT(again.err, HasSubstr("nowhere.obj was not found in "));
+  EXPECT_THAT(again.err, HasSubstr(". It is left out of the pictures."));
+  ASSERT_EQ(limber_program({"plan", scene(), "-o", out()}).code, exit_done);
+  EXPECT_EQ(frame_3({}), seen);
+}
+
+std::vector<Json> events_of(const std::string& text) {
+  std::vector<Json> events;
+  std::istringstream lines(text);
+  for (std::string line; std::getline(lines, line);) events.push_back(Json::parse(line));
+  return events;
+}
+
+// Every line is an event; the frames told are those on the disk, and stdout has what it has without.
+TEST_F(Filmed_slow, ProgressTellsEveryFrameWithItsHash) {
+  ASSERT_EQ(limber_program({"render", out(), "--frames", "1"}).code, exit_done);
+  const std::string file = out("progress.jsonl");
+  const std::vector<std::string> words{"render", out(), "--resume", "--json", "--frames", "0-4,9999"};
+  for (const std::string& where : {std::string("json"), file}) {
+    SCOPED_TRACE(where);
+    fs::remove(fs::path(out()) / "frames" / "0002.png");
+    std::vector<std::string> told = words;
+    told.insert(told.end(), {"--progress", where});
+    const Result result = limber_program(told);
+    ASSERT_EQ(result.code, exit_done) << result.err;
+    const bool on_stderr = where == "json";
+    const std::vector<Json> events = events_of(on_stderr ? result.err : read_file(file));
+    EXPECT_EQ(result.err.find("left out") == std::string::npos, false);
+    std::map<int, std::string> hashes;
+    std::set<std::string> kinds;
+    for (const Json& event : events) {
+      kinds.insert(event.at("event"));
+      if (event.at("event") == "frames") {
+        EXPECT_EQ(event.at("wanted"), 5);
+      }
+      if (event.at("event") != "frame") continue;
+      hashes[event.at("frame")] = event.at("hash");
+      EXPECT_EQ(event.at("done"), hashes.size());
+      EXPECT_GE(event.at("seconds"), 0);
+    }
+    EXPECT_EQ(kinds.contains("warning"), on_stderr);
+    EXPECT_THAT(kinds, testing::IsSupersetOf({"frames", "stage", "frame", "stage_end", "end"}));
+    EXPECT_EQ(events.back().at("event"), "end");
+    EXPECT_EQ(events.back().at("exit_code"), exit_done);
+    EXPECT_EQ(int(hashes.size()), result.json().at("painted"));
+    EXPECT_EQ(hashes.size(), on_stderr ? 4u : 1u);  // the second time only the missing one
+    for (const auto& [frame, hash] : hashes)
+      EXPECT_EQ(render::frame_hash(fs::path(out()) / "frames" / fmt::format("{:04}.png", frame)), hash);
+  }
+  EXPECT_EQ(limber_program(words).err.find('{'), std::string::npos);
+  EXPECT_EQ(limber_program({"render", out(), "--progress", "yes"}).code, exit_bad_input);
+  EXPECT_EQ(limber_program({"render", out(), "--progress", out("no/such.jsonl")}).code, exit_disk);
+  const Result failed = limber_program({"render", out("none"), "--progress", "json"});
+  EXPECT_EQ(failed.code, exit_bad_input);
+  EXPECT_EQ(events_of(failed.err).back().at("exit_code"), exit_bad_input);
+}
+
+// Nothing touches the robot in the goal, so what the forces add to the pictures of the settle is its own
+// arrow.
+TEST_F(Filmed_slow, TheSettleHasAnArrow) {
+  const plan::Trajectory path = read_plan_folder(out()).plan.trajectory;
+  int first_of_settle = 0;
+  while (path.frames[std::size_t(first_of_settle)].step < path.end.step - path.settle_steps)
+    ++first_of_settle;
+  ASSERT_LT(first_of_settle, frames - 2);
+  const std::string settle = fmt::format("{}-{}", first_of_settle, frames - 1);
+  for (const char* forces : {"false", "true"})
+    ASSERT_EQ(limber_program({"render", out(), "--frames", settle, "--as", forces, "--set",
+                              fmt::format("film.forces={}", forces)})
+                  .code,
+              exit_done);
+  int changed = 0;
+  for (int f = first_of_settle; f < frames; ++f) {
+    const std::string name = fmt::format("{:04}.png", f);
+    changed += render::read_png(fs::path(out()) / "frames-true" / name).rgb !=
+               render::read_png(fs::path(out()) / "frames-false" / name).rgb;
+  }
+  EXPECT_GT(changed, (frames - first_of_settle) / 2);
+}
+
+// A scene whose film changed is filmed anew, not planned anew.
+TEST_F(Program_slow, RunFilmsAnewWhatIsFilmedOtherwise) {
+  ASSERT_EQ(limber_program({"run", scene(), "-o", out()}).code, exit_done);
+  const std::string plan = limber_program({"info", out(), "--json"}).out;
+  const auto before = render::read_png(fs::path(out()) / "frames" / "0003.png");
+  const Result again = limber_program({"run", scene(replaced("#c0392b", "#00ff00")), "-o", out(), "--json"});
+  ASSERT_EQ(again.code, exit_done) << again.err;
+  EXPECT_GT(again.json().at("render").at("painted"), 0);
+  EXPECT_NE(render::read_png(fs::path(out()) / "frames" / "0003.png"), before);
+  EXPECT_EQ(Json::parse(plan).at("tree_hash"),
+            Json::parse(limber_program({"info", out(), "--json"}).out).at("tree_hash"));
+}
+
+}  // namespace
+}  // namespace limber::app

@@ -1,0 +1,362 @@
+// limber scene new: from a folder of models to a scene that limber plans.
+#include <gmock/gmock.h>
+
+#include <fstream>
+#include <map>
+
+#include "core/mesh_files.h"
+#include "scenes/scene.h"
+#include "tests/cli/program.h"
+#include "tests/imaging/made_maps.h"
+
+namespace limber::app {
+namespace {
+
+using testing::HasSubstr;
+
+// Cubes in millimetres, y to the back: the heart stands 100 behind the lung.
+class NewScene : public Program {
+ protected:
+  void SetUp() override {
+    fs::create_directories(models());
+    cube("heart", {0, 0, 1000}, 80);
+    cube("lung", {150, -100, 1000}, 80);
+    cube("spine", {0, 200, 1000}, 60);
+    cube("skin", {0, 0, 1000}, 900);
+  }
+  void box(const char* name, const Vec3& center_mm, const Vec3& edges_mm) const {
+    SurfaceMesh mesh{Points(8, 3), Triangles(12, 3)};
+    for (int i = 0; i < 8; ++i)
+      mesh.positions.row(i) =
+          (center_mm + edges_mm.cwiseProduct(Vec3((i & 1) - 0.5, (i >> 1 & 1) - 0.5, (i >> 2) - 0.5)))
+              .transpose();
+    mesh.triangles << 0, 2, 3, 0, 3, 1, 4, 5, 7, 4, 7, 6, 0, 1, 5, 0, 5, 4, 2, 6, 7, 2, 7, 3, 0, 4, 6, 0, 6,
+        2, 1, 3, 7, 1, 7, 5;
+    write_obj(models() / (std::string(name) + ".obj"), mesh);
+  }
+  void cube(const char* name, const Vec3& center_mm, double edge_mm) const {
+    box(name, center_mm, Vec3::Constant(edge_mm));
+  }
+  fs::path models() const { return folder / "models"; }
+  std::vector<std::string> words(std::vector<std::string> more = {"--robot", "heart"}) const {
+    std::vector<std::string> all{"scene",           "new", "--from",
+                                 models().string(), "-o",  (folder / "chest.toml").string()};
+    all.insert(all.end(), more.begin(), more.end());
+    return all;
+  }
+};
+using NewScene_slow = NewScene;  // stays out of the sanitizer runs
+
+TEST_F(NewScene, OrgansAreInTheirPlacesAndRoles) {
+  const Result made = limber_program(words());
+  ASSERT_EQ(made.code, exit_done) << made.err;
+  const scenes::Scene scene = scenes::read_scene_file(folder / "chest.toml");
+  ASSERT_EQ(scene.bodies.size(), 3u);
+  ASSERT_EQ(scene.scenery.size(), 1u);
+  const auto& heart = scene.bodies[std::size_t(scene.robot)];
+  EXPECT_EQ(heart.name, "heart");
+  EXPECT_LT((heart.pose.position_m - Vec3(0, 0, 1)).norm(), 1e-12);
+  for (const scenes::BodySpec& body : scene.bodies) {
+    EXPECT_EQ(body.kind, body.name == "spine" ? scenes::Kind::rigid : scenes::Kind::deformable);
+    EXPECT_EQ(std::get<scenes::FileModel>(body.model).scale, 0.001);  // they are apart
+    if (body.name == "lung") {                                        // −y is our x
+      EXPECT_LT((body.pose.position_m - Vec3(0.1, 0.15, 1)).norm(), 1e-12);
+    }
+  }
+  EXPECT_EQ(scene.scenery[0].name, "skin");
+  EXPECT_EQ(std::get<scenes::FileModel>(scene.scenery[0].model).scale, 0.001);
+  EXPECT_LT(scene.scenery[0].opacity, 0.5);
+  // One and a half lengths of the heart to the front of the middle of its cage.
+  EXPECT_LT((scene.goal.center_of_mass_m - Vec3(0.12, 0, 1)).norm(), 0.005);
+  ASSERT_EQ(scene.cameras.size(), 4u);
+  EXPECT_EQ(scene.cameras[0].subject, scene.robot);
+  EXPECT_LT(scene.cameras[0].fill, 0.6);
+}
+
+// Behind a wall that ends at its left side.
+TEST_F(NewScene_slow, TheCameraStandsWhereTheRobotIsSeen) {
+  fs::remove(models() / "lung.obj");
+  for (const double side : {1.0, -1.0}) {
+    box("stomach", {-155 * side, -100, 1000}, {390, 40, 700});
+    ASSERT_EQ(limber_program(words({"--robot", "heart", "--goal", "up"})).code, exit_done);
+    const scenes::Scene scene = scenes::read_scene_file(folder / "chest.toml");
+    const Vec3 direction = scene.cameras[0].direction;
+    EXPECT_GT(side * direction.y(), 0.8 * direction.x());
+    fs::remove(folder / "chest.toml");
+  }
+}
+
+// 20 mm deep, 100 mm wide: one and a half times its depth would be within its goal's radius.
+TEST_F(NewScene_slow, AFlatRobotsGoalIsOutOfItsReachAtTheStart) {
+  box("heart", {0, 0, 1000}, {100, 20, 100});
+  ASSERT_EQ(limber_program(words()).code, exit_done);
+  const scenes::Scene scene = scenes::read_scene_file(folder / "chest.toml");
+  EXPECT_NEAR(scene.goal.center_of_mass_m.x(), 0.1, 0.005);
+  EXPECT_NEAR(scene.goal.radius_m, 0.04, 1e-9);
+}
+
+TEST_F(NewScene_slow, IsPlannedAsItIs) {
+  ASSERT_EQ(limber_program(words()).code, exit_done);
+  const Result planned = limber_program(
+      {"plan", (folder / "chest.toml").string(), "--data", models().string(), "-o", out(), "--json"});
+  EXPECT_EQ(planned.code, exit_done) << planned.err;
+  EXPECT_EQ(planned.json().at("solved"), true);
+}
+
+// Two lungs that reach 10 mm into the heart, and a liver 5 mm into all three.
+TEST_F(NewScene_slow, OrgansThatOverlapComeApartAndArePlanned) {
+  fs::remove(models() / "lung.obj");
+  cube("lung_left", {70, 0, 1000}, 80);
+  cube("lung_right", {-70, 10, 1000}, 80);
+  cube("liver", {0, 0, 925}, 80);
+  std::vector<std::string> with_json = words();
+  with_json.push_back("--json");
+  const Result made = limber_program(with_json);
+  ASSERT_EQ(made.code, exit_done) << made.err;
+  EXPECT_LT(made.json().at("scale").get<double>(), 1);
+  EXPECT_GE(made.json().at("scale").get<double>(), 0.5);
+  const std::string text = read_file(folder / "chest.toml");
+  const Result planned = limber_program(
+      {"plan", (folder / "chest.toml").string(), "--data", models().string(), "-o", out(), "--json"});
+  EXPECT_EQ(planned.code, exit_done) << planned.err;
+  fs::remove(folder / "chest.toml");
+  ASSERT_EQ(limber_program(with_json).code, exit_done);
+  EXPECT_EQ(read_file(folder / "chest.toml"), text);
+}
+
+TEST_F(NewScene_slow, TheGoalIsPastAllThatLiesInItsWay) {
+  cube("stomach", {0, -300, 1000}, 80);
+  for (const auto& [word, direction] :
+       {std::pair("front", Vec3(1, 0, 0)), {"left", Vec3(0, 1, 0)}, {"down", Vec3(0, 0, -1)}}) {
+    SCOPED_TRACE(word);
+    ASSERT_EQ(limber_program(words({"--robot", "heart", "--goal", word})).code, exit_done);
+    const scenes::Scene scene = scenes::read_scene_file(folder / "chest.toml");
+    const Vec3 way = scene.goal.center_of_mass_m - Vec3(0, 0, 1);
+    EXPECT_GT(way.dot(direction), 0.115);
+    EXPECT_LT((way - way.dot(direction) * direction).norm(), 0.01);
+    if (word == std::string("front")) {
+      EXPECT_GT(way.x(), 0.34 + 0.04);  // the stomach's front, and half the heart
+    }
+    fs::remove(folder / "chest.toml");
+  }
+}
+
+TEST_F(NewScene, SheetsAreOnlySeenAndDoublesLeftOut) {
+  box("diaphragm", {0, 0, 900}, {300, 300, 4});
+  cube("body", {0, 1, 1000}, 900);
+  ASSERT_EQ(limber_program(words()).code, exit_done);
+  const scenes::Scene scene = scenes::read_scene_file(folder / "chest.toml");
+  ASSERT_EQ(scene.scenery.size(), 2u);
+  EXPECT_EQ(scene.scenery[0].name, "body");
+  EXPECT_EQ(scene.scenery[1].name, "diaphragm");
+  EXPECT_EQ(scene.bodies.size(), 3u);
+}
+
+TEST_F(NewScene_slow, OrgansWithinOneAnotherAreRefused) {
+  cube("liver", {0, 0, 1000}, 70);
+  const Result made = limber_program(words());
+  EXPECT_EQ(made.code, exit_bad_input);
+  EXPECT_THAT(made.err, HasSubstr("still do not come apart; take fewer with --only"));
+  EXPECT_FALSE(fs::exists(folder / "chest.toml"));
+}
+
+TEST_F(NewScene, WhatIsNotThereIsRefusedWithWhatIs) {
+  EXPECT_THAT(limber_program(words({"--robot", "liver"})).err, HasSubstr("there are: heart, lung"));
+  EXPECT_THAT(limber_program(words({"--robot", "heart", "--only", "liver"})).err,
+              HasSubstr("heart, lung, skin, spine"));
+  EXPECT_THAT(limber_program(words({"--robot", "heart", "--rigid", "liver"})).err,
+              HasSubstr("--rigid liver: "));
+  EXPECT_THAT(limber_program(words({"--robot", "heart", "--goal", "away"})).err, HasSubstr("front"));
+  EXPECT_THAT(limber_program(words({"--robot", "spine"})).err, HasSubstr("there are: heart, lung"));
+  EXPECT_THAT(limber_program(words({"--robot", "heart", "--up", "+z", "--front", "-z"})).err,
+              HasSubstr("same axis"));
+  EXPECT_FALSE(fs::exists(folder / "chest.toml"));
+  ASSERT_EQ(limber_program(words()).code, exit_done);
+  EXPECT_THAT(limber_program(words()).err, HasSubstr("is there already"));
+  fs::create_directories(folder / "empty");
+  const Result empty = limber_program({"scene", "new", "--from", (folder / "empty").string(), "-o",
+                                       (folder / "a.toml").string(), "--robot", "heart"});
+  EXPECT_EQ(empty.code, exit_bad_input);
+  EXPECT_THAT(empty.err, HasSubstr("holds no model"));
+}
+
+// Boxes of voxels of 4 mm: a heart, a lung beside it, two vertebrae behind, two ribs before, and a crumb.
+class SceneOfAScan : public NewScene {
+ protected:
+  struct Block {
+    int label;
+    Vec3 center_m, edges_m;
+  };
+  const std::vector<Block> blocks{{51, {0, 0, 1}, {0.08, 0.08, 0.08}},
+                                  {9, {0.1, 0, 1}, {0.08, 0.08, 0.08}},
+                                  {30, {0, 0.1, 0.96}, {0.04, 0.04, 0.04}},
+                                  {31, {0, 0.1, 1.04}, {0.04, 0.04, 0.04}},
+                                  {92, {0, -0.1, 0.96}, {0.2, 0.012, 0.012}},
+                                  {93, {0, -0.1, 1.04}, {0.2, 0.012, 0.012}},
+                                  {77, {0.002, 0.002, 1.142}, {0.004, 0.004, 0.004}}};
+  void SetUp() override {
+    imaging::LabelMap map = imaging::made_map(
+        {72, 64, 80}, 0.004 * Eigen::Matrix3d::Identity(), Vec3(-0.126, -0.126, 0.85), [&](const Vec3& p) {
+          for (std::size_t b = 0; b < blocks.size(); ++b)
+            if (((p - blocks[b].center_m).cwiseAbs() - 0.5 * blocks[b].edges_m).maxCoeff() < 0)
+              return int(b) + 1;
+          return 0;
+        });
+    ASSERT_EQ(map.labels.size(), blocks.size() + 1);
+    for (std::size_t b = 0; b < blocks.size(); ++b) map.labels[b + 1] = blocks[b].label;
+    imaging::write_nifti(scan(), map);
+    std::ofstream(names()) << R"({"labels": {"background": 0, "heart": 51, "lung left": 9, "vertebrae_L1": 30,
+      "vertebrae_L2": 31, "rib_left_1": 92, "rib_left_2": 93, "cyst": 77, "spleen": 200}})";
+  }
+  fs::path scan() const { return folder / "scan.nii.gz"; }
+  fs::path names() const { return folder / "names.json"; }
+  fs::path made() const { return folder / "chest_models"; }
+  std::vector<std::string> words(std::vector<std::string> more = {"--robot", "heart"}) const {
+    std::vector<std::string> all{"scene",    "new",
+                                 "--from",   scan().string(),
+                                 "--labels", names().string(),
+                                 "-o",       (folder / "chest.toml").string()};
+    all.insert(all.end(), more.begin(), more.end());
+    return all;
+  }
+  void refused(const std::vector<std::string>& all, const char* why) const {
+    const Result result = limber_program(all);
+    EXPECT_EQ(result.code, exit_bad_input) << why;
+    EXPECT_THAT(result.err, HasSubstr(why));
+    EXPECT_FALSE(fs::exists(made()));
+    EXPECT_FALSE(fs::exists(folder / "chest.toml"));
+  }
+};
+using SceneOfAScan_slow = SceneOfAScan;
+
+TEST_F(SceneOfAScan, PartsAreInTheirPlacesAndRoles) {
+  const Result result = limber_program(words());
+  ASSERT_EQ(result.code, exit_done) << result.err;
+  for (const char* said :
+       {"skeleton is 2 labels in one: vertebrae_L1, vertebrae_L2",
+        "ribcage is 2 labels in one: rib_left_1, rib_left_2", "lung left is called lung_left",
+        "cyst: left out 1 small pieces, 1 voxels", "1 names of", "next: limber run"})
+    EXPECT_THAT(result.out, HasSubstr(said));
+  const scenes::Scene scene = scenes::read_scene_file(folder / "chest.toml");
+  std::map<std::string, const scenes::BodySpec*> bodies;
+  for (const scenes::BodySpec& body : scene.bodies) bodies[body.name] = &body;
+  ASSERT_EQ(bodies.size(), 3u);
+  EXPECT_EQ(scene.bodies[std::size_t(scene.robot)].name, "heart");
+  EXPECT_EQ(bodies.at("skeleton")->kind, scenes::Kind::rigid);
+  ASSERT_EQ(scene.scenery.size(), 1u);
+  EXPECT_EQ(scene.scenery[0].name, "ribcage");
+  // x to the left and y to the back, of the scan, are y and −x here; they are apart, and stay.
+  EXPECT_LT((bodies.at("heart")->pose.position_m - Vec3(0, 0, 1)).norm(), 1e-4);
+  EXPECT_LT((bodies.at("lung_left")->pose.position_m - Vec3(0, 0.1, 1)).norm(), 1e-4);
+  EXPECT_LT((bodies.at("skeleton")->pose.position_m - Vec3(-0.1, 0, 1)).norm(), 1e-4);
+  EXPECT_EQ(bodies.at("heart")->material.density_kg_m3, 1050);
+  EXPECT_EQ(bodies.at("lung_left")->material.density_kg_m3, 400);
+  const SurfaceMesh heart = read_ply(made() / "heart.ply");
+  EXPECT_NEAR(volume(heart) * 1e-9, 0.08 * 0.08 * 0.08, 0.02 * 0.08 * 0.08 * 0.08);
+}
+
+TEST_F(SceneOfAScan, ChosenPartsAreMadeAlone) {
+  ASSERT_EQ(limber_program(words({"--robot", "heart", "--only", "heart,30,31"})).code, exit_done);
+  const scenes::Scene scene = scenes::read_scene_file(folder / "chest.toml");
+  std::vector<std::string> all;
+  for (const scenes::BodySpec& body : scene.bodies) all.push_back(body.name);
+  EXPECT_THAT(all, testing::UnorderedElementsAre("heart", "vertebrae_L1", "vertebrae_L2"));
+}
+
+TEST_F(SceneOfAScan_slow, ItIsPlannedWithoutAnEdit) {
+  ASSERT_EQ(limber_program(words()).code, exit_done);
+  const Result planned = limber_program({"plan", (folder / "chest.toml").string(), "-o", out(), "--json"});
+  ASSERT_EQ(planned.code, exit_done) << planned.err;
+  EXPECT_TRUE(planned.json().at("solved"));
+  EXPECT_EQ(limber_program({"verify", out()}).code, exit_done);
+}
+
+TEST_F(SceneOfAScan, WhatDoesNotFitIsRefusedAndNothingStays) {
+  refused(words({"--robot", "spleen"}), "there are: heart, lung_left");
+  refused(words({"--robot", "heart", "--only", "heart,8"}), "has no label 8; it has 9 (lung left)");
+  refused(words({"--robot", "heart", "--scale", "1"}), "leave --scale, --up and --front out");
+  const auto with_names = [&](const char* text, const char* why) {
+    std::ofstream(names()) << text;
+    refused(words(), why);
+  };
+  with_names("[1, 2]", "is no object");
+  with_names(R"({"labels": 3})", "\"labels\" is no object");
+  with_names(R"({"heart": "yes"})", "neither a label's number with a name");
+  with_names(R"({"heart": 51, "51": "lung"})", "label 51 has two names");
+  with_names(R"({"heart": 51, "Heart": 9})", "would both be called");
+  with_names(R"({"heart": 4})", "names none of the scan's labels");
+  with_names(R"({"51": ""})", "has an empty name");
+  std::ofstream(folder / "text.nii") << "no scan";
+  refused({"scene", "new", "--from", (folder / "text.nii").string(), "-o", (folder / "chest.toml").string(),
+           "--robot", "heart"},
+          "neither a folder of models nor a label map");
+  NewScene::SetUp();
+  refused({"scene", "new", "--from", models().string(), "--labels", names().string(), "-o",
+           (folder / "chest.toml").string(), "--robot", "heart"},
+          "is a folder; leave it out");
+  fs::create_directories(made());
+  EXPECT_THAT(limber_program(words()).err, HasSubstr("is there already"));
+}
+
+// Files as BodyParts3D has them, of made cubes: a heart of two elements, a kidney, a bone.
+class SceneOfAnAtlas : public NewScene {
+ protected:
+  void SetUp() override {
+    fs::create_directories(models());
+    cube("FJ1", {0, 0, 980}, 40), cube("FJ2", {0, 0, 1020}, 40);
+    cube("FJ3", {150, -100, 1000}, 80), cube("FJ4M", {0, 200, 1000}, 60);
+    fs::create_directories(atlas() / "isa_BP3D_4.0_obj_99");
+    for (const auto& entry : fs::directory_iterator(models()))
+      fs::rename(entry.path(), atlas() / "isa_BP3D_4.0_obj_99" / entry.path().filename());
+    table("isa_element_parts.txt",
+          "FMA7088\theart\tFJ1\r\nFMA7088\theart\tFJ2\r\nFMA7205\tleft kidney\tFJ3\r\n"
+          "FMA13322\tlumbar vertebra\tFJ4M\r\nFMA1\tlost\tFJ99\r\nFMA2\tlost\tFJ98\r\n");
+  }
+  fs::path atlas() const { return folder / "atlas"; }
+  void table(const char* name, const std::string& lines) const {
+    std::ofstream(atlas() / name) << "concept id\tname\telement file id\r\n" << lines;
+  }
+  Result made(const std::vector<std::string>& more) const {
+    std::vector<std::string> all{"scene",          "new", "--from",
+                                 atlas().string(), "-o",  (folder / "chest.toml").string()};
+    all.insert(all.end(), more.begin(), more.end());
+    return limber_program(all);
+  }
+};
+
+TEST_F(SceneOfAnAtlas, PartsAreFoundByNameAndId) {
+  const Result result = made({"--robot", "heart", "--only", "Heart,left_kidney,fma13322"});
+  ASSERT_EQ(result.code, exit_done) << result.err;
+  EXPECT_THAT(result.out, HasSubstr("heart is 2 elements in one"));
+  const scenes::Scene scene = scenes::read_scene_file(folder / "chest.toml");
+  std::map<std::string, Vec3> at;
+  for (const scenes::BodySpec& body : scene.bodies) at[body.name] = body.pose.position_m;
+  ASSERT_EQ(at.size(), 3u);
+  EXPECT_LT((at.at("heart") - Vec3(0, 0, 1)).norm(), 1e-9);
+  EXPECT_LT((at.at("left_kidney") - Vec3(0.1, 0.15, 1)).norm(), 1e-9);
+  EXPECT_LT((at.at("lumbar_vertebra") - Vec3(-0.2, 0, 1)).norm(), 1e-9);
+  EXPECT_EQ(scene.bodies[2].kind, scenes::Kind::rigid);
+}
+
+TEST_F(SceneOfAnAtlas, WhatDoesNotFitIsRefusedAndNothingStays) {
+  const auto refused = [&](const std::vector<std::string>& more, const char* why) {
+    const Result result = made(more);
+    EXPECT_EQ(result.code, exit_bad_input) << why;
+    EXPECT_THAT(result.err, HasSubstr(why));
+    EXPECT_FALSE(fs::exists(folder / "chest.toml"));
+    EXPECT_FALSE(fs::exists(folder / "chest_models"));
+  };
+  refused({"--robot", "heart"}, "choose some with --only");
+  refused({"--robot", "heart", "--only", "kidney"}, "did you mean left kidney (FMA7205)?");
+  refused({"--robot", "heart", "--only", "lost"}, "are both called lost");
+  refused({"--robot", "heart", "--only", "FMA1"}, "1 of them are not here: FJ99");
+  table("partof_element_parts.txt", "FMA9\tchest\tFJ1\n");
+  refused({"--robot", "heart", "--only", "heart,chest"}, "FJ1 is a part of heart and of chest");
+  table("partof_element_parts.txt", "FMA9\tchest\n");
+  refused({"--robot", "heart", "--only", "heart"}, "partof_element_parts.txt: line 2: ");
+  table("partof_element_parts.txt", "FMA9\tchest\t../../etc/passwd\n");
+  refused({"--robot", "heart", "--only", "heart"}, "is no element's id");
+}
+
+}  // namespace
+}  // namespace limber::app

@@ -1,0 +1,240 @@
+// What a goal asks for besides the place of the robot.
+#include <gtest/gtest.h>
+
+#include <numbers>
+
+#include "core/error.h"
+#include "fem/batch.h"
+#include "fem/observe.h"
+#include "limber/detail/world/fem_system.h"
+#include "plan/course.h"
+#include "plan/search.h"
+#include "tests/fem/worlds.h"
+
+namespace limber::app {
+namespace {
+
+using fem::testing::alone;
+using fem::testing::grid;
+
+// A brick alone, and a slab half a metre below it.
+fem::WorldSpec brick_over_slab() {
+  fem::WorldSpec spec =
+      alone({"robot", grid({0, 0, 1}, {0.6, 0.4, 0.2}, 3, 2, 1), {}, {}, fem::BodyKind::deformable});
+  spec.bodies.push_back({"slab", grid({-1, -1, 0}, {2, 2, 0.5}, 2, 2, 1), {}, {}, fem::BodyKind::immovable});
+  return spec;
+}
+
+Points turned(const Points& p, const Vec3& axis, double deg) {
+  const Eigen::Matrix3d turn =
+      Eigen::AngleAxisd(deg * std::numbers::pi / 180, axis.normalized()).toRotationMatrix();
+  return p * turn.transpose();
+}
+
+State with_robot_at(const fem::World& world, const Points& places) {
+  State state = fem::rest_state(world);
+  for (int n = 0; n < places.rows(); ++n)
+    for (int c = 0; c < 3; ++c)
+      state.positions[std::size_t(3 * (world.bodies[0].first_node + n) + c)] = float(places(n, c));
+  return state;
+}
+
+TEST(Goal, TurnAndShapeAreMeasuredFromTheGoalShape) {
+  fem::WorldSpec spec = brick_over_slab();
+  const Points rest = spec.bodies[0].cage.positions;
+  const Vec3 axis(1, 2, -1);
+  spec.goal_shape_m = turned(rest, axis, 70);
+  const fem::World world = fem::build_world(spec);
+  EXPECT_NEAR(fem::turn_from_goal_shape_deg(world, fem::rest_state(world)), 70, 1e-3);
+  for (const double deg : {0.0, 40.0, 70.0, 100.0}) {
+    Points now = turned(rest, axis, deg);
+    now.rowwise() += Eigen::RowVector3d(5, 6, 7);  // its place does not count
+    EXPECT_NEAR(fem::turn_from_goal_shape_deg(world, with_robot_at(world, now)), std::abs(70 - deg), 0.05)
+        << deg;
+    EXPECT_EQ(fem::distance_from_goal_shape_m(world, with_robot_at(world, now)) < 1e-5, deg == 70.0);
+  }
+  // A stretch along x by 1.1 moves the ends, 0.3 m from the middle, by 3 cm; it does not turn.
+  spec.goal_shape_m = rest;
+  const fem::World upright = fem::build_world(spec);
+  const State stretched = with_robot_at(upright, rest * Vec3(1.1, 1, 1).asDiagonal());
+  EXPECT_NEAR(fem::distance_from_goal_shape_m(upright, stretched), 0.03, 1e-6);
+  EXPECT_NEAR(fem::turn_from_goal_shape_deg(upright, stretched), 0, 0.05);
+}
+
+TEST(Goal, PredicatesAreAboutAllOfABody) {
+  const fem::World world = fem::build_world(brick_over_slab());
+  const auto at_height = [&](double z) {
+    Points p = world.bodies[0].cage.positions;
+    p.col(2).array() += z - 1;
+    return with_robot_at(world, p);
+  };
+  GoalRules above, below, clear;
+  above.above = below.below = clear.clear_of = 1;
+  const FemSystem is_above(world, above), is_below(world, below), is_clear(world, clear);
+  for (const double bottom : {-1.0, -0.21, -0.19, 0.3, 0.49, 0.51, 2.0}) {
+    const State state = at_height(bottom);
+    EXPECT_EQ(is_above.goal_holds(state), bottom > 0.5) << bottom;
+    EXPECT_EQ(is_below.goal_holds(state), bottom < -0.2) << bottom;
+  }
+  EXPECT_TRUE(is_clear.goal_holds(at_height(0.6)));
+  EXPECT_FALSE(is_clear.goal_holds(at_height(0.45)));
+  EXPECT_NE(is_above.hash(), is_below.hash()) << "another goal is another search";
+}
+
+// The whole way: the robot is asked to end turned by a right angle, in a box.
+TEST(Goal, TheRobotComesToRestTurnedInTheBox) {
+  fem::WorldSpec spec = brick_over_slab();
+  spec.goal_shape_m = turned(spec.bodies[0].cage.positions, Vec3::UnitZ(), 90);
+  const fem::World world = fem::build_world(spec);
+  GoalRules rules;
+  rules.turn_tolerance_deg = 5;
+  const FemSystem system(world, rules);
+  plan::Settings s;
+  s.goal.center_of_mass_m = Vec3(1, 0.5, 2), s.goal.radius_m = 1;
+  s.goal.box_m = Box{Vec3(0.9, 0.3, 1.8), Vec3(1.2, 0.6, 2.1)};
+  s.seed = 3, s.max_force_n = 60, s.max_iterations = 60, s.goal_bias = 0.5, s.settle.max_duration_s = 6;
+  s.weights.interpolation = 3;
+  const plan::Plan p = plan::plan(system, s);
+  ASSERT_TRUE(p.solved()) << plan::explain(p);
+  const State& end = p.trajectory.end;
+  EXPECT_LE(fem::turn_from_goal_shape_deg(world, end), 5);
+  const Vec3 center = system.robot_center(end);
+  EXPECT_TRUE((center.array() >= s.goal.box_m->lower.array()).all() &&
+              (center.array() <= s.goal.box_m->upper.array()).all());
+  EXPECT_LT(system.mean_speed(end), s.settle.mean_speed_m_s);
+  s.laws.hold = s.settle.hold = true;  // held, it never turns
+  EXPECT_FALSE(plan::plan(system, s).solved());
+}
+
+// Pushed out of all measure, rollouts diverge between looks; the search goes on without them.
+TEST(Goal, RolloutsThatDivergeOnTheirWayAreOnlyCounted) {
+  const fem::World world = fem::build_world(brick_over_slab());
+  const FemSystem system(world);
+  plan::Settings s;
+  s.goal.center_of_mass_m = Vec3(1, 0.5, 2), s.goal.radius_m = 1e-9;
+  s.max_force_n = 1e12, s.max_iterations = 40;
+  s.laws = {.lag = 3,
+            .guidance = 0.7,
+            .soft_price = 10,
+            .look_s = 0.02,
+            .stop_in_goal = true,
+            .end_hopeless = true};
+  const plan::Plan p = plan::plan(system, s);
+  EXPECT_FALSE(p.solved());
+  EXPECT_GT(p.statistics.diverged, 10);
+}
+
+// A robot that arrives turned rests as it is where the settle holds it; interpolation turns it upright.
+TEST(Goal, TheSettleHoldsARobotInWhateverTurnItIs) {
+  const fem::World world = fem::build_world(brick_over_slab());
+  const FemSystem system(world);
+  const Vec3 middle(0.3, 0.2, 1.1);
+  Points p = world.bodies[0].cage.positions.rowwise() - middle.transpose();
+  p = turned(p, Vec3::UnitX(), 60).rowwise() + middle.transpose();
+  plan::Course arriving;
+  arriving.from = with_robot_at(world, p);
+  const fem::Body& robot = world.bodies[0];
+  for (int n = 0; n < robot.node_count(); ++n)
+    arriving.from.velocities[std::size_t(3 * (robot.first_node + n))] = 0.1f;
+  plan::Settings s;
+  s.goal.center_of_mass_m = middle, s.goal.radius_m = 0.1, s.max_force_n = 20, s.settle.max_duration_s = 8;
+  for (const bool hold : {true, false}) {
+    s.settle.hold = hold;
+    plan::Course course = arriving;
+    plan::run(system, s, {&course, 1}, {.ask_acceptable = false});
+    EXPECT_EQ(course.result, plan::Course::rests_in_goal) << hold;
+    EXPECT_NEAR(fem::turn_from_goal_shape_deg(world, course.end), hold ? 60 : 0, 5) << hold;
+  }
+}
+
+// Where no rest is asked for, what else the goal asks still counts.
+TEST(Goal, WithoutASettleTheGoalIsStillAsked) {
+  const fem::World world = fem::build_world(brick_over_slab());
+  plan::Settings s;
+  s.goal.center_of_mass_m = Vec3(0.3, 0.2, 1.1), s.goal.radius_m = 0.1;  // where it starts
+  s.max_iterations = 0, s.settle.max_duration_s = 0;
+  GoalRules above, below;
+  above.above = 1, below.below = 1;
+  EXPECT_TRUE(plan::plan(FemSystem(world, above), s).solved());
+  EXPECT_FALSE(plan::plan(FemSystem(world, below), s).solved());
+}
+
+// Goals in a row have rules of their own; the dynamics are the same.
+TEST(Goal, EachLegAsksWhatItsGoalAsks) {
+  const fem::World world = fem::build_world(brick_over_slab());
+  GoalRules above, above_then_below;
+  above.above = 1;
+  above_then_below.via = {above};
+  above_then_below.below = 1;
+  const FemSystem system(world, above_then_below), last_alone(world, [] {
+    GoalRules below;
+    below.below = 1;
+    return below;
+  }());
+  Points p = world.bodies[0].cage.positions;
+  const State high = with_robot_at(world, p);
+  p.col(2).array() -= 1.3;
+  const State low = with_robot_at(world, p);
+  EXPECT_TRUE(system.on_leg(0).goal_holds(high));
+  EXPECT_FALSE(system.on_leg(0).goal_holds(low));
+  EXPECT_FALSE(system.on_leg(1).goal_holds(high));
+  EXPECT_TRUE(system.on_leg(1).goal_holds(low));
+  EXPECT_EQ(&system.on_leg(1), &system);
+  EXPECT_NE(system.hash(), last_alone.hash()) << "other goals on the way are another search";
+}
+
+// A block falls onto the floor and bounces back: who looks only at the end of a push does not see that the
+// goal was lost on the way.
+TEST(Goal, ALookSeesThatTheGoalIsLost) {
+  fem::WorldSpec spec =
+      alone({"robot", grid({0, 0, 3}, {0.6, 0.4, 0.2}, 3, 2, 1), {}, {}, fem::BodyKind::deformable});
+  fem::Material springy;
+  springy.damping_ratio = 0;
+  spec.bodies.push_back(
+      {"block", grid({2, 2, 0.5}, {1, 1, 1}, 2, 2, 2), springy, {}, fem::BodyKind::deformable});
+  spec.bounds_m = {Vec3(-4, -4, 0), Vec3(8, 8, 8)}, spec.walls = true;
+  spec.gravity_m_s2 = Vec3(0, 0, -1);
+  const fem::World world = fem::build_world(spec);
+  const auto lowest = [&](const State& s) { return fem::body_positions(world, s, 1).col(2).minCoeff(); };
+
+  // Step by step: it lands, and rises again.
+  const FemSystem free(world);
+  const int piece = plan::steps_of(0.01, free.dt_s());
+  State state = free.start();
+  const auto propagator = free.make_propagator();
+  double least = lowest(state);
+  while (lowest(state) < least + 0.1) {
+    plan::Rollout rollout{&state, {}, {}, false};
+    rollout.control.steps = piece;
+    propagator->propagate({&rollout, 1});
+    ASSERT_TRUE(rollout.ok);
+    ASSERT_LT(rollout.to.step, 5000 * piece) << "it does not bounce";
+    const State next = rollout.to;
+    state = next;
+    least = std::min(least, lowest(state));
+  }
+  GoalRules rules;
+  rules.body = 1, rules.lost_below_m = least + 0.05;
+  const FemSystem system(world, rules);
+  ASSERT_TRUE(system.acceptable(state)) << "after the bounce";
+
+  plan::Settings s;
+  s.goal.center_of_mass_m = Vec3(0.3, 0.2, 7), s.goal.radius_m = 0.01;
+  s.max_force_n = 1, s.max_iterations = 3, s.settle.max_duration_s = 0;
+  s.min_duration_s = s.max_duration_s = double(state.step) * system.dt_s();
+  s.laws.look_s = 0.02;
+  const plan::Plan p = plan::plan(system, s);
+  EXPECT_EQ(p.statistics.rejected, 3);
+  EXPECT_EQ(p.tree.size(), 1);
+  EXPECT_LT(p.statistics.rollout_steps, 3 * state.step)
+      << "it goes no further than it can be seen to be lost";
+}
+
+TEST(Goal, AShapeOfAnotherCageIsRefused) {
+  fem::WorldSpec spec = brick_over_slab();
+  spec.goal_shape_m = Points::Zero(3, 3);
+  EXPECT_THROW(fem::build_world(spec), InputError);
+}
+
+}  // namespace
+}  // namespace limber::app

@@ -1,0 +1,66 @@
+// The scenes that come with limber, as far as a plan needs them: their bodies prepared, their world built and
+// stepped.
+#include "limber/detail/world/scene_world.h"
+
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <map>
+
+#include "limber/detail/world/fem_system.h"
+#include "plan/expansion.h"
+#include "scenes/library.h"
+#include "tests/core/temporary_folder.h"
+
+namespace limber::app {
+namespace {
+
+// All tets of the scene: exactly where all cages are cells, within a tenth where limber makes one round a
+// model.
+const std::map<std::string, int> tets_of_scene{
+    {"barriers1", 675}, {"barriers2", 2335},      {"bunny_gate", 620},   {"squeeze", 957},
+    {"windows", 1710},  {"falling_objects", 370}, {"body_parts", 557},   {"there_and_back", 435},
+    {"torso", 1411},    {"heart_and_lung", 500},  {"moving_door", 1790}, {"crowd", 2550}};
+
+TEST(SceneWorld, EveryScenePreparesBuildsAndSteps) {
+  TemporaryFolder folder;
+  ::setenv("LIMBER_MODELS", folder.path().c_str(), 1);  // the made models, on every machine
+  for (const scenes::KnownScene& known : scenes::known_scenes()) {
+    SCOPED_TRACE(known.name);
+    const scenes::Scene scene = scenes::read_scene_file(known.file);
+    const std::vector<PreparedBody> bodies = prepare_bodies(scene, {}, folder / known.name);
+    int tets = 0;
+    bool by_budget = false;
+    for (std::size_t b = 0; b < bodies.size(); ++b) {
+      SCOPED_TRACE(scene.bodies[b].name);
+      EXPECT_TRUE(bodies[b].report.at("certificate").at("holds").get<bool>());
+      tets += int(bodies[b].cage.tets.rows());
+      by_budget |= scene.bodies[b].cage.tets > 0;
+    }
+    EXPECT_NEAR(tets, tets_of_scene.at(known.name), by_budget ? 0.1 * tets : 0);
+
+    const fem::World world = build_world(scene, bodies);
+    for (std::size_t b = 0; b < bodies.size(); ++b) {
+      SCOPED_TRACE(scene.bodies[b].name);
+      // What its model weighs, whatever its cage is.
+      const double mass_kg = scene.bodies[b].material.density_kg_m3 * volume(bodies[b].surface);
+      ASSERT_TRUE(scene.bodies[b].parts.empty());
+      EXPECT_NEAR(world.bodies[b].mass_kg, mass_kg, 1e-5 * mass_kg);
+    }
+    const FemSystem system(world, goal_rules_of(scene));
+    const State start = system.start();
+    const scenes::Goal& first = scene.via.empty() ? scene.goal : scene.via.front().goal;
+    EXPECT_GT((system.robot_center(start) - first.center_of_mass_m).norm(), 2 * first.radius_m);
+    plan::Rollout rollout{&start, {}, {}, false};
+    rollout.control.manipulation = Manipulation::body;
+    rollout.control.force_n = Vec3f::UnitX() * float(scene.planner.max_force_n);
+    rollout.control.steps = plan::steps_of(0.15, system.dt_s());  // nothing gets to a wall by then
+    system.make_propagator()->propagate({&rollout, 1});
+    ASSERT_TRUE(rollout.ok);
+    EXPECT_TRUE(system.acceptable(rollout.to));
+    EXPECT_NE(rollout.to.positions, start.positions);
+  }
+}
+
+}  // namespace
+}  // namespace limber::app
