@@ -36,7 +36,7 @@
 #include "limber/detail/plan/plan_folder.h"
 #include "limber/detail/world/scene_world.h"
 
-namespace limber::app {
+namespace limber::detail {
 namespace {
 
 namespace ob = ompl::base;
@@ -495,10 +495,10 @@ int compare(int argc, char** argv) {
 }
 
 }  // namespace
-}  // namespace limber::app
+}  // namespace limber::detail
 
 int main(int argc, char** argv) try {
-  return limber::app::compare(argc, argv);
+  return limber::detail::compare(argc, argv);
 } catch (const std::exception& error) {
   limber::log::warn("{}", error.what());
   return 1;

@@ -42,7 +42,7 @@ int main(int argc, char** argv) {
   const Plan planned = problem.solve({.seed = 1});
   const std::vector<State>& frames = planned.impl().plan.trajectory.frames;
   constexpr int count = 256;
-  const app::FemSystem& system = problem.impl().system;
+  const detail::FemSystem& system = problem.impl().system;
   std::vector<plan::Rollout> rollouts(count);
   for (int i = 0; i < count; ++i) {
     rollouts[std::size_t(i)].from = &frames[std::size_t(i) % frames.size()];

@@ -4,7 +4,9 @@
 #include <cstdio>
 #include <new>
 
+#include "cli/command_line.h"
 #include "cli/command_words.h"
+#include "cli/commands.h"
 #include "core/error.h"
 #include "core/events.h"
 #include "core/json_text.h"
@@ -15,10 +17,9 @@
 #include "core/words.h"
 #include "limber/detail/batch/model_list.h"
 #include "limber/detail/body/export.h"
-#include "limber/detail/commands.h"
 #include "limber/detail/film/shot.h"
 
-namespace limber::app {
+namespace limber::cli {
 
 namespace {
 
@@ -98,7 +99,7 @@ void add_store(CLI::App& command, fs::path& store, const char* otherwise) {
       ->envname("LIMBER_STORE");
 }
 
-void add_scene(CLI::App& command, SceneOptions& options) {
+void add_scene(CLI::App& command, detail::SceneOptions& options) {
   command
       .add_option("SCENE", options.scene,
                   "a scene file, or the name of a scene that comes with limber (see limber scenes)")
@@ -139,7 +140,7 @@ void add_from(CLI::App& command, fs::path& folder, std::optional<int>& frame) {
       ->needs(from);
 }
 
-void add_plan(CLI::App& command, PlanOptions& options) {
+void add_plan(CLI::App& command, detail::PlanOptions& options) {
   command.add_option("-o,--out", options.out, "work folder; it is made where it is missing")
       ->required()
       ->type_name("DIR");
@@ -163,7 +164,7 @@ void add_plan(CLI::App& command, PlanOptions& options) {
       ->type_name("FILE.jsonl");
 }
 
-void add_simulate(CLI::App& command, SimulateOptions& options) {
+void add_simulate(CLI::App& command, detail::SimulateOptions& options) {
   command.add_option("-o,--out", options.out, "work folder; it is made where it is missing")
       ->required()
       ->type_name("DIR");
@@ -187,7 +188,7 @@ void add_simulate(CLI::App& command, SimulateOptions& options) {
                    "go on from the simulation in the work folder: longer, or after it was stopped");
 }
 
-void add_shortcut(CLI::App& command, PlanOptions& options) {
+void add_shortcut(CLI::App& command, detail::PlanOptions& options) {
   command
       .add_option("--shortcut", options.shortcut_rounds,
                   "rounds of sixteen changes to the path that is found, each simulated, 0 … 100000; default: "
@@ -204,7 +205,7 @@ void add_shortcut(CLI::App& command, PlanOptions& options) {
                    "go on after the first path until --iterations or --time-limit, and keep the best");
 }
 
-void add_render(CLI::App& command, RenderOptions& options) {
+void add_render(CLI::App& command, detail::RenderOptions& options) {
   command
       .add_option(
           "--frames", options.frames,
@@ -222,7 +223,7 @@ void add_render(CLI::App& command, RenderOptions& options) {
                   "what their levels mean")
       ->type_name("PASS[,PASS…]")
       ->delimiter(',')
-      ->check(CLI::IsMember(pass_names))
+      ->check(CLI::IsMember(detail::pass_names))
       ->allow_extra_args(false);
   command.add_option("--bits", options.bits, "a channel of frames and passes, 8 or 16")
       ->check(CLI::IsMember({8, 16}))
@@ -239,7 +240,7 @@ void add_render(CLI::App& command, RenderOptions& options) {
       ->type_name("FILE");
 }
 
-void add_bench(CLI::App& command, BenchOptions& options) {
+void add_bench(CLI::App& command, detail::BenchOptions& options) {
   command.add_option("SCENE", options.scenes,
                      "scene files, or names of scenes that come with limber (see limber scenes)");
   command.add_option("-o,--out", options.out, "folder of the records; what is in it is not run again")
@@ -353,14 +354,14 @@ int run_command_line(int argc, const char* const* argv) {
       "4 frames failed; 5 the disk failed; 6 some of many models failed; 130 and 143 stopped by a signal, "
       "with all finished work kept.");
   GlobalOptions global;
-  BatchOptions batch_options;
-  PrepareOptions& prepare_options = batch_options.each;
-  PlanOptions plan_options;
-  SimulateOptions simulate_options;
-  RenderOptions render_options;
-  BenchOptions bench_options;
+  detail::BatchOptions batch_options;
+  detail::PrepareOptions& prepare_options = batch_options.each;
+  detail::PlanOptions plan_options;
+  detail::SimulateOptions simulate_options;
+  detail::RenderOptions render_options;
+  detail::BenchOptions bench_options;
   fs::path folder;
-  VerifyOptions verify_options;
+  detail::VerifyOptions verify_options;
   std::function<Outcome()> chosen;
 
   CLI::App& prepare_command =
@@ -436,7 +437,7 @@ int run_command_line(int argc, const char* const* argv) {
           "(body.scn)")
       ->type_name("FORMAT[,FORMAT…]")
       ->delimiter(',')
-      ->check(CLI::IsMember(export_formats))
+      ->check(CLI::IsMember(detail::export_formats))
       ->allow_extra_args(false);
   prepare_command
       .add_option("--density", prepare_options.density_kg_m3, "kg/m³, of the masses of --export; 1e-6 … 1e6")
@@ -512,10 +513,10 @@ int run_command_line(int argc, const char* const* argv) {
   prepare_command.callback([&] {
     chosen = [&] {
       const std::vector<std::string>& models = batch_options.models;
-      if (models.size() > 1 || is_of_many(models.front())) {
+      if (models.size() > 1 || detail::is_of_many(models.front())) {
         if (!prepare_options.format.empty())
           throw InputError("--format is of a model on stdin; leave it out, files are named by their endings");
-        return prepare_many(batch_options);
+        return detail::prepare_many(batch_options);
       }
       for (const CLI::Option* option : of_many)
         if (option->count() > 0)
@@ -524,7 +525,7 @@ int run_command_line(int argc, const char* const* argv) {
                           "list or more models",
                           option->get_name(), models.front()));
       prepare_options.model = models.front();
-      return prepare(prepare_options);
+      return detail::prepare(prepare_options);
     };
   });
 
@@ -534,14 +535,14 @@ int run_command_line(int argc, const char* const* argv) {
   plan_command.add_flag("--resume", plan_options.resume,
                         "go on from the plan in the work folder: more iterations, or after it was stopped");
   add_global(plan_command, global), add_threads(plan_command, global), add_progress(plan_command, global);
-  plan_command.callback([&] { chosen = [&] { return plan(plan_options); }; });
+  plan_command.callback([&] { chosen = [&] { return detail::plan(plan_options); }; });
 
   CLI::App& simulate_command = *program.add_subcommand(
       "simulate", "scene left to itself → bodies, motion: velocities, forces and motions that it tells");
   add_scene(simulate_command, simulate_options.scene), add_simulate(simulate_command, simulate_options);
   add_global(simulate_command, global), add_threads(simulate_command, global),
       add_progress(simulate_command, global);
-  simulate_command.callback([&] { chosen = [&] { return simulate(simulate_options); }; });
+  simulate_command.callback([&] { chosen = [&] { return detail::simulate(simulate_options); }; });
 
   CLI::App& render_command = *program.add_subcommand("render", "path → frames, contact sheet, film");
   render_command.add_option("DIR", render_options.folder, "work folder with a plan; with --still a scene")
@@ -554,7 +555,7 @@ int run_command_line(int argc, const char* const* argv) {
       ->type_name("KEY=VALUE")
       ->allow_extra_args(false);
   bool still = false;
-  StillOptions still_options;
+  detail::StillOptions still_options;
   CLI::Option* const still_flag = render_command.add_flag(
       "--still", still, "paint the start of a scene, a file or a name, before any plan: one PNG");
   render_command
@@ -576,15 +577,15 @@ int run_command_line(int argc, const char* const* argv) {
     still_flag->excludes(of_a_film);
   render_command.callback([&] {
     chosen = [&] {
-      if (!still) return render(render_options);
+      if (!still) return detail::render(render_options);
       still_options.scene.scene = render_options.folder.string();
       still_options.scene.sets = render_options.sets;
       still_options.camera = render_options.camera, still_options.size = render_options.size;
-      return render_still(still_options);
+      return detail::render_still(still_options);
     };
   });
 
-  ExportOptions export_options;
+  detail::ExportOptions export_options;
   CLI::App& export_command =
       *program.add_subcommand("export", "path → files for viewers, Blender, USD programs and ParaView");
   export_command.add_option("DIR", export_options.folder, "work folder with a plan")->required();
@@ -596,7 +597,7 @@ int run_command_line(int argc, const char* const* argv) {
       ->required()
       ->type_name("FORMAT[,FORMAT…]")
       ->delimiter(',')
-      ->check(CLI::IsMember(motion_formats))
+      ->check(CLI::IsMember(detail::motion_formats))
       ->allow_extra_args(false);
   export_command
       .add_option("-o,--out", export_options.out, "folder for them; default: export in the work folder")
@@ -606,20 +607,20 @@ int run_command_line(int argc, const char* const* argv) {
                   "frames to export: 0-300:2; beyond the last is left out with a warning; default: all")
       ->check(no_empty_list());
   add_global(export_command, global);
-  export_command.callback([&] { chosen = [&] { return export_motion(export_options); }; });
+  export_command.callback([&] { chosen = [&] { return detail::export_motion(export_options); }; });
 
   CLI::App& run_command =
       *program.add_subcommand("run", "all of it: prepare, plan, render; what is up to date is skipped");
   add_scene(run_command, plan_options.scene), add_plan(run_command, plan_options),
       add_shortcut(run_command, plan_options), add_render(run_command, render_options);
   add_global(run_command, global), add_threads(run_command, global), add_progress(run_command, global);
-  run_command.callback([&] { chosen = [&] { return run(plan_options, render_options); }; });
+  run_command.callback([&] { chosen = [&] { return detail::run(plan_options, render_options); }; });
 
   CLI::App& bench_command = *program.add_subcommand(
       "bench", "many runs: scenes × seeds × presets → a record a run, a table; what is done is skipped");
   add_bench(bench_command, bench_options);
   add_global(bench_command, global), add_threads(bench_command, global), add_progress(bench_command, global);
-  bench_command.callback([&] { chosen = [&] { return bench(bench_options); }; });
+  bench_command.callback([&] { chosen = [&] { return detail::bench(bench_options); }; });
 
   CLI::App& verify_command =
       *program.add_subcommand("verify", "replays the plan bit for bit, checks every promise, prints a table");
@@ -642,7 +643,7 @@ int run_command_line(int argc, const char* const* argv) {
   verify_command.add_flag("--remake", verify_options.remake,
                           "make the convex shells of large bodies (over 20,000 triangles) again, too, and "
                           "compare; else they are only checked against what shells must be");
-  verify_command.callback([&] { chosen = [&] { return verify(verify_options); }; });
+  verify_command.callback([&] { chosen = [&] { return detail::verify(verify_options); }; });
 
   std::optional<fs::path> page;
   CLI::App& report_command = *program.add_subcommand(
@@ -651,9 +652,9 @@ int run_command_line(int argc, const char* const* argv) {
   report_command.add_option("-o,--out", page, "the page; default: report.html in the work folder")
       ->type_name("FILE.html");
   add_global(report_command, global), add_threads(report_command, global);
-  report_command.callback([&] { chosen = [&] { return report(folder, page); }; });
+  report_command.callback([&] { chosen = [&] { return detail::report(folder, page); }; });
 
-  RobustOptions robust_options;
+  detail::RobustOptions robust_options;
   CLI::App& robust_command = *program.add_subcommand(
       "robust", "replays the plan with other materials and forces, and reports how often it still works");
   robust_command.add_option("DIR", robust_options.folder, "work folder with a plan")->required();
@@ -682,9 +683,9 @@ int run_command_line(int argc, const char* const* argv) {
   robust_command.add_flag("--follow", robust_options.follow,
                           "also follow the plan's path by feedback in the same worlds under the same errors");
   add_global(robust_command, global), add_threads(robust_command, global);
-  robust_command.callback([&] { chosen = [&] { return robust(robust_options); }; });
+  robust_command.callback([&] { chosen = [&] { return detail::robust(robust_options); }; });
 
-  RefineOptions refine_options;
+  detail::RefineOptions refine_options;
   CLI::App& refine_command =
       *program.add_subcommand("refine", "carries a plan to finer cages of the same bodies");
   refine_command.add_option("DIR", refine_options.folder, "work folder with a plan that reaches the goal")
@@ -702,7 +703,7 @@ int run_command_line(int argc, const char* const* argv) {
   add_store(refine_command, refine_options.store, "none");
   add_limits(refine_command, refine_options);
   add_global(refine_command, global), add_threads(refine_command, global);
-  refine_command.callback([&] { chosen = [&] { return refine(refine_options); }; });
+  refine_command.callback([&] { chosen = [&] { return detail::refine(refine_options); }; });
 
   CLI::App& info_command = *program.add_subcommand("info", "what is in a file or folder");
   info_command
@@ -712,7 +713,7 @@ int run_command_line(int argc, const char* const* argv) {
   add_global(info_command, global);
   info_command.callback([&] { chosen = [&] { return info(folder); }; });
 
-  NewSceneOptions new_options;
+  detail::NewSceneOptions new_options;
   CLI::App& scene_command = *program.add_subcommand("scene", "makes scene files, and checks them");
   scene_command.require_subcommand(1);
   CLI::App& new_command = *scene_command.add_subcommand(
@@ -770,9 +771,9 @@ int run_command_line(int argc, const char* const* argv) {
         ->check(CLI::IsMember({"+x", "-x", "+y", "-y", "+z", "-z"}))
         ->capture_default_str();
   add_global(new_command, global);
-  new_command.callback([&] { chosen = [&] { return new_scene(new_options); }; });
+  new_command.callback([&] { chosen = [&] { return detail::new_scene(new_options); }; });
 
-  ScenePrepareOptions scene_prepare_options;
+  detail::ScenePrepareOptions scene_prepare_options;
   CLI::App& scene_prepare_command = *scene_command.add_subcommand(
       "prepare", "the bodies of a scene in its work folder, as plan and run would make them first");
   add_scene(scene_prepare_command, scene_prepare_options.scene);
@@ -787,9 +788,10 @@ int run_command_line(int argc, const char* const* argv) {
       ->delimiter(',')
       ->allow_extra_args(false);
   add_global(scene_prepare_command, global), add_threads(scene_prepare_command, global);
-  scene_prepare_command.callback([&] { chosen = [&] { return prepare_scene(scene_prepare_options); }; });
+  scene_prepare_command.callback(
+      [&] { chosen = [&] { return detail::prepare_scene(scene_prepare_options); }; });
 
-  SceneCheckOptions check_options;
+  detail::SceneCheckOptions check_options;
   CLI::App& check_command = *scene_command.add_subcommand(
       "check", "loads a scene and its models, and says what can be said before it is planned");
   add_scene(check_command, check_options.scene);
@@ -809,7 +811,7 @@ int run_command_line(int argc, const char* const* argv) {
                   "pixels of the still, 16x16 … 8192x8192; default: the scene's")
       ->type_name("WxH");
   add_global(check_command, global), add_threads(check_command, global);
-  check_command.callback([&] { chosen = [&] { return check_scene(check_options); }; });
+  check_command.callback([&] { chosen = [&] { return detail::check_scene(check_options); }; });
 
   CLI::App& scenes_command = *program.add_subcommand("scenes", "the scenes that come with limber");
   add_global(scenes_command, global);
@@ -876,11 +878,11 @@ int run_command_line(int argc, const char* const* argv) {
     return report_failure(exit_disk, fmt::format("{}: {}", error.path1().string(), error.code().message()),
                           global.json);
   } catch (const std::bad_alloc&) {
-    return report_failure(exit_bad_input, not_enough_memory, global.json);
+    return report_failure(exit_bad_input, detail::not_enough_memory, global.json);
   } catch (const std::exception& error) {
     return report_failure(exit_defect, fmt::format("this is a defect of limber: {}", error.what()),
                           global.json);
   }
 }
 
-}  // namespace limber::app
+}  // namespace limber::cli

@@ -8,7 +8,7 @@
 
 #include "core/version.h"
 
-namespace limber::app {
+namespace limber::cli {
 
 namespace {
 
@@ -300,4 +300,4 @@ std::string manual_of(const CLI::App& program, const CLI::App& command) {
   return text + fmt::format("{}\n", fmt::join(others, ",\n"));
 }
 
-}  // namespace limber::app
+}  // namespace limber::cli

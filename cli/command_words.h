@@ -8,7 +8,7 @@ namespace CLI {
 class App;
 }
 
-namespace limber::app {
+namespace limber::cli {
 
 inline const std::vector<std::string> shells_completed{"bash", "zsh", "fish"};
 
@@ -26,4 +26,4 @@ std::vector<const CLI::App*> all_commands(const CLI::App& program);
 // "limber", "limber scene new".
 std::string full_name(const CLI::App& command);
 
-}  // namespace limber::app
+}  // namespace limber::cli

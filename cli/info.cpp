@@ -1,3 +1,4 @@
+#include "cli/commands.h"
 #include "core/error.h"
 #include "core/hash.h"
 #include "core/json_text.h"
@@ -6,13 +7,12 @@
 #include "imaging/label_map.h"
 #include "limber/detail/body/body.h"
 #include "limber/detail/body/preview.h"
-#include "limber/detail/commands.h"
 #include "limber/detail/plan/plan_folder.h"
 #include "meshing/quality.h"
 #include "render/png_file.h"
 #include "scenes/library.h"
 
-namespace limber::app {
+namespace limber::cli {
 
 namespace {
 
@@ -84,7 +84,7 @@ Outcome info_of_label_map(const fs::path& path) {
 }
 
 // What a person needs to choose a part by its shell: where it is, how large, which colour in the pictures.
-Json info_of_shells(const PreparedBody& body, const std::vector<ConvexShell>& shells) {
+Json info_of_shells(const detail::PreparedBody& body, const std::vector<ConvexShell>& shells) {
   std::vector<int> tets(shells.size(), 0);
   for (std::size_t t = 0; t < body.shell_from_tet.size(); ++t) {
     const int shell = body.shell_from_tet[t];
@@ -97,7 +97,7 @@ Json info_of_shells(const PreparedBody& body, const std::vector<ConvexShell>& sh
   Json list = Json::array();
   for (std::size_t s = 0; s < shells.size(); ++s) {
     const Box box = bounding_box(shells[s].vertices);
-    const Vec3 middle = box.center(), size = box.size(), color = 255 * shell_color(s);
+    const Vec3 middle = box.center(), size = box.size(), color = 255 * detail::shell_color(s);
     list.push_back({{"shell", s},
                     {"middle_m", {middle.x(), middle.y(), middle.z()}},
                     {"size_m", {size.x(), size.y(), size.z()}},
@@ -110,10 +110,10 @@ Json info_of_shells(const PreparedBody& body, const std::vector<ConvexShell>& sh
 }
 
 Outcome info_of_body(const fs::path& folder) {
-  const PreparedBody body = read_body(folder);
+  const detail::PreparedBody body = detail::read_body(folder);
   Json json = body.report;
   json["shell_list"] = info_of_shells(body, read_obj_shells(folder / "shells.obj"));
-  std::string text = summary_of_report(body.report);
+  std::string text = detail::summary_of_report(body.report);
   const auto place = [](const Json& v) {
     return fmt::format("({:8.4g} {:8.4g} {:8.4g})", v[0].get<double>(), v[1].get<double>(),
                        v[2].get<double>());
@@ -130,11 +130,12 @@ Outcome info_of_body(const fs::path& folder) {
 }  // namespace
 
 Outcome info(const fs::path& path) {
-  if (path.extension() == ".toml") return info_of_scene(path);
-  if (!fs::exists(path) && path.extension().empty()) return info_of_scene(scenes::find_scene(path.string()));
+  if (path.extension() == ".toml") return detail::info_of_scene(path);
+  if (!fs::exists(path) && path.extension().empty())
+    return detail::info_of_scene(scenes::find_scene(path.string()));
   if (fs::is_directory(path)) {
-    if (fs::exists(path / "scene.toml")) return info_of_scene(path / "scene.toml");
-    if (fs::exists(path / "plan.npz")) return outcome_of(read_plan_folder(path).summary);
+    if (fs::exists(path / "scene.toml")) return detail::info_of_scene(path / "scene.toml");
+    if (fs::exists(path / "plan.npz")) return outcome_of(detail::read_plan_folder(path).summary);
     if (fs::exists(path / "report.json")) return info_of_body(path);
     throw InputError(fmt::format(
         "{}: holds none of plan.npz, report.json, scene.toml; nothing here is limber's", path.string()));
@@ -163,4 +164,4 @@ Outcome list_scenes() {
   return {exit_done, json, text};
 }
 
-}  // namespace limber::app
+}  // namespace limber::cli

@@ -1,3 +1,3 @@
-#include "limber/detail/commands.h"
+#include "cli/command_line.h"
 
-int main(int argc, char** argv) { return limber::app::run_command_line(argc, argv); }
+int main(int argc, char** argv) { return limber::cli::run_command_line(argc, argv); }

@@ -29,7 +29,7 @@ void require_mode(const std::string& mode) {
       fmt::format("mode is \"{}\"; it must be one of \"lattice\", \"fast\", \"paper\", \"conform\"", mode));
 }
 
-app::PrepareSettings settings_of(const PrepareOptions& o) {
+detail::PrepareSettings settings_of(const PrepareOptions& o) {
   require_mode(o.mode);
   return {.shells = o.shells,
           .concavity = o.concavity,
@@ -68,10 +68,10 @@ ImportedMesh imported(const meshing::ImportedModel& model) {
   return {mesh_of(model.surface), model.mended, model.warnings};
 }
 
-Body body_of(const app::BodySource& source, const PrepareOptions& options) {
+Body body_of(const detail::BodySource& source, const PrepareOptions& options) {
   auto impl = std::make_shared<Body::Impl>();
-  const app::PrepareSettings settings = settings_of(options);
-  app::WholeBody whole = app::make_body(source, settings, [](const char*) {});
+  const detail::PrepareSettings settings = settings_of(options);
+  detail::WholeBody whole = detail::make_body(source, settings, [](const char*) {});
   impl->surface = mesh_of(whole.model.surface);
   for (const ConvexShell& shell : whole.made.decomposition.shells) impl->hulls.push_back(mesh_of(shell));
   impl->cage = cage_of(whole.made.cage.mesh, whole.made.cage.shell_from_tet);
@@ -79,7 +79,7 @@ Body body_of(const app::BodySource& source, const PrepareOptions& options) {
   impl->cage.notes = whole.made.cage.notes;
   impl->certificate = certificate_of(whole.certificate);
   impl->binding = binding_of(whole.binding);
-  impl->report = app::report_of(whole, source, settings);
+  impl->report = detail::report_of(whole, source, settings);
   for (const Json& warning : impl->report.at("warnings"))
     log::warn("{}: {}", source.model, warning.get<std::string>());
   impl->bound = whole.binding;
@@ -111,7 +111,7 @@ ImportedMesh clean(const Mesh& mesh, const Context& context) {
 Decomposition decompose(const Mesh& mesh, const DecomposeOptions& options, const Context& context) {
   return working_for(context, [&] {
     require_mesh(mesh, "mesh");
-    const meshing::Decomposition made = app::make_shells(surface_of(mesh), {.shells = options.max_convex_hull,
+    const meshing::Decomposition made = detail::make_shells(surface_of(mesh), {.shells = options.max_convex_hull,
                                                                             .concavity = options.concavity,
                                                                             .threshold = options.threshold,
                                                                             .inflate = options.inflate,
@@ -135,7 +135,7 @@ Cage build_cage(const Mesh& mesh, const std::vector<Mesh>& hulls, const CageOpti
     require_mesh(mesh, "mesh");
     const std::vector<ConvexShell> shells = detail::shells_of(hulls);
     for (std::size_t h = 0; h < shells.size(); ++h) validate(shells[h], fmt::format("hull {}", h));
-    const meshing::Cage made = app::make_cage(
+    const meshing::Cage made = detail::make_cage(
         surface_of(mesh), shells, {.tets = options.tets, .mode = options.mode, .only = {}}, std::nullopt);
     Cage cage = cage_of(made.mesh, made.shell_from_tet);
     cage.volume_ratio = made.volume_ratio;
@@ -204,16 +204,16 @@ void Body::save(const std::filesystem::path& folder) const {
   if (!impl_->made && fs::equivalent(folder, impl_->folder)) return;
   const FolderLock lock(folder, FolderLock::alone);
   if (impl_->made) {
-    app::write_body(impl_->made->whole, impl_->made->source, impl_->made->settings, folder);
+    detail::write_body(impl_->made->whole, impl_->made->source, impl_->made->settings, folder);
     return;
   }
-  app::clear_body(folder);
+  detail::clear_body(folder);
   for (const auto& [name, any] : impl_->report.at("files").items())
     write_file(folder / name, read_file(impl_->folder / name));
   write_file(folder / "report.json", read_file(impl_->folder / "report.json"));
 }
 
-Body detail::body_of(const app::PreparedBody& prepared, const std::filesystem::path& folder) {
+Body detail::body_of(const detail::PreparedBody& prepared, const std::filesystem::path& folder) {
   auto impl = std::make_shared<Body::Impl>();
   impl->surface = mesh_of(prepared.surface);
   for (const ConvexShell& shell : read_obj_shells(folder / "shells.obj")) impl->hulls.push_back(mesh_of(shell));
@@ -239,13 +239,13 @@ Body detail::body_of(const app::PreparedBody& prepared, const std::filesystem::p
 }
 
 Body Body::load(const std::filesystem::path& folder) {
-  return detail::body_of(app::read_body(folder), folder);
+  return detail::body_of(detail::read_body(folder), folder);
 }
 
 Body prepare(const Mesh& mesh, const PrepareOptions& options, const Context& context) {
   return working_for(context, [&] {
     const SurfaceMesh surface = surface_of(mesh);
-    app::BodySource source;
+    detail::BodySource source;
     source.model = "mesh";
     source.identity = {{"mesh_hash", hex(hash_of(surface))}};
     source.load = [surface] { return meshing::clean(surface); };
@@ -256,9 +256,9 @@ Body prepare(const Mesh& mesh, const PrepareOptions& options, const Context& con
 Body prepare(const std::filesystem::path& model, const PrepareOptions& options, const ImportOptions& import,
              const Context& context) {
   return working_for(context, [&] {
-    app::PrepareOptions command;
+    detail::PrepareOptions command;
     command.model = model, command.scale = import.scale, command.y_up = import.y_up;
-    return body_of(app::source_of(command, model), options);
+    return body_of(detail::source_of(command, model), options);
   });
 }
 

@@ -139,38 +139,38 @@ Push push_of(const Control& c) {
           .steps = c.steps};
 }
 
-std::vector<app::PreparedBody> prepare_bodies(const Scene::Impl& scene, const std::filesystem::path& folder) {
+std::vector<detail::PreparedBody> prepare_bodies(const Scene::Impl& scene, const std::filesystem::path& folder) {
   make_folder(folder);
   const FolderLock lock(folder, FolderLock::alone);
-  return app::prepare_bodies(scene.scene, scene.data, folder);
+  return detail::prepare_bodies(scene.scene, scene.data, folder);
 }
 
 }  // namespace
 
 Problem::Impl::Impl(const Scene& of, const std::filesystem::path& work_folder,
-                    std::vector<app::PreparedBody> (*prepare)(const Scene::Impl&,
+                    std::vector<detail::PreparedBody> (*prepare)(const Scene::Impl&,
                                                               const std::filesystem::path&),
                     const std::vector<float>& start_positions)
     : scene(of),
       folder(work_folder),
       prepared(prepare(of.impl(), folder.path())),
-      world(app::build_world(of.impl().scene, prepared, start_positions)),
+      world(detail::build_world(of.impl().scene, prepared, start_positions)),
       system(world),
       state_numbers(3 * std::size_t(world.moving_nodes)) {
   for (std::size_t b = 0; b < prepared.size(); ++b)
     bodies.push_back(
-        detail::body_of(prepared[b], app::body_folder(folder.path(), of.impl().scene.bodies[b])));
+        detail::body_of(prepared[b], detail::body_folder(folder.path(), of.impl().scene.bodies[b])));
 }
 
 Problem::Impl::Impl(const Scene& of, const std::filesystem::path& work_folder)
     : Impl(of, work_folder, prepare_bodies, {}) {}
 
-Problem::Impl::Impl(const app::PlanFolder& planned, const std::filesystem::path& of_plan)
+Problem::Impl::Impl(const detail::PlanFolder& planned, const std::filesystem::path& of_plan)
     : Impl(Scene(std::make_shared<Scene::Impl>(planned.scene, std::vector<std::filesystem::path>{})), of_plan,
            [](const Scene::Impl& of, const std::filesystem::path& in) {
-             return app::read_bodies(of.scene, in);
+             return detail::read_bodies(of.scene, in);
            },
-           app::begins_elsewhere(planned) ? std::vector<float>{}
+           detail::begins_elsewhere(planned) ? std::vector<float>{}
                                           : State(planned.plan.tree.states[0]).positions) {}
 
 Problem::Problem(const Scene& scene, const std::filesystem::path& work_folder, const Context& context)
@@ -270,7 +270,7 @@ std::vector<std::array<double, 3>> Problem::robot_centers(const States& states) 
 
 Plan Problem::solve(const SolveOptions& options, const Context& context) const {
   return working_for(context, [&] {
-    app::PlanOptions command;
+    detail::PlanOptions command;
     command.seed = options.seed, command.iterations = options.iterations;
     command.time_limit_s = options.time_limit_s;
     command.shortcut_rounds = options.shortcut_rounds;
@@ -278,8 +278,8 @@ Plan Problem::solve(const SolveOptions& options, const Context& context) const {
     command.improve = options.improve;
     const scenes::Scene& scene = impl_->scene.impl().scene;
     scenes::require_plannable(scene);
-    const app::FemSystem system(impl_->world, impl_->prepared, app::goal_rules_of(scene));
-    app::Found found = app::find_plan(scene, system, command);
+    const detail::FemSystem system(impl_->world, impl_->prepared, detail::goal_rules_of(scene));
+    detail::Found found = detail::find_plan(scene, system, command);
     return Plan(std::make_shared<Plan::Impl>(*this, std::move(found.plan), std::move(found.extra)));
   });
 }
@@ -292,10 +292,10 @@ Plan Problem::simulate(double duration_s, const Context& context) const {
   });
 }
 
-const app::MotionFigures& Plan::Impl::motion_figures() const {
+const detail::MotionFigures& Plan::Impl::motion_figures() const {
   std::call_once(measured, [&] {
     const Problem::Impl& p = problem.impl();
-    figures = app::measure_motion(p.world, p.prepared, plan.trajectory);
+    figures = detail::measure_motion(p.world, p.prepared, plan.trajectory);
   });
   return figures;
 }
@@ -304,9 +304,9 @@ Plan::Plan(std::shared_ptr<const Impl> impl) : impl_(std::move(impl)) {}
 
 Plan Plan::load(const std::filesystem::path& folder) {
   return working_for({}, [&] {
-    app::PlanFolder planned = app::read_plan_folder(folder);
+    detail::PlanFolder planned = detail::read_plan_folder(folder);
     const auto problem = std::make_shared<const Problem::Impl>(planned, folder);
-    app::read_bodies_of(planned, folder);  // complains of those that are others
+    detail::read_bodies_of(planned, folder);  // complains of those that are others
     auto impl = std::make_shared<Plan::Impl>(Problem(problem), std::move(planned.plan));
     impl->summary = std::move(planned.summary);
     return Plan(std::move(impl));
@@ -347,17 +347,17 @@ Vertices Plan::surface(int body, int frame) const {
   if (frame < 0 || frame >= int(frames.size()))
     throw InputError(fmt::format("there is no frame {}; they are 0 … {}", frame, frames.size() - 1));
   Points moved;
-  app::deform(p.prepared[std::size_t(body)], fem::body_positions(p.world, frames[std::size_t(frame)], body),
+  detail::deform(p.prepared[std::size_t(body)], fem::body_positions(p.world, frames[std::size_t(frame)], body),
               moved);
   return detail::vertices_of(moved);
 }
 
 namespace {
 
-app::FemSystem system_of(const Plan::Impl& plan) {
+detail::FemSystem system_of(const Plan::Impl& plan) {
   const Problem::Impl& p = plan.problem.impl();
-  if (plan.plan.simulation) return app::FemSystem(p.world);
-  return app::FemSystem(p.world, p.prepared, app::goal_rules_of(p.scene.impl().scene));
+  if (plan.plan.simulation) return detail::FemSystem(p.world);
+  return detail::FemSystem(p.world, p.prepared, detail::goal_rules_of(p.scene.impl().scene));
 }
 
 }  // namespace
@@ -366,7 +366,7 @@ std::string Plan::summary_json(const Context& context) const {
   if (!impl_->summary.is_null()) return text_of(impl_->summary, 2);
   return working_for(context, [&] {
     Json summary =
-        app::facts_of(impl_->plan, impl_->problem.impl().world, system_of(*impl_), impl_->motion_figures());
+        detail::facts_of(impl_->plan, impl_->problem.impl().world, system_of(*impl_), impl_->motion_figures());
     if (!impl_->extra.is_null()) summary.update(impl_->extra);
     return text_of(summary, 2);
   });
@@ -394,7 +394,7 @@ void Plan::save(const std::filesystem::path& folder, const Context& context) con
             throw DiskError(fmt::format("{}: writing it failed: {}", (folder / part).string(), failed.message()));
         }
     plan::Plan plan = impl_->plan;
-    app::keep_measured_plan(folder, p.scene.impl().scene, p.prepared, p.world, system_of(*impl_), plan,
+    detail::keep_measured_plan(folder, p.scene.impl().scene, p.prepared, p.world, system_of(*impl_), plan,
                             impl_->motion_figures(), impl_->extra, "");
   });
 }

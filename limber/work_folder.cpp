@@ -13,10 +13,10 @@ using detail::working_for;
 std::vector<Promise> verify(const std::filesystem::path& folder, const std::string& scene,
                             const Context& context) {
   return working_for(context, [&] {
-    app::VerifyOptions options;
+    detail::VerifyOptions options;
     options.folder = folder, options.scene.scene = scene;
     std::vector<Promise> promises;
-    for (const Json& row : app::verify(options).json.at("promises"))
+    for (const Json& row : detail::verify(options).json.at("promises"))
       promises.push_back({row.at("promise").get<std::string>(), row.at("value").get<std::string>(),
                           row.at("kept").get<bool>()});
     return promises;
@@ -25,7 +25,7 @@ std::vector<Promise> verify(const std::filesystem::path& folder, const std::stri
 
 Film render_film(const std::filesystem::path& folder, const FilmOptions& options, const Context& context) {
   return working_for(context, [&] {
-    app::RenderOptions command;
+    detail::RenderOptions command;
     command.folder = folder;
     command.frames = options.frames;
     command.resume = options.resume;
@@ -33,7 +33,7 @@ Film render_film(const std::filesystem::path& folder, const FilmOptions& options
       command.size = fmt::format("{}x{}", options.width, options.height);
     command.camera = options.camera, command.name = options.name, command.sets = options.sets;
     if (!options.video.empty()) command.video = options.video;
-    const Json told = app::render(command).json;
+    const Json told = detail::render(command).json;
     Film film;
     film.frames_painted = told.at("painted").get<int>(), film.frames_failed = told.at("failed").get<int>();
     if (told.contains("film")) film.video = told.at("film").get<std::string>();
@@ -46,14 +46,14 @@ std::vector<std::filesystem::path> export_motion(const std::filesystem::path& fo
                                                  const std::filesystem::path& out, const Context& context) {
   return working_for(context, [&] {
     for (const std::string& format : formats)
-      if (std::find(app::motion_formats.begin(), app::motion_formats.end(), format) ==
-          app::motion_formats.end())
+      if (std::find(detail::motion_formats.begin(), detail::motion_formats.end(), format) ==
+          detail::motion_formats.end())
         throw InputError(fmt::format("there is no format \"{}\"; there are gltf, pc2, usd, vtu", format));
-    app::ExportOptions options;
+    detail::ExportOptions options;
     options.folder = folder, options.formats = formats;
     if (!out.empty()) options.out = out;
     std::vector<std::filesystem::path> files;
-    const Json written = app::export_motion(options).json.at("formats");
+    const Json written = detail::export_motion(options).json.at("formats");
     for (const std::string& format : formats)
       files.push_back(written.at(format).at("open").get<std::string>());
     return files;
@@ -65,7 +65,7 @@ std::filesystem::path write_report(const std::filesystem::path& folder, const st
   return working_for(context, [&] {
     std::optional<fs::path> to;
     if (!file.empty()) to = file;
-    app::report(folder, to);
+    detail::report(folder, to);
     return file.empty() ? folder / "report.html" : file;
   });
 }

@@ -10,7 +10,7 @@
 #include "core/file.h"
 #include "core/json.h"
 
-namespace limber::app {
+namespace limber::detail {
 
 // What the process says when it ends; docs/cli.md tells users.
 enum ExitCode : int {
@@ -234,11 +234,6 @@ struct NewSceneOptions {
 };
 Outcome new_scene(const NewSceneOptions&);
 
-Outcome info(const fs::path& path);
 Outcome info_of_scene(const fs::path& file);
-Outcome list_scenes();
 
-// Parses the arguments, runs the subcommand, prints, and answers the exit code. Throws nothing.
-int run_command_line(int argc, const char* const* argv);
-
-}  // namespace limber::app
+}  // namespace limber::detail

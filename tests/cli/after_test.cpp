@@ -1,7 +1,7 @@
 // What is done with a plan once it is found.
 #include "tests/cli/program.h"
 
-namespace limber::app {
+namespace limber::detail {
 namespace {
 
 TEST_F(Program_slow, AShortenedPathIsAPlanLikeAnyOther) {
@@ -186,4 +186,4 @@ TEST_F(Program_slow, APlanIsCarriedToFinerCages) {
 }
 
 }  // namespace
-}  // namespace limber::app
+}  // namespace limber::detail

@@ -11,7 +11,7 @@
 #include "tests/cli/program.h"
 #include "tests/places.h"
 
-namespace limber::app {
+namespace limber::detail {
 namespace {
 
 using testing::Contains;
@@ -363,4 +363,4 @@ TEST_F(Painted_slow, VerifyNamesWhatIsNotTheModels) {
 }
 
 }  // namespace
-}  // namespace limber::app
+}  // namespace limber::detail

@@ -15,7 +15,7 @@
 #include "tests/cli/program.h"
 #include "tests/places.h"
 
-namespace limber::app {
+namespace limber::detail {
 namespace {
 
 class Batch_slow : public Program {
@@ -256,4 +256,4 @@ TEST_F(Batch_slow, ListsAndModelsComeOnStdin) {
 }
 
 }  // namespace
-}  // namespace limber::app
+}  // namespace limber::detail

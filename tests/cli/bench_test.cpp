@@ -13,7 +13,7 @@
 #include "plan/plan_file.h"
 #include "tests/cli/program.h"
 
-namespace limber::app {
+namespace limber::detail {
 namespace {
 
 // A record with only what the tables read.
@@ -364,4 +364,4 @@ TEST_F(Program_slow, BadBenchmarksAreRefusedWithAWayOut) {
 }
 
 }  // namespace
-}  // namespace limber::app
+}  // namespace limber::detail

@@ -21,7 +21,7 @@
 #include "tests/cli/program.h"
 #include "tests/places.h"
 
-namespace limber::app {
+namespace limber::detail {
 namespace {
 
 TEST_F(Program, RunFilmsASceneVerifyAgreesAndASecondRunChangesNothing) {
@@ -432,4 +432,4 @@ TEST_F(Program_slow, PreviewPaintsTheSamePicturesEachTime) {
 }
 
 }  // namespace
-}  // namespace limber::app
+}  // namespace limber::detail

@@ -9,7 +9,7 @@
 #include "core/file.h"
 #include "tests/cli/program.h"
 
-namespace limber::app {
+namespace limber::detail {
 namespace {
 
 class CommandWords : public Program {
@@ -121,4 +121,4 @@ TEST_F(CommandWords, ZshAndFishHaveThemToo) {
 }
 
 }  // namespace
-}  // namespace limber::app
+}  // namespace limber::detail

@@ -8,7 +8,7 @@
 #include "scenes/library.h"
 #include "tests/cli/program.h"
 
-namespace limber::app {
+namespace limber::detail {
 namespace {
 
 using Sets = std::vector<std::string>;
@@ -106,4 +106,4 @@ TEST_F(Controls, TheSmallestWindowIsAvoidedAndAWideOneTaken) {
 }
 
 }  // namespace
-}  // namespace limber::app
+}  // namespace limber::detail

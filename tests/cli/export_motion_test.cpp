@@ -19,7 +19,7 @@
 #include "tests/cli/program.h"
 #include "tests/places.h"
 
-namespace limber::app {
+namespace limber::detail {
 namespace {
 
 // Beside the robot, by Phong Deformation, and the soft block, linear: a rigid body that falls, and one that
@@ -332,4 +332,4 @@ TEST_F(ExportMotion, OtherProgramsReadersAgree) {
 }
 
 }  // namespace
-}  // namespace limber::app
+}  // namespace limber::detail

@@ -10,7 +10,7 @@
 #include "render/png_file.h"
 #include "tests/cli/program.h"
 
-namespace limber::app {
+namespace limber::detail {
 namespace {
 
 using testing::HasSubstr;
@@ -306,4 +306,4 @@ TEST_F(Program_slow, RunFilmsAnewWhatIsFilmedOtherwise) {
 }
 
 }  // namespace
-}  // namespace limber::app
+}  // namespace limber::detail

@@ -4,7 +4,7 @@
 
 #include "tests/cli/program.h"
 
-namespace limber::app {
+namespace limber::detail {
 namespace {
 
 std::vector<Json> lines_of(const fs::path& file) {
@@ -146,4 +146,4 @@ TEST_F(Habits_slow, TheBodyThatBlocksIsNamed) {
 }
 
 }  // namespace
-}  // namespace limber::app
+}  // namespace limber::detail

@@ -12,7 +12,7 @@
 #include "tests/cli/program.h"
 #include "tests/places.h"
 
-namespace limber::app {
+namespace limber::detail {
 namespace {
 
 Json plan_json(const std::string& scene, const std::string& out, std::vector<std::string> more) {
@@ -188,4 +188,4 @@ TEST_F(Interrupt, ABenchmarkStoppedInARunKeepsTheFinishedOnes) {
 }
 
 }  // namespace
-}  // namespace limber::app
+}  // namespace limber::detail

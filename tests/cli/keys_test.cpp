@@ -12,7 +12,7 @@
 #include "scenes/detail/schema.h"
 #include "tests/cli/program.h"
 
-namespace limber::app {
+namespace limber::detail {
 namespace {
 
 enum Shapes : unsigned { nothing = 0, world = 1, search = 2, film = 4 };
@@ -523,4 +523,4 @@ TEST_F(Keys_slow, SceneryIsMadeAnewWhereItsTrianglesChange) {
 }
 
 }  // namespace
-}  // namespace limber::app
+}  // namespace limber::detail

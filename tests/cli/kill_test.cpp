@@ -19,7 +19,7 @@
 #include "tests/cli/program.h"
 #include "tests/places.h"
 
-namespace limber::app {
+namespace limber::detail {
 namespace {
 
 // LIMBER_KILLS=N kills each as often.
@@ -309,4 +309,4 @@ TEST_F(Killed, TakesItsEncoderAlong) {
 }
 
 }  // namespace
-}  // namespace limber::app
+}  // namespace limber::detail

@@ -6,7 +6,7 @@
 #include "tests/cli/program.h"
 #include "tests/imaging/made_maps.h"
 
-namespace limber::app {
+namespace limber::detail {
 namespace {
 
 // Two balls of 8 mm that touch, and two voxels on their own.
@@ -62,4 +62,4 @@ TEST_F(Program_slow, ALabelOfAScanIsPreparedWhereItIs) {
 }
 
 }  // namespace
-}  // namespace limber::app
+}  // namespace limber::detail

@@ -7,7 +7,7 @@
 #include "limber/detail/body/model_content.h"
 #include "tests/cli/program.h"
 
-namespace limber::app {
+namespace limber::detail {
 namespace {
 
 class ModelList : public Program {
@@ -137,4 +137,4 @@ TEST_F(ModelList, AnObjIsItsMaterialsAndTheirImagesToo) {
 }
 
 }  // namespace
-}  // namespace limber::app
+}  // namespace limber::detail

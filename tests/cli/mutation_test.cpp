@@ -22,7 +22,7 @@
 #include "plan/plan_file.h"
 #include "tests/cli/program.h"
 
-namespace limber::app {
+namespace limber::detail {
 namespace {
 
 // A soft ball, a soft block of two convex parts, and a post that is only seen.
@@ -1274,4 +1274,4 @@ TEST_F(PartedMutations_slow, OfTheStart) {
 }
 
 }  // namespace
-}  // namespace limber::app
+}  // namespace limber::detail

@@ -9,7 +9,7 @@
 #include "tests/cli/program.h"
 #include "tests/imaging/made_maps.h"
 
-namespace limber::app {
+namespace limber::detail {
 namespace {
 
 using testing::HasSubstr;
@@ -359,4 +359,4 @@ TEST_F(SceneOfAnAtlas, WhatDoesNotFitIsRefusedAndNothingStays) {
 }
 
 }  // namespace
-}  // namespace limber::app
+}  // namespace limber::detail

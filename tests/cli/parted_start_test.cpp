@@ -7,7 +7,7 @@
 #include "limber/detail/world/workspace.h"
 #include "tests/cli/program.h"
 
-namespace limber::app {
+namespace limber::detail {
 namespace {
 
 // The robot and a ball that goes along with the goal are 0.05 m in one another.
@@ -121,4 +121,4 @@ TEST_F(PartedStart_slow, IsRefusedWhereTheSceneWantsThatOrItCannotBe) {
 }
 
 }  // namespace
-}  // namespace limber::app
+}  // namespace limber::detail

@@ -9,12 +9,13 @@
 #include <utility>
 #include <vector>
 
+#include "cli/command_line.h"
 #include "core/error.h"
 #include "core/json.h"
 #include "limber/detail/commands.h"
 #include "tests/core/temporary_folder.h"
 
-namespace limber::app {
+namespace limber::detail {
 
 struct Result {
   int code;
@@ -27,7 +28,7 @@ inline Result limber_program(std::vector<std::string> arguments) {
   for (const std::string& a : arguments) argv.push_back(a.c_str());
   testing::internal::CaptureStdout();
   testing::internal::CaptureStderr();
-  const int code = run_command_line(int(argv.size()), argv.data());
+  const int code = cli::run_command_line(int(argv.size()), argv.data());
   const std::string out = testing::internal::GetCapturedStdout();
   return {code, out, testing::internal::GetCapturedStderr()};
 }
@@ -96,4 +97,4 @@ inline std::vector<std::pair<std::string, std::string>> contents(const fs::path&
   return files;
 }
 
-}  // namespace limber::app
+}  // namespace limber::detail

@@ -11,7 +11,7 @@
 #include "tests/cli/program.h"
 #include "tests/places.h"
 
-namespace limber::app {
+namespace limber::detail {
 namespace {
 
 int count_of(const std::string& text, const std::string& what) {
@@ -198,4 +198,4 @@ TEST_F(Report, ABrowserPlaysIt) {
 }
 
 }  // namespace
-}  // namespace limber::app
+}  // namespace limber::detail

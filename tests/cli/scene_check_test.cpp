@@ -2,7 +2,7 @@
 #include "render/png_file.h"
 #include "tests/cli/program.h"
 
-namespace limber::app {
+namespace limber::detail {
 namespace {
 
 class SceneCheck : public Program {
@@ -199,4 +199,4 @@ TEST_F(SceneCheck, BodiesArePreparedApart) {
 }
 
 }  // namespace
-}  // namespace limber::app
+}  // namespace limber::detail

@@ -12,7 +12,7 @@
 #include "plan/simulation.h"
 #include "tests/cli/program.h"
 
-namespace limber::app {
+namespace limber::detail {
 namespace {
 
 // A soft cube thrown over a plate that turns and rises, and pushed on its way.
@@ -494,4 +494,4 @@ TEST_F(SimulationMutations_slow, OfWhatItFollows) {
 }
 
 }  // namespace
-}  // namespace limber::app
+}  // namespace limber::detail

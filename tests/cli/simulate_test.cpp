@@ -10,7 +10,7 @@
 #include "render/png_file.h"
 #include "tests/cli/program.h"
 
-namespace limber::app {
+namespace limber::detail {
 namespace {
 
 // A soft cube thrown into a room, and a plate that goes up under it.
@@ -567,4 +567,4 @@ TEST_F(Simulate_slow, WhatCannotBeFollowedIsRefusedWithASentence) {
 }
 
 }  // namespace
-}  // namespace limber::app
+}  // namespace limber::detail

@@ -11,7 +11,7 @@
 #include "render/png_file.h"
 #include "tests/cli/program.h"
 
-namespace limber::app {
+namespace limber::detail {
 namespace {
 
 using testing::HasSubstr;
@@ -279,4 +279,4 @@ TEST_F(Story_slow, PassesTellWhereTheRobotIsTouched) {
 }
 
 }  // namespace
-}  // namespace limber::app
+}  // namespace limber::detail

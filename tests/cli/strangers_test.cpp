@@ -10,7 +10,7 @@
 #include "plan/plan_file.h"
 #include "tests/cli/program.h"
 
-namespace limber::app {
+namespace limber::detail {
 namespace {
 
 class Strangers_slow : public Program {
@@ -252,4 +252,4 @@ TEST_F(Program_slow, RobustSaysOfNoRobotThatItRestsWhereNoneWasAskedTo) {
 }
 
 }  // namespace
-}  // namespace limber::app
+}  // namespace limber::detail

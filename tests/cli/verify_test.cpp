@@ -6,7 +6,7 @@
 #include "tests/cli/program.h"
 #include "tests/fem/worlds.h"
 
-namespace limber::app {
+namespace limber::detail {
 namespace {
 
 // A brick, from z = 1 to 1.2, alone over a slab that ends at 0.5; its middle is at (0.3 0.2 1.1).
@@ -144,4 +144,4 @@ TEST_F(Verify, RestIsPromisedOnlyWhereItIsAskedFor) {
 }
 
 }  // namespace
-}  // namespace limber::app
+}  // namespace limber::detail

@@ -1,7 +1,7 @@
 // A scene with goals in a row, as a user meets it.
 #include "tests/cli/program.h"
 
-namespace limber::app {
+namespace limber::detail {
 namespace {
 
 // Over the block and to rest above its far side, and back.
@@ -109,4 +109,4 @@ TEST_F(ViaProgram_slow, APathByWayOfViaPointsIsNotCarriedToFinerCages) {
 }
 
 }  // namespace
-}  // namespace limber::app
+}  // namespace limber::detail

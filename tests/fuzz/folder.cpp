@@ -2,6 +2,7 @@
 
 #include <fstream>
 
+#include "cli/commands.h"
 #include "core/contact_shape_file.h"
 #include "core/hash.h"
 #include "core/log.h"
@@ -9,7 +10,6 @@
 #include "core/progress.h"
 #include "core/words.h"
 #include "ffd/binding_file.h"
-#include "limber/detail/commands.h"
 #include "limber/detail/plan/manifest.h"
 #include "limber/detail/plan/plan_folder.h"
 #include "limber/detail/world/scene_world.h"
@@ -65,7 +65,7 @@ sheet = [2, 1]
 
 struct BodyFiles {
   std::string name, shells;
-  app::PreparedBody body;
+  detail::PreparedBody body;
 };
 
 // What a run that went well left, in memory.
@@ -75,7 +75,7 @@ struct Good {
     set_progress_enabled(false);
     std::ofstream(scene_file) << scene_text;
     const scenes::Scene scene = scenes::read_scene_file(scene_file);
-    for (const app::PreparedBody& prepared : app::prepare_bodies(scene, {}, work)) {
+    for (const detail::PreparedBody& prepared : detail::prepare_bodies(scene, {}, work)) {
       const std::string& name = scene.bodies[bodies.size()].name;
       bodies.push_back({name, read_file(work / "bodies" / name / "shells.obj"), prepared});
       // Of a field for show a thousandth will do.
@@ -83,9 +83,9 @@ struct Good {
           prepared.surface, prepared.cage, {.cells = 8, .most_cells = 8, .most_nodes = 1000});
       write_body(bodies.back());
     }
-    app::PlanOptions options;
+    detail::PlanOptions options;
     options.scene.scene = scene_file.string(), options.out = work;
-    app::plan(options);
+    detail::plan(options);
     planned = plan::read_plan(work / "plan.npz");
     manifest = read_json(work / "manifest.json");
     for (const char* file : {"sign.ply", "sign.json"}) scenery[file] = read_file(work / "scenery" / file);
@@ -94,7 +94,7 @@ struct Good {
   fs::path write_body(const BodyFiles& one) const {
     const fs::path folder = work / "bodies" / one.name;
     make_folder(folder);
-    const app::PreparedBody& b = one.body;
+    const detail::PreparedBody& b = one.body;
     write_ply(folder / "surface.ply", b.surface);
     write_file(folder / "shells.obj", one.shells);
     write_msh(folder / "cage.msh", b.cage, b.shell_from_tet);
@@ -143,7 +143,7 @@ void change_npz(const fs::path& path, Script& script) {
 // One of its files, and its report so that it fits, or that alone.
 void change_body(Json& given, Script& script) {
   BodyFiles one = good().bodies[std::size_t(script.below(int(good().bodies.size())))];
-  app::PreparedBody& body = one.body;
+  detail::PreparedBody& body = one.body;
   const int file = script.below(6);
   if (file == 0) edit(body.surface, script);
   if (file == 1) edit(body.cage, body.shell_from_tet, script);
@@ -195,29 +195,29 @@ void meet_changed_folder(std::string_view bytes) {
   write_folder();
   const int command = script.below(8);
   change_folder(script);
-  app::read_manifest(work);
-  const app::PlanFolder planned = app::read_plan_folder(work);
+  detail::read_manifest(work);
+  const detail::PlanFolder planned = detail::read_plan_folder(work);
   if (command == 0) {
-    app::info(work), app::info(work / "bodies" / "robot"), app::info(work / "bodies" / "block");
+    cli::info(work), cli::info(work / "bodies" / "robot"), cli::info(work / "bodies" / "block");
     return;
   }
   if (command < 5) {
-    app::ExportOptions options;
-    options.folder = work, options.formats = {app::motion_formats[std::size_t(command - 1)]};
-    app::export_motion(options);
+    detail::ExportOptions options;
+    options.folder = work, options.formats = {detail::motion_formats[std::size_t(command - 1)]};
+    detail::export_motion(options);
   } else if (command == 5) {
-    app::RenderOptions options;
+    detail::RenderOptions options;
     options.folder = work, options.frames = {"0-0"}, options.size = {"32x32"};
-    app::render(options);
+    detail::render(options);
   } else if (command == 6) {
-    app::robust({.folder = work, .perturbations = 1});
+    detail::robust({.folder = work, .perturbations = 1});
   } else {
-    const std::vector<app::PreparedBody> bodies = app::read_bodies_of(planned, work);
-    const fem::World world = app::build_world(planned.scene, bodies);
-    const app::FemSystem system(world, app::goal_rules_of(planned.scene));
-    const app::MotionFigures figures = app::measure_motion(world, bodies, planned.plan.trajectory);
-    app::facts_of(planned.plan, world, system, figures);
-    app::pictures_of(planned.scene, world, planned.plan, figures);
+    const std::vector<detail::PreparedBody> bodies = detail::read_bodies_of(planned, work);
+    const fem::World world = detail::build_world(planned.scene, bodies);
+    const detail::FemSystem system(world, detail::goal_rules_of(planned.scene));
+    const detail::MotionFigures figures = detail::measure_motion(world, bodies, planned.plan.trajectory);
+    detail::facts_of(planned.plan, world, system, figures);
+    detail::pictures_of(planned.scene, world, planned.plan, figures);
     plan::explain(planned.plan);
   }
 }

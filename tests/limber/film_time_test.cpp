@@ -6,7 +6,7 @@
 #include <cmath>
 #include <numeric>
 
-namespace limber::app {
+namespace limber::detail {
 namespace {
 
 constexpr PaceRange range{0.2, 2};
@@ -129,4 +129,4 @@ TEST(FirstAtRest, IsWhereTheLastMotionEnds) {
 }
 
 }  // namespace
-}  // namespace limber::app
+}  // namespace limber::detail

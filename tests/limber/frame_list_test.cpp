@@ -6,7 +6,7 @@
 
 #include "core/error.h"
 
-namespace limber::app {
+namespace limber::detail {
 namespace {
 
 TEST(FrameList, ReadsFramesRangesAndSteps) {
@@ -61,4 +61,4 @@ TEST(FrameList, Sizes) {
 }
 
 }  // namespace
-}  // namespace limber::app
+}  // namespace limber::detail

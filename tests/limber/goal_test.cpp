@@ -11,7 +11,7 @@
 #include "plan/search.h"
 #include "tests/fem/worlds.h"
 
-namespace limber::app {
+namespace limber::detail {
 namespace {
 
 using fem::testing::alone;
@@ -237,4 +237,4 @@ TEST(Goal, AShapeOfAnotherCageIsRefused) {
 }
 
 }  // namespace
-}  // namespace limber::app
+}  // namespace limber::detail

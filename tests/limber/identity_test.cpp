@@ -14,7 +14,7 @@
 #include "scenes/library.h"
 #include "tests/core/temporary_folder.h"
 
-namespace limber::app {
+namespace limber::detail {
 namespace {
 
 constexpr int rollouts = 20;
@@ -193,4 +193,4 @@ INSTANTIATE_TEST_SUITE_P(Of, Identity, testing::ValuesIn(names_of_scenes()),
                          [](const auto& name) { return name.param; });
 
 }  // namespace
-}  // namespace limber::app
+}  // namespace limber::detail

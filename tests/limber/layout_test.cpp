@@ -6,7 +6,7 @@
 #include "meshing/contact_shape.h"
 #include "scenes/shapes.h"
 
-namespace limber::app {
+namespace limber::detail {
 namespace {
 
 LaidBody cube(const Vec3& center, double edge = 1, bool held = false) {
@@ -79,4 +79,4 @@ TEST(Layout, SaysWhereThereIsNoWay) {
 }
 
 }  // namespace
-}  // namespace limber::app
+}  // namespace limber::detail

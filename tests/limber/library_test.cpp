@@ -11,7 +11,7 @@
 namespace limber {
 namespace {
 
-using app::limber_program;
+using detail::limber_program;
 using testing::HasSubstr;
 
 template <class F>
@@ -45,7 +45,7 @@ class Library : public testing::Test {
   TemporaryFolder folder;
   std::string path(const std::string& name) const { return (folder.path() / name).string(); }
   Scene small() const {
-    std::ofstream(path("small.toml")) << app::small_scene;
+    std::ofstream(path("small.toml")) << detail::small_scene;
     return read_scene(path("small.toml"));
   }
   // Its bodies are prepared once for all tests.
@@ -123,7 +123,7 @@ TEST_F(Library_slow, ABodyIsTheBytesThatTheCommandWrites) {
 
 TEST_F(Library_slow, APlanIsTheCommands) {
   const Scene scene = small();
-  const app::Result command =
+  const detail::Result command =
       limber_program({"plan", path("small.toml"), "-o", path("by command"), "--seed", "1", "--json"});
   ASSERT_EQ(command.code, 0) << command.err;
   for (const int threads : {1, 2}) {
@@ -140,7 +140,8 @@ TEST_F(Library_slow, APlanIsTheCommands) {
       one->erase("statistics"), one->erase("dynamics"), one->erase("shortcut");
     EXPECT_EQ(summary, told);
   }
-  const app::Result verified = limber_program({"verify", path("by library"), "--scene", path("small.toml")});
+  const detail::Result verified =
+      limber_program({"verify", path("by library"), "--scene", path("small.toml")});
   EXPECT_EQ(verified.code, 0) << verified.out << verified.err;
   const Plan read = Plan::load(path("by library"));
   EXPECT_EQ(read.trajectory_hash(), command.json().at("trajectory_hash"));

@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-namespace limber::app {
+namespace limber::detail {
 namespace {
 
 // A square of side 2 round the middle at height z, and 20 × 20 points over the same square at height 0.
@@ -40,4 +40,4 @@ TEST(LineOfSight, WhatTwoHideCountsOnce) {
 }
 
 }  // namespace
-}  // namespace limber::app
+}  // namespace limber::detail

@@ -5,7 +5,7 @@
 
 #include <Eigen/Geometry>
 
-namespace limber::app {
+namespace limber::detail {
 namespace {
 
 const Box bounds{Vec3(0, 0, 0), Vec3(4, 2, 3)};
@@ -81,4 +81,4 @@ TEST(Pane, EndsWithTheWall) {
 }
 
 }  // namespace
-}  // namespace limber::app
+}  // namespace limber::detail

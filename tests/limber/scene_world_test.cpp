@@ -12,7 +12,7 @@
 #include "scenes/library.h"
 #include "tests/core/temporary_folder.h"
 
-namespace limber::app {
+namespace limber::detail {
 namespace {
 
 // All tets of the scene: exactly where all cages are cells, within a tenth where limber makes one round a
@@ -63,4 +63,4 @@ TEST(SceneWorld, EveryScenePreparesBuildsAndSteps) {
 }
 
 }  // namespace
-}  // namespace limber::app
+}  // namespace limber::detail

@@ -7,7 +7,7 @@
 #include "scenes/library.h"
 #include "tests/core/temporary_folder.h"
 
-namespace limber::app {
+namespace limber::detail {
 namespace {
 
 struct Throw {
@@ -65,4 +65,4 @@ TEST(Squeeze, ABallComesThroughTheSlitWhole) {
 }
 
 }  // namespace
-}  // namespace limber::app
+}  // namespace limber::detail

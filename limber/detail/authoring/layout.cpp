@@ -5,7 +5,7 @@
 #include "core/mesh.h"
 #include "core/progress.h"
 
-namespace limber::app {
+namespace limber::detail {
 
 namespace {
 
@@ -123,4 +123,4 @@ std::optional<std::vector<Vec3>> ways_apart(std::vector<LaidBody> bodies, double
   return layout.way_m;
 }
 
-}  // namespace limber::app
+}  // namespace limber::detail

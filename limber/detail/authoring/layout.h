@@ -7,7 +7,7 @@
 
 #include "core/contact_shape.h"
 
-namespace limber::app {
+namespace limber::detail {
 
 struct LaidBody {
   std::shared_ptr<const ContactShape> shape;
@@ -28,4 +28,4 @@ struct Nearness {
 Nearness nearness(const ContactShape& one, const Vec3& way_of_one_m, const ContactShape& other,
                   const Vec3& way_of_other_m, double room_m);
 
-}  // namespace limber::app
+}  // namespace limber::detail

@@ -5,7 +5,7 @@
 
 #include "core/error.h"
 
-namespace limber::app {
+namespace limber::detail {
 
 double share_in_sight(const Points& points, const Vec3& toward_eye, std::span<const SurfaceMesh> hiding) {
   LIMBER_CHECK(points.rows() > 0 && toward_eye.norm() > 0, points.rows());
@@ -33,4 +33,4 @@ double share_in_sight(const Points& points, const Vec3& toward_eye, std::span<co
   return 1 - double(std::count(hidden.begin(), hidden.end(), true)) / double(hidden.size());
 }
 
-}  // namespace limber::app
+}  // namespace limber::detail

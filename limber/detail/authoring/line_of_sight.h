@@ -5,9 +5,9 @@
 
 #include "core/mesh.h"
 
-namespace limber::app {
+namespace limber::detail {
 
 // The share of the points from which nothing of `hiding` lies in the direction of the eye.
 double share_in_sight(const Points&, const Vec3& toward_eye, std::span<const SurfaceMesh> hiding);
 
-}  // namespace limber::app
+}  // namespace limber::detail

@@ -22,7 +22,7 @@
 #include "scenes/models.h"
 #include "scenes/scene.h"
 
-namespace limber::app {
+namespace limber::detail {
 
 namespace {
 
@@ -517,4 +517,4 @@ Outcome new_scene(const NewSceneOptions& options) {
   return scene_of_folder(options, "", {});
 }
 
-}  // namespace limber::app
+}  // namespace limber::detail

@@ -17,7 +17,7 @@
 #include "meshing/import.h"
 #include "scenes/anatomy.h"
 
-namespace limber::app {
+namespace limber::detail {
 
 namespace {
 
@@ -308,4 +308,4 @@ PartModels make_part_models(const PartSource& source, const fs::path& folder) {
   return made;
 }
 
-}  // namespace limber::app
+}  // namespace limber::detail

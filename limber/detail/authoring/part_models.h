@@ -7,7 +7,7 @@
 
 #include "core/file.h"
 
-namespace limber::app {
+namespace limber::detail {
 
 struct PartSource {
   fs::path from;   // a label map; or a folder with an atlas' tables and element files
@@ -30,4 +30,4 @@ bool is_atlas(const fs::path&);
 // Throws InputError: a part that is not there, a name twice, tables and files that do not fit.
 PartModels make_part_models(const PartSource&, const fs::path& folder);
 
-}  // namespace limber::app
+}  // namespace limber::detail

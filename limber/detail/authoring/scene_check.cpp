@@ -21,7 +21,7 @@
 #include "scenes/library.h"
 #include "scenes/problems.h"
 
-namespace limber::app {
+namespace limber::detail {
 
 namespace {
 
@@ -491,4 +491,4 @@ Outcome render_still(const StillOptions& options) {
           still.string() + "\n"};
 }
 
-}  // namespace limber::app
+}  // namespace limber::detail

@@ -8,7 +8,7 @@
 #include "core/json.h"
 #include "limber/detail/batch/model_list.h"
 
-namespace limber::app {
+namespace limber::detail {
 
 // A model of a batch. `reason` is empty where it was prepared; else one of
 // "refused" (it is no model, or none for these options), "time", "memory", "crash", "defect".
@@ -43,4 +43,4 @@ void write_tables(const fs::path& batch, const std::vector<BatchModel>&, const J
 // index.html, and index-2.html … of more than a thousand; each with a picture of every model in it.
 void write_pages(const fs::path& batch, const std::vector<BatchModel>&);
 
-}  // namespace limber::app
+}  // namespace limber::detail

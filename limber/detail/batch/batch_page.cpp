@@ -7,7 +7,7 @@
 #include "limber/detail/body/preview.h"
 #include "limber/detail/report/page.h"
 
-namespace limber::app {
+namespace limber::detail {
 
 // The files of report/, made part of the library by cmake/limber_embed.cmake.
 extern const char* const batch_css;
@@ -117,4 +117,4 @@ void write_pages(const fs::path& batch, const std::vector<BatchModel>& models) {
   }
 }
 
-}  // namespace limber::app
+}  // namespace limber::detail

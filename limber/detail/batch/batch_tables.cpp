@@ -12,7 +12,7 @@
 #include "limber/detail/batch/batch.h"
 #include "limber/detail/body/preview.h"
 
-namespace limber::app {
+namespace limber::detail {
 
 namespace {
 
@@ -153,4 +153,4 @@ void write_tables(const fs::path& batch, const std::vector<BatchModel>& models, 
   lines.commit(), table.commit(), seconds.commit();
 }
 
-}  // namespace limber::app
+}  // namespace limber::detail

@@ -16,7 +16,7 @@
 
 #include "core/error.h"
 
-namespace limber::app {
+namespace limber::detail {
 
 namespace {
 
@@ -130,4 +130,4 @@ void LimitedProcess::stop() {
   if (pid_ > 0) ::kill(-pid_, SIGTERM);
 }
 
-}  // namespace limber::app
+}  // namespace limber::detail

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-namespace limber::app {
+namespace limber::detail {
 
 struct ProcessLimits {
   double cpu_s, clock_s;
@@ -41,4 +41,4 @@ class LimitedProcess {
   double memory_asked_s_ = 0;
 };
 
-}  // namespace limber::app
+}  // namespace limber::detail

@@ -15,7 +15,7 @@
 #include "core/words.h"
 #include "meshing/import.h"
 
-namespace limber::app {
+namespace limber::detail {
 
 namespace {
 
@@ -148,4 +148,4 @@ std::vector<ListedModel> list_models(const std::vector<std::string>& words,
   return all;
 }
 
-}  // namespace limber::app
+}  // namespace limber::detail

@@ -6,7 +6,7 @@
 
 #include "core/file.h"
 
-namespace limber::app {
+namespace limber::detail {
 
 struct ListedModel {
   fs::path file;
@@ -23,4 +23,4 @@ bool is_of_many(const std::string& word);
 std::vector<ListedModel> list_models(const std::vector<std::string>& words,
                                      const std::vector<fs::path>& but_not);
 
-}  // namespace limber::app
+}  // namespace limber::detail

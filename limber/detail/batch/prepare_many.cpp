@@ -23,7 +23,7 @@
 #include "limber/detail/body/prepare.h"
 #include "limber/detail/body/preview.h"
 
-namespace limber::app {
+namespace limber::detail {
 
 namespace {
 
@@ -407,4 +407,4 @@ class Batch {
 
 Outcome prepare_many(const BatchOptions& options) { return Batch(options).run(); }
 
-}  // namespace limber::app
+}  // namespace limber::detail

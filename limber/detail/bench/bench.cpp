@@ -24,7 +24,7 @@
 #include "limber/detail/world/analysis.h"
 #include "limber/detail/world/scene_world.h"
 
-namespace limber::app {
+namespace limber::detail {
 
 namespace {
 
@@ -262,4 +262,4 @@ Outcome bench(const BenchOptions& options) {
   return {exit_done, report, text};
 }
 
-}  // namespace limber::app
+}  // namespace limber::detail

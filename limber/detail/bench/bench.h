@@ -7,7 +7,7 @@
 #include "core/file.h"
 #include "core/json.h"
 
-namespace limber::app {
+namespace limber::detail {
 
 // Each is one run, as docs/bench.md describes it; ordered by scene, preset and seed, each of these once.
 using RunRecords = std::vector<Json>;
@@ -46,4 +46,4 @@ Expected expected_iterations(const RunRecords& of_one_group);
 // `date` as in "2026-01-31 12:00:00".
 std::string ompl_log(const RunRecords& of_one_scene, const std::string& date);
 
-}  // namespace limber::app
+}  // namespace limber::detail

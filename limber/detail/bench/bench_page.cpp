@@ -6,7 +6,7 @@
 #include "limber/detail/report/page.h"
 #include "render/plot.h"
 
-namespace limber::app {
+namespace limber::detail {
 
 namespace {
 
@@ -98,4 +98,4 @@ std::string page_of_bench(const RunRecords& records, const Json& report) {
   return page.html();
 }
 
-}  // namespace limber::app
+}  // namespace limber::detail

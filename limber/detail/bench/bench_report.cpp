@@ -9,7 +9,7 @@
 #include "core/version.h"
 #include "limber/detail/bench/bench.h"
 
-namespace limber::app {
+namespace limber::detail {
 
 namespace {
 
@@ -358,4 +358,4 @@ std::string ompl_log(const RunRecords& records, const std::string& date) {
   return text;
 }
 
-}  // namespace limber::app
+}  // namespace limber::detail

@@ -21,7 +21,7 @@
 #include "meshing/split_edges.h"
 #include "render/image_file.h"
 
-namespace limber::app {
+namespace limber::detail {
 
 namespace {
 
@@ -633,4 +633,4 @@ std::string summary_of_report(const Json& report) {
   return text;
 }
 
-}  // namespace limber::app
+}  // namespace limber::detail

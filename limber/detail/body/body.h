@@ -19,7 +19,7 @@
 #include "meshing/import.h"
 #include "scenes/scene.h"
 
-namespace limber::app {
+namespace limber::detail {
 
 struct PrepareSettings {
   int shells = 32;
@@ -141,4 +141,4 @@ void deform(const PreparedBody&, const ffd::Binding& part, const Points& cage_po
 // The figures of a report as a few lines.
 std::string summary_of_report(const Json& report);
 
-}  // namespace limber::app
+}  // namespace limber::detail

@@ -11,7 +11,7 @@
 #include "core/version.h"
 #include "limber/detail/body/preview.h"
 
-namespace limber::app {
+namespace limber::detail {
 
 namespace {
 
@@ -45,7 +45,7 @@ std::string BodyStore::key_of(const BodySource& source, const Json& input) {
 
 bool BodyStore::has(const std::string& key) const { return fs::exists(entry(key) / "report.json"); }
 
-bool BodyStore::has_picture(const std::string& key) const { return app::has_picture(entry(key)); }
+bool BodyStore::has_picture(const std::string& key) const { return detail::has_picture(entry(key)); }
 
 std::optional<Json> BodyStore::fetch(const std::string& key, const Json& input, const std::string& model,
                                      const fs::path& folder) const {
@@ -85,4 +85,4 @@ void BodyStore::keep(const std::string& key, const fs::path& folder) const {
   write_json(to / "report.json", report);
 }
 
-}  // namespace limber::app
+}  // namespace limber::detail

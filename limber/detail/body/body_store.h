@@ -7,7 +7,7 @@
 
 #include "limber/detail/body/body.h"
 
-namespace limber::app {
+namespace limber::detail {
 
 // An entry is a body's folder, STORE/ab/abcd…, whose report tells no model's name and no costs, so that
 // whoever makes it makes the same bytes. Its report is written last: an entry without one is none. Files are
@@ -34,4 +34,4 @@ class BodyStore {
   fs::path folder_;
 };
 
-}  // namespace limber::app
+}  // namespace limber::detail

@@ -10,7 +10,7 @@
 #include "limber/detail/body/write_soft_body.h"
 #include "meshing/quality.h"
 
-namespace limber::app {
+namespace limber::detail {
 
 namespace {
 
@@ -113,4 +113,4 @@ void remove_exports(const fs::path& folder) {
   fs::remove(folder / "hulls", ignored);  // where nothing of the user's is in it
 }
 
-}  // namespace limber::app
+}  // namespace limber::detail

@@ -6,7 +6,7 @@
 
 #include "limber/detail/body/body.h"
 
-namespace limber::app {
+namespace limber::detail {
 
 inline const std::vector<std::string> export_formats{"vtu",  "node", "interp", "vtk", "vtk-interior", "inp",
                                                      "urdf", "sdf",  "mjcf",   "usd", "usd-omni",     "sofa"};
@@ -18,4 +18,4 @@ std::vector<std::string> export_body(const PreparedBody&, const std::vector<std:
 // Removes all that export_body can have written there.
 void remove_exports(const fs::path& folder);
 
-}  // namespace limber::app
+}  // namespace limber::detail

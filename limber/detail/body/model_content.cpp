@@ -7,7 +7,7 @@
 #include "core/error.h"
 #include "core/hash.h"
 
-namespace limber::app {
+namespace limber::detail {
 
 namespace {
 
@@ -107,4 +107,4 @@ ModelContent content_of_model(const fs::path& model) {
   return {hex(hash_of(std::string_view(alone + all))), content_hash(alone + all), ending};
 }
 
-}  // namespace limber::app
+}  // namespace limber::detail

@@ -7,7 +7,7 @@
 
 #include "core/file.h"
 
-namespace limber::app {
+namespace limber::detail {
 
 // Files in the model's folder and below it whose names stand in its bytes, as they are, %-encoded, or with a
 // path of another machine before them. Ordered, each once.
@@ -21,4 +21,4 @@ struct ModelContent {
 // Throws InputError when the model cannot be read.
 ModelContent content_of_model(const fs::path&);
 
-}  // namespace limber::app
+}  // namespace limber::detail

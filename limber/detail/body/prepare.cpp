@@ -15,7 +15,7 @@
 #include "limber/detail/body/model_content.h"
 #include "limber/detail/body/preview.h"
 
-namespace limber::app {
+namespace limber::detail {
 
 namespace {
 
@@ -166,4 +166,4 @@ Outcome prepare(const PrepareOptions& options) {
   return {exit_done, report, text};
 }
 
-}  // namespace limber::app
+}  // namespace limber::detail

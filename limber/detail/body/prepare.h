@@ -4,7 +4,7 @@
 #include "limber/detail/body/body_store.h"
 #include "limber/detail/commands.h"
 
-namespace limber::app {
+namespace limber::detail {
 
 // Throws InputError where two of them exclude each other.
 void require_agreeing(const PrepareOptions&);
@@ -14,4 +14,4 @@ PrepareSettings settings_of(const PrepareOptions&);
 // The body's model is `file`, and named options.model. Throws InputError when it cannot be read.
 BodySource source_of(const PrepareOptions&, const fs::path& file);
 
-}  // namespace limber::app
+}  // namespace limber::detail

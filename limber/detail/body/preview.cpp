@@ -14,7 +14,7 @@
 #include "render/png_file.h"
 #include "render/renderer.h"
 
-namespace limber::app {
+namespace limber::detail {
 
 namespace {
 
@@ -293,4 +293,4 @@ void write_previews(PreparedBody body, std::vector<ConvexShell> shells, const fs
   }
 }
 
-}  // namespace limber::app
+}  // namespace limber::detail

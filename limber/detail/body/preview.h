@@ -7,7 +7,7 @@
 
 #include "limber/detail/body/body.h"
 
-namespace limber::app {
+namespace limber::detail {
 
 inline constexpr const char* preview_files[] = {"preview-shells.png", "preview-cage.png", "preview-cut.png",
                                                 "preview-dihedrals.png"};
@@ -25,4 +25,4 @@ void write_picture(const fs::path& folder);
 // Writes preview_files into the folder; they do not show where the model lies.
 void write_previews(PreparedBody, std::vector<ConvexShell>, const fs::path& folder);
 
-}  // namespace limber::app
+}  // namespace limber::detail

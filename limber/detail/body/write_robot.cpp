@@ -6,7 +6,7 @@
 
 #include "core/mesh_files.h"
 
-namespace limber::app {
+namespace limber::detail {
 
 namespace {
 
@@ -136,4 +136,4 @@ void write_mjcf_flex(const fs::path& path, const PreparedBody& body, const BodyM
                          name_of(body), density * whole.of.volume_m3, 0.005 * size, points, tets));
 }
 
-}  // namespace limber::app
+}  // namespace limber::detail

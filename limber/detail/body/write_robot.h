@@ -7,7 +7,7 @@
 #include "core/mass_properties.h"
 #include "limber/detail/body/body.h"
 
-namespace limber::app {
+namespace limber::detail {
 
 // What a body weighs of density 1: its model where that is closed, else its cage.
 struct BodyMass {
@@ -26,4 +26,4 @@ void write_mjcf(const fs::path&, const PreparedBody&, const BodyMass&, int hulls
 // The cage as a flex of MuJoCo's, to be included in a model.
 void write_mjcf_flex(const fs::path&, const PreparedBody&, const BodyMass&, double density_kg_m3);
 
-}  // namespace limber::app
+}  // namespace limber::detail

@@ -2,7 +2,7 @@
 
 #include <fmt/format.h>
 
-namespace limber::app {
+namespace limber::detail {
 
 namespace {
 
@@ -106,4 +106,4 @@ void write_sofa_scene(const fs::path& path, const BodyMass& whole, double densit
                 plugins, density * whole.of.volume_m3, soft_youngs_modulus_pa, soft_poissons_ratio));
 }
 
-}  // namespace limber::app
+}  // namespace limber::detail

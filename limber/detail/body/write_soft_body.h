@@ -3,7 +3,7 @@
 
 #include "limber/detail/body/write_robot.h"
 
-namespace limber::app {
+namespace limber::detail {
 
 // No material is known here; the files begin with these.
 constexpr double soft_youngs_modulus_pa = 5e4, soft_poissons_ratio = 0.3;
@@ -18,4 +18,4 @@ void write_usd_body(const fs::path&, const PreparedBody&, const BodyMass&, doubl
 // A scene of SOFA's for cage.vtk and surface.obj beside it, which falls by its weight.
 void write_sofa_scene(const fs::path&, const BodyMass&, double density_kg_m3);
 
-}  // namespace limber::app
+}  // namespace limber::detail

@@ -14,7 +14,7 @@
 #include "limber/detail/plan/plan_folder.h"
 #include "limber/detail/world/scene_world.h"
 
-namespace limber::app {
+namespace limber::detail {
 
 namespace {
 
@@ -126,4 +126,4 @@ Outcome export_motion(const ExportOptions& options) {
           fmt::format("{} of {} frames, {} bodies\n{}", motion.wanted.size(), count, bodies.size(), text)};
 }
 
-}  // namespace limber::app
+}  // namespace limber::detail

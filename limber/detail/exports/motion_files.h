@@ -10,7 +10,7 @@
 #include "limber/detail/body/body.h"
 #include "scenes/scene.h"
 
-namespace limber::app {
+namespace limber::detail {
 
 struct PlannedMotion {
   const scenes::Scene& scene;
@@ -58,4 +58,4 @@ WrittenFiles write_point_caches(const PlannedMotion&, const fs::path& folder);
 // vtu/: cages.pvd and surfaces.pvd, each with a .vtu a frame.
 WrittenFiles write_vtu_series(const PlannedMotion&, const fs::path& folder);
 
-}  // namespace limber::app
+}  // namespace limber::detail

@@ -14,7 +14,7 @@
 #include "render/image.h"
 #include "render/renderer.h"
 
-namespace limber::app {
+namespace limber::detail {
 
 namespace {
 
@@ -474,4 +474,4 @@ WrittenFiles write_gltf(const PlannedMotion& motion, const fs::path& folder) {
   return {folder / "motion.glb", 1, content.size()};
 }
 
-}  // namespace limber::app
+}  // namespace limber::detail

@@ -5,7 +5,7 @@
 #include "limber/detail/exports/motion_files.h"
 #include "render/image.h"
 
-namespace limber::app {
+namespace limber::detail {
 
 namespace {
 
@@ -121,4 +121,4 @@ WrittenFiles write_point_caches(const PlannedMotion& motion, const fs::path& out
   return written;
 }
 
-}  // namespace limber::app
+}  // namespace limber::detail

@@ -10,7 +10,7 @@
 #include "render/image.h"
 #include "render/renderer.h"
 
-namespace limber::app {
+namespace limber::detail {
 
 namespace {
 
@@ -305,4 +305,4 @@ WrittenFiles write_usd(const PlannedMotion& motion, const fs::path& folder) {
   return written;
 }
 
-}  // namespace limber::app
+}  // namespace limber::detail

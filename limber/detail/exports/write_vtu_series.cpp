@@ -8,7 +8,7 @@
 #include "fem/observe.h"
 #include "limber/detail/exports/motion_files.h"
 
-namespace limber::app {
+namespace limber::detail {
 
 namespace {
 
@@ -138,4 +138,4 @@ WrittenFiles write_vtu_series(const PlannedMotion& motion, const fs::path& out) 
   return written;
 }
 
-}  // namespace limber::app
+}  // namespace limber::detail

@@ -5,7 +5,7 @@
 
 #include "core/error.h"
 
-namespace limber::app {
+namespace limber::detail {
 
 namespace {
 
@@ -111,4 +111,4 @@ int first_at_rest(const std::vector<State>& frames, double tolerance_m) {
   return first;
 }
 
-}  // namespace limber::app
+}  // namespace limber::detail

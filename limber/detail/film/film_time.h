@@ -7,7 +7,7 @@
 #include "core/mesh.h"
 #include "core/state.h"
 
-namespace limber::app {
+namespace limber::detail {
 
 // 0 … 1 a frame of the motion: what it is made to rise before and to fall after, so that the largest within
 // `frames` on either side are reached where they were, without a jump.
@@ -36,4 +36,4 @@ State state_at(const std::vector<State>& frames, double dt_s, double moment);
 // The first of these frames from which on no node is farther than this from where it is in the last.
 int first_at_rest(const std::vector<State>& frames, double tolerance_m);
 
-}  // namespace limber::app
+}  // namespace limber::detail

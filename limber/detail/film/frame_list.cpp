@@ -8,7 +8,7 @@
 
 #include "core/error.h"
 
-namespace limber::app {
+namespace limber::detail {
 
 namespace {
 
@@ -106,4 +106,4 @@ std::pair<int, int> parse_size(const std::string& text) {
   return *size;
 }
 
-}  // namespace limber::app
+}  // namespace limber::detail

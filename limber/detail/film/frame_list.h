@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-namespace limber::app {
+namespace limber::detail {
 
 // "1-30,47-327:2": single frames, ranges with both ends, ranges with a step; ascending, each once. "" is all
 // of 0 … count−1. Frames beyond the last are left out and counted in *left_out. Throws InputError naming the
@@ -21,4 +21,4 @@ std::vector<int> chunk_of(const std::vector<int>& frames, const std::string& chu
 // "1920x1080"; throws InputError when it is not of that form or a side is outside 16 … 8192.
 std::pair<int, int> parse_size(const std::string& text);
 
-}  // namespace limber::app
+}  // namespace limber::detail

@@ -2,7 +2,7 @@
 
 #include "core/error.h"
 
-namespace limber::app {
+namespace limber::detail {
 
 namespace {
 
@@ -103,4 +103,4 @@ render::MeshLook look_of(const scenes::BodySpec& body, double size_m) {
           .woven = stuff.woven};
 }
 
-}  // namespace limber::app
+}  // namespace limber::detail

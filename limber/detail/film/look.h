@@ -4,7 +4,7 @@
 #include "render/renderer.h"
 #include "scenes/scene.h"
 
-namespace limber::app {
+namespace limber::detail {
 
 // Light, ground and background; what else there is in a Look is left as it is.
 void set_light(render::Look&, const scenes::FilmSpec&);
@@ -13,4 +13,4 @@ void set_light(render::Look&, const scenes::FilmSpec&);
 // gets are shares of it, so that a toy and an organ are seen to be of the same stuff.
 render::MeshLook look_of(const scenes::BodySpec&, double size_m);
 
-}  // namespace limber::app
+}  // namespace limber::detail

@@ -5,7 +5,7 @@
 #include "core/error.h"
 #include "fem/observe.h"
 
-namespace limber::app {
+namespace limber::detail {
 
 namespace {
 
@@ -84,4 +84,4 @@ const char* caption_of(scenes::ColorBy by) {
   return "";
 }
 
-}  // namespace limber::app
+}  // namespace limber::detail

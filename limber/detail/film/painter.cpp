@@ -14,7 +14,7 @@
 #include "render/occlusion.h"
 #include "render/outline.h"
 
-namespace limber::app {
+namespace limber::detail {
 
 namespace {
 
@@ -438,4 +438,4 @@ Picture Shot::Painter::paint(int frame) {
   return picture;
 }
 
-}  // namespace limber::app
+}  // namespace limber::detail

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <numbers>
 
-namespace limber::app {
+namespace limber::detail {
 
 namespace {
 
@@ -85,4 +85,4 @@ Triangles rim_triangles() {
   return triangles;
 }
 
-}  // namespace limber::app
+}  // namespace limber::detail

@@ -5,7 +5,7 @@
 
 #include "core/mesh.h"
 
-namespace limber::app {
+namespace limber::detail {
 
 // A side of a box.
 struct Wall {
@@ -28,4 +28,4 @@ Pane pane_behind(const Box& body, const Box& bounds, const Wall&, double margin_
 Triangles pane_triangles();
 Triangles rim_triangles();
 
-}  // namespace limber::app
+}  // namespace limber::detail

@@ -21,7 +21,7 @@
 #include "render/film.h"
 #include "render/png_file.h"
 
-namespace limber::app {
+namespace limber::detail {
 
 namespace {
 
@@ -283,4 +283,4 @@ Outcome run(const PlanOptions& plan_options, const RenderOptions& render_options
   return both;
 }
 
-}  // namespace limber::app
+}  // namespace limber::detail

@@ -19,7 +19,7 @@
 #include "render/film.h"
 #include "render/image_file.h"
 
-namespace limber::app {
+namespace limber::detail {
 
 namespace {
 
@@ -756,4 +756,4 @@ std::string Shot::hash_of(int frame) const {
   return hex(hasher.value(camera.fov_deg).digest());
 }
 
-}  // namespace limber::app
+}  // namespace limber::detail

@@ -19,7 +19,7 @@
 #include "render/image.h"
 #include "render/renderer.h"
 
-namespace limber::app {
+namespace limber::detail {
 
 // What is written of a frame.
 struct Output {
@@ -88,7 +88,7 @@ class Shot {
   // Frames are those of the film but where they are called stored: of the plan.
   int stored() const { return int(plan_.trajectory.frames.size()); }
   State state_at(int frame) const {
-    return app::state_at(plan_.trajectory.frames, world_.dt_s, moment_of(frame));
+    return detail::state_at(plan_.trajectory.frames, world_.dt_s, moment_of(frame));
   }
   double moment_of(int frame) const { return moments_[std::size_t(frame)].at; }
   void lay_out_time();
@@ -168,4 +168,4 @@ class Shot {
   std::uint64_t look_hash_ = 0;
 };
 
-}  // namespace limber::app
+}  // namespace limber::detail

@@ -8,7 +8,7 @@
 #include "limber/detail/film/shot.h"
 #include "render/png_file.h"
 
-namespace limber::app {
+namespace limber::detail {
 
 namespace {
 
@@ -122,4 +122,4 @@ double write_still(const Start& start, const std::string& camera, std::pair<int,
   return seconds;
 }
 
-}  // namespace limber::app
+}  // namespace limber::detail

@@ -7,7 +7,7 @@
 
 #include "limber/detail/world/scene_world.h"
 
-namespace limber::app {
+namespace limber::detail {
 
 struct Start {
   scenes::Scene scene;  // as it is painted: of one moment, so without paths, trees and forces
@@ -32,4 +32,4 @@ Start loaded_start(const scenes::Scene&, const std::vector<LoadedModel>&, const 
 double write_still(const Start&, const std::string& camera, std::pair<int, int> size_px,
                    const fs::path& file);
 
-}  // namespace limber::app
+}  // namespace limber::detail

@@ -17,9 +17,9 @@ struct Body::Impl {
   Json report;
   // One of the two: made here, or read from a folder.
   struct Made {
-    app::WholeBody whole;
-    app::BodySource source;
-    app::PrepareSettings settings;
+    detail::WholeBody whole;
+    detail::BodySource source;
+    detail::PrepareSettings settings;
   };
   std::optional<Made> made;
   std::filesystem::path folder;
@@ -31,7 +31,7 @@ struct Body::Impl {
 };
 
 namespace detail {
-Body body_of(const app::PreparedBody&, const std::filesystem::path& folder);
+Body body_of(const detail::PreparedBody&, const std::filesystem::path& folder);
 }
 
 }  // namespace limber

@@ -38,10 +38,10 @@ class WorkFolder {
 struct Problem::Impl {
   Scene scene;
   detail::WorkFolder folder;
-  std::vector<app::PreparedBody> prepared;
+  std::vector<detail::PreparedBody> prepared;
   std::vector<Body> bodies;
   fem::World world;
-  app::FemSystem system;      // without a goal: what rollouts need
+  detail::FemSystem system;   // without a goal: what rollouts need
   std::size_t state_numbers;  // of positions, and of velocities
 
   // Scratch memory of threads that step, kept between calls.
@@ -51,11 +51,11 @@ struct Problem::Impl {
   // Prepares what is not up to date.
   Impl(const Scene&, const std::filesystem::path& work_folder);
   // Of a plan in its folder.
-  Impl(const app::PlanFolder&, const std::filesystem::path& folder);
+  Impl(const detail::PlanFolder&, const std::filesystem::path& folder);
 
  private:
   Impl(const Scene&, const std::filesystem::path& work_folder,
-       std::vector<app::PreparedBody> (*prepare)(const Scene::Impl&, const std::filesystem::path&),
+       std::vector<detail::PreparedBody> (*prepare)(const Scene::Impl&, const std::filesystem::path&),
        const std::vector<float>& start_positions);
 };
 
@@ -66,8 +66,8 @@ struct Plan::Impl {
   Json summary = {};  // of a plan that was read; else null
 
   mutable std::once_flag measured = {};
-  mutable app::MotionFigures figures = {};
-  const app::MotionFigures& motion_figures() const;
+  mutable detail::MotionFigures figures = {};
+  const detail::MotionFigures& motion_figures() const;
 };
 
 }  // namespace limber

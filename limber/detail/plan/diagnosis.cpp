@@ -5,7 +5,7 @@
 #include "fem/observe.h"
 #include "plan/passage.h"
 
-namespace limber::app {
+namespace limber::detail {
 
 namespace {
 
@@ -75,4 +75,4 @@ Diagnosis diagnose(const fem::World& world, const FemSystem& system, const plan:
   return d;
 }
 
-}  // namespace limber::app
+}  // namespace limber::detail

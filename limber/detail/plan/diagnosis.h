@@ -8,7 +8,7 @@
 #include "limber/detail/world/fem_system.h"
 #include "plan/search.h"
 
-namespace limber::app {
+namespace limber::detail {
 
 struct Diagnosis {
   std::string text;  // sentences that follow plan::explain's
@@ -16,4 +16,4 @@ struct Diagnosis {
 };
 Diagnosis diagnose(const fem::World&, const FemSystem&, const plan::Plan&);
 
-}  // namespace limber::app
+}  // namespace limber::detail

@@ -4,9 +4,9 @@
 
 #include "core/file.h"
 
-namespace limber::app {
+namespace limber::detail {
 
 // Those of the files in a folder that `limber export` may have written there, ordered.
 std::vector<fs::path> exported_files(const fs::path& folder);
 
-}  // namespace limber::app
+}  // namespace limber::detail

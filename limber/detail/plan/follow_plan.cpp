@@ -6,7 +6,7 @@
 #include "core/hash.h"
 #include "limber/detail/world/scene_world.h"
 
-namespace limber::app {
+namespace limber::detail {
 
 namespace {
 
@@ -68,4 +68,4 @@ Json FollowedPlan::facts(const plan::Plan& simulation, const fs::path& from) con
           {"reaches", rests && plan::holds(settings_.goal, center) && system_->goal_holds(end)}};
 }
 
-}  // namespace limber::app
+}  // namespace limber::detail

@@ -6,7 +6,7 @@
 #include "limber/detail/plan/plan_folder.h"
 #include "plan/follow.h"
 
-namespace limber::app {
+namespace limber::detail {
 
 class FollowedPlan {
  public:
@@ -31,4 +31,4 @@ class FollowedPlan {
   double duration_s_ = 0;
 };
 
-}  // namespace limber::app
+}  // namespace limber::detail

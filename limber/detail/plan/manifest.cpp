@@ -7,7 +7,7 @@
 #include "core/log.h"
 #include "core/version.h"
 
-namespace limber::app {
+namespace limber::detail {
 
 Json read_manifest(const fs::path& folder) {
   const fs::path file = folder / "manifest.json";
@@ -37,4 +37,4 @@ void update_manifest(const fs::path& folder, const std::string& stage, const Jso
   write_json(folder / "manifest.json", manifest);
 }
 
-}  // namespace limber::app
+}  // namespace limber::detail

@@ -20,7 +20,7 @@
 #include "plan/portfolio.h"
 #include "scenes/library.h"
 
-namespace limber::app {
+namespace limber::detail {
 
 namespace {
 
@@ -506,4 +506,4 @@ bool plan_is_up_to_date(const PlanOptions& options, const scenes::Scene& scene) 
   }
 }
 
-}  // namespace limber::app
+}  // namespace limber::detail

@@ -7,7 +7,7 @@
 #include "limber/detail/world/scene_world.h"
 #include "plan/plan_file.h"
 
-namespace limber::app {
+namespace limber::detail {
 
 namespace {
 
@@ -184,4 +184,4 @@ std::vector<PreparedBody> read_bodies_of(const PlanFolder& planned, const fs::pa
   return bodies;
 }
 
-}  // namespace limber::app
+}  // namespace limber::detail

@@ -12,7 +12,7 @@
 #include "plan/search.h"
 #include "scenes/scene.h"
 
-namespace limber::app {
+namespace limber::detail {
 
 struct PlanFolder {
   plan::Plan plan;
@@ -97,4 +97,4 @@ plan::Settings settings_of(const scenes::Scene&, const PlanOptions&);
 Outcome plan(const PlanOptions&, const scenes::Scene&);
 bool plan_is_up_to_date(const PlanOptions&, const scenes::Scene&);
 
-}  // namespace limber::app
+}  // namespace limber::detail

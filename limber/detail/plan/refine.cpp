@@ -10,7 +10,7 @@
 #include "limber/detail/world/fem_system.h"
 #include "limber/detail/world/scene_world.h"
 
-namespace limber::app {
+namespace limber::detail {
 
 namespace {
 
@@ -100,4 +100,4 @@ Outcome refine(const RefineOptions& options) {
   return outcome;
 }
 
-}  // namespace limber::app
+}  // namespace limber::detail

@@ -4,7 +4,7 @@
 
 #include "core/error.h"
 
-namespace limber::app {
+namespace limber::detail {
 
 namespace {
 
@@ -50,4 +50,4 @@ void SearchLog::finish() {
   write_file(path_, lines_);
 }
 
-}  // namespace limber::app
+}  // namespace limber::detail

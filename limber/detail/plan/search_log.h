@@ -4,7 +4,7 @@
 #include "core/file.h"
 #include "plan/search.h"
 
-namespace limber::app {
+namespace limber::detail {
 
 // The file is written anew now and then and by finish(), each time whole.
 class SearchLog {
@@ -22,4 +22,4 @@ class SearchLog {
   double written_at_wall_s_ = 0;
 };
 
-}  // namespace limber::app
+}  // namespace limber::detail

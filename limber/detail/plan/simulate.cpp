@@ -14,7 +14,7 @@
 #include "plan/simulation.h"
 #include "scenes/library.h"
 
-namespace limber::app {
+namespace limber::detail {
 
 namespace {
 
@@ -188,4 +188,4 @@ Outcome simulate(const SimulateOptions& options) {
   return outcome;
 }
 
-}  // namespace limber::app
+}  // namespace limber::detail

@@ -3,7 +3,7 @@
 
 #include "limber/detail/plan/plan_folder.h"
 
-namespace limber::app {
+namespace limber::detail {
 
 // Frame `frame` of the plan or simulation in `folder`, as plan.npz has it, positions and velocities bit for
 // bit: of each body that moves in both worlds, at the step nearest to the time of that frame. Bodies that the
@@ -23,4 +23,4 @@ Beginning beginning_of(const fs::path& from, std::optional<int> frame, const fs:
 // Throws InputError where they are one: what begins there would write over it.
 void require_other_folder(const fs::path& from, const fs::path& out);
 
-}  // namespace limber::app
+}  // namespace limber::detail

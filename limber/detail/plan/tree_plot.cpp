@@ -6,7 +6,7 @@
 
 #include "fem/observe.h"
 
-namespace limber::app {
+namespace limber::detail {
 
 namespace {
 
@@ -121,4 +121,4 @@ std::string tree_svg(const scenes::Scene& scene, const fem::World& world, const 
   return svg + "</svg>\n";
 }
 
-}  // namespace limber::app
+}  // namespace limber::detail

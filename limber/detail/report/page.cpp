@@ -2,7 +2,7 @@
 
 #include "core/version.h"
 
-namespace limber::app {
+namespace limber::detail {
 
 // The files beside this one, made part of the library by cmake/limber_embed.cmake.
 extern const char* const report_css;
@@ -50,4 +50,4 @@ void Page::table(const std::vector<std::string>& head, const std::vector<std::ve
   add("</table></div>\n");
 }
 
-}  // namespace limber::app
+}  // namespace limber::detail

@@ -7,7 +7,7 @@
 #include <string_view>
 #include <vector>
 
-namespace limber::app {
+namespace limber::detail {
 
 std::string escaped(const std::string& text);
 
@@ -32,4 +32,4 @@ class Page {
   std::string html_;
 };
 
-}  // namespace limber::app
+}  // namespace limber::detail

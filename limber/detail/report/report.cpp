@@ -22,7 +22,7 @@
 #include "render/camera.h"
 #include "render/plot.h"
 
-namespace limber::app {
+namespace limber::detail {
 
 // The files beside this one, made part of the library by cmake/limber_embed.cmake.
 extern const char* const report_viewer;
@@ -433,4 +433,4 @@ Outcome report(const fs::path& folder, const std::optional<fs::path>& file) {
                       verified.exit_code == exit_done ? "" : "; not every promise is kept")};
 }
 
-}  // namespace limber::app
+}  // namespace limber::detail

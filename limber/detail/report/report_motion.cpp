@@ -8,7 +8,7 @@
 #include "limber/detail/exports/motion_files.h"
 #include "render/image.h"
 
-namespace limber::app {
+namespace limber::detail {
 
 namespace {
 
@@ -96,4 +96,4 @@ PackedMotion pack_motion(const fem::World& world, const std::vector<PreparedBody
   return packed;
 }
 
-}  // namespace limber::app
+}  // namespace limber::detail

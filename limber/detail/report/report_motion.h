@@ -7,7 +7,7 @@
 #include "fem/world.h"
 #include "limber/detail/body/body.h"
 
-namespace limber::app {
+namespace limber::detail {
 
 struct PackedMotion {
   // meta["bodies"][b]: name, color (linear), and where in `bytes` its arrays are, as [first byte, elements]:
@@ -26,4 +26,4 @@ struct PackedMotion {
 PackedMotion pack_motion(const fem::World&, const std::vector<PreparedBody>&,
                          const std::vector<Vec3>& colors_srgb, const std::vector<State>& frames);
 
-}  // namespace limber::app
+}  // namespace limber::detail

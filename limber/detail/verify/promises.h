@@ -6,7 +6,7 @@
 
 #include "core/json.h"
 
-namespace limber::app {
+namespace limber::detail {
 
 class Promises {
  public:
@@ -27,4 +27,4 @@ class Promises {
   bool all_kept_ = true;
 };
 
-}  // namespace limber::app
+}  // namespace limber::detail

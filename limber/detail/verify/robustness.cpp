@@ -16,7 +16,7 @@
 #include "plan/follow.h"
 #include "plan/shortcut.h"
 
-namespace limber::app {
+namespace limber::detail {
 
 namespace {
 
@@ -337,4 +337,4 @@ Outcome robust(const RobustOptions& options) {
   return {exit_done, json, text};
 }
 
-}  // namespace limber::app
+}  // namespace limber::detail

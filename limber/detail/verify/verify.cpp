@@ -10,7 +10,7 @@
 #include "limber/detail/world/scene_world.h"
 #include "scenes/library.h"
 
-namespace limber::app {
+namespace limber::detail {
 
 namespace {
 
@@ -136,4 +136,4 @@ Outcome verify(const VerifyOptions& options) {
                   folder.string()));
 }
 
-}  // namespace limber::app
+}  // namespace limber::detail

@@ -4,7 +4,7 @@
 #include "limber/detail/plan/plan_folder.h"
 #include "limber/detail/world/analysis.h"
 
-namespace limber::app {
+namespace limber::detail {
 
 // A scene that whoever asks trusts, and the folders of its models.
 struct TrustedScene {
@@ -24,4 +24,4 @@ struct VerifyDepth {
 Outcome verify_plan(const fs::path& folder, const PlanFolder&, const std::vector<PreparedBody>&,
                     const fem::World&, MotionFigures& figures, const VerifyDepth& = {});
 
-}  // namespace limber::app
+}  // namespace limber::detail

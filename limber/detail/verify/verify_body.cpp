@@ -18,7 +18,7 @@
 #include "meshing/surface_tree.h"
 #include "render/image_file.h"
 
-namespace limber::app {
+namespace limber::detail {
 
 namespace {
 
@@ -386,4 +386,4 @@ void check_goal_cage(GoalCage found, bool must_be_here, Promises& table) {
               found == GoalCage::not_here ? "its file is not here" : "");
 }
 
-}  // namespace limber::app
+}  // namespace limber::detail

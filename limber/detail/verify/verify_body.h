@@ -5,7 +5,7 @@
 #include "limber/detail/verify/promises.h"
 #include "limber/detail/world/scene_world.h"
 
-namespace limber::app {
+namespace limber::detail {
 
 // By the files alone. `made_cage`: of a body in cells, where the scene is at hand. `remake`: shells, too, are
 // made again, whatever that costs. Throws InputError where shells.obj is none.
@@ -17,4 +17,4 @@ void check_body(const std::string& name, const PreparedBody&, const fs::path& fo
 void check_origin(const std::string& name, const Origin&, bool must_be_here, Promises&);
 void check_goal_cage(GoalCage, bool must_be_here, Promises&);
 
-}  // namespace limber::app
+}  // namespace limber::detail

@@ -18,7 +18,7 @@
 #include "plan/shortcut.h"
 #include "plan/simulation.h"
 
-namespace limber::app {
+namespace limber::detail {
 
 namespace {
 
@@ -661,4 +661,4 @@ void check_pictures(const fs::path& folder, const PlanFolder& planned, const fem
   }
 }
 
-}  // namespace limber::app
+}  // namespace limber::detail

@@ -5,7 +5,7 @@
 #include "limber/detail/verify/promises.h"
 #include "limber/detail/world/analysis.h"
 
-namespace limber::app {
+namespace limber::detail {
 
 // Replays the path and searches anew, by what the scene says; a simulation is replayed alone. `figures` are
 // overwritten by those of the replay. Throws Interrupted after a stop signal.
@@ -19,4 +19,4 @@ void check_shapes(const MotionFigures&, const fem::World&, Promises&);
 void check_pictures(const fs::path& folder, const PlanFolder&, const fem::World&, const MotionFigures&,
                     Promises&);
 
-}  // namespace limber::app
+}  // namespace limber::detail

@@ -10,7 +10,7 @@
 #include "render/plot.h"
 #include "render/png_file.h"
 
-namespace limber::app {
+namespace limber::detail {
 
 namespace {
 
@@ -240,4 +240,4 @@ VolumePlot volume_plot(const scenes::Scene& scene, const fem::World& world, cons
   return {render::plot_svg(curves, look), render::png_bytes(render::plot_image(curves, look))};
 }
 
-}  // namespace limber::app
+}  // namespace limber::detail

@@ -12,7 +12,7 @@
 #include "plan/trajectory.h"
 #include "scenes/scene.h"
 
-namespace limber::app {
+namespace limber::detail {
 
 struct BodyFigures {          // of one frame; all 0 for a body that does not move, but for contact_force_n
   double volume_change = 0;   // V/V₀ − 1
@@ -75,4 +75,4 @@ struct VolumePlot {
 VolumePlot volume_plot(const scenes::Scene&, const fem::World&, const MotionFigures&,
                        double frames_per_second);
 
-}  // namespace limber::app
+}  // namespace limber::detail

@@ -11,7 +11,7 @@
 #include "fem/observe.h"
 #include "limber/detail/world/workspace.h"
 
-namespace limber::app {
+namespace limber::detail {
 
 namespace {
 
@@ -336,4 +336,4 @@ fem::Cost FemSystem::cost() const {
   return sum;
 }
 
-}  // namespace limber::app
+}  // namespace limber::detail

@@ -11,7 +11,7 @@
 #include "limber/detail/world/seen.h"
 #include "plan/system.h"
 
-namespace limber::app {
+namespace limber::detail {
 
 // What a goal asks for besides the place of the robot's centre of mass. Bodies by index, −1: none.
 struct GoalRules {
@@ -73,4 +73,4 @@ class FemSystem final : public plan::System {
   mutable fem::Cost cost_;
 };
 
-}  // namespace limber::app
+}  // namespace limber::detail

@@ -4,7 +4,7 @@
 
 #include "fem/observe.h"
 
-namespace limber::app {
+namespace limber::detail {
 
 namespace {
 
@@ -84,4 +84,4 @@ GoalTerm loss_term(const scenes::Scene& scene, const fem::World& world, const St
           lowest >= least, fmt::format("lowest {:.3f} m", lowest)};
 }
 
-}  // namespace limber::app
+}  // namespace limber::detail

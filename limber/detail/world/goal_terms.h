@@ -8,7 +8,7 @@
 #include "fem/world.h"
 #include "scenes/scene.h"
 
-namespace limber::app {
+namespace limber::detail {
 
 struct GoalTerm {
   std::string asked;  // "centre of mass within 0.3 m of (3.2 1 1)"
@@ -26,4 +26,4 @@ GoalTerm rest_term(const scenes::Scene&, const fem::World&, const State&);
 // With goal.lost_below_m: whether the goal is there still.
 GoalTerm loss_term(const scenes::Scene&, const fem::World&, const State&);
 
-}  // namespace limber::app
+}  // namespace limber::detail

@@ -10,7 +10,7 @@
 #include "limber/detail/world/scene_world.h"
 #include "scenes/library.h"
 
-namespace limber::app {
+namespace limber::detail {
 
 Outcome prepare_scene(const ScenePrepareOptions& options) {
   const scenes::Scene scene =
@@ -48,4 +48,4 @@ Outcome prepare_scene(const ScenePrepareOptions& options) {
               text};
 }
 
-}  // namespace limber::app
+}  // namespace limber::detail

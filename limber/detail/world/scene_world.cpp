@@ -19,7 +19,7 @@
 #include "scenes/library.h"
 #include "scenes/models.h"
 
-namespace limber::app {
+namespace limber::detail {
 
 namespace {
 
@@ -600,4 +600,4 @@ fem::World build_world(const scenes::Scene& scene, const std::vector<PreparedBod
   }
 }
 
-}  // namespace limber::app
+}  // namespace limber::detail

@@ -8,7 +8,7 @@
 #include "limber/detail/world/fem_system.h"
 #include "scenes/scene.h"
 
-namespace limber::app {
+namespace limber::detail {
 
 fs::path body_folder(const fs::path& work_folder, const scenes::BodySpec&);
 
@@ -77,4 +77,4 @@ GoalRules goal_rules_of(const scenes::Scene&);
 fem::World build_world(const scenes::Scene&, const std::vector<PreparedBody>&,
                        const std::vector<float>& start_positions = {});
 
-}  // namespace limber::app
+}  // namespace limber::detail

@@ -9,7 +9,7 @@
 #include "limber/detail/exports/motion_files.h"
 #include "limber/detail/film/pane.h"
 
-namespace limber::app {
+namespace limber::detail {
 
 namespace {
 
@@ -156,4 +156,4 @@ std::vector<SeenFrame> measure_seen(const Surfaces& surfaces, const std::vector<
   return seen;
 }
 
-}  // namespace limber::app
+}  // namespace limber::detail

@@ -13,7 +13,7 @@
 #include "limber/detail/body/body.h"
 #include "meshing/surface_overlap.h"
 
-namespace limber::app {
+namespace limber::detail {
 
 // What is promised of what is seen, as shares of the robot's size (longest edge of its fine surface's box at
 // rest), where contact is on the surfaces; and what the report marks of stretch, which a scene may promise.
@@ -70,4 +70,4 @@ void keep_what_presses(std::vector<SeenFrame>&);
 // One a frame.
 std::vector<SeenFrame> measure_seen(const Surfaces&, const std::vector<State>& frames);
 
-}  // namespace limber::app
+}  // namespace limber::detail

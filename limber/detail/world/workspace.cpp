@@ -5,7 +5,7 @@
 
 #include "fem/observe.h"
 
-namespace limber::app {
+namespace limber::detail {
 
 namespace {
 
@@ -85,4 +85,4 @@ plan::Workspace workspace_of(const fem::World& world, const std::optional<State>
   return w;
 }
 
-}  // namespace limber::app
+}  // namespace limber::detail
