@@ -643,7 +643,7 @@ int run_command_line(int argc, const char* const* argv) {
   verify_command.add_flag("--remake", verify_options.remake,
                           "make the convex shells of large bodies (over 20,000 triangles) again, too, and "
                           "compare; else they are only checked against what shells must be");
-  verify_command.callback([&] { chosen = [&] { return detail::verify(verify_options); }; });
+  verify_command.callback([&] { chosen = [&] { return cli::verify(verify_options); }; });
 
   std::optional<fs::path> page;
   CLI::App& report_command = *program.add_subcommand(
@@ -652,7 +652,7 @@ int run_command_line(int argc, const char* const* argv) {
   report_command.add_option("-o,--out", page, "the page; default: report.html in the work folder")
       ->type_name("FILE.html");
   add_global(report_command, global), add_threads(report_command, global);
-  report_command.callback([&] { chosen = [&] { return detail::report(folder, page); }; });
+  report_command.callback([&] { chosen = [&] { return cli::report(folder, page); }; });
 
   detail::RobustOptions robust_options;
   CLI::App& robust_command = *program.add_subcommand(

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "limber/detail/commands.h"
+#include "limber/detail/verify/verify.h"
 
 namespace limber::cli {
 
@@ -10,5 +11,7 @@ using enum detail::ExitCode;
 
 Outcome info(const fs::path& path);
 Outcome list_scenes();
+Outcome report(const fs::path& folder, const std::optional<fs::path>& file = {});
+Outcome verify(const detail::VerifyOptions&);
 
 }  // namespace limber::cli

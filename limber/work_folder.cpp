@@ -3,6 +3,8 @@
 #include <algorithm>
 
 #include "limber/detail/commands.h"
+#include "limber/detail/report/report.h"
+#include "limber/detail/verify/verify.h"
 #include "core/error.h"
 #include "limber/detail/interface/working_for.h"
 
@@ -15,11 +17,7 @@ std::vector<Promise> verify(const std::filesystem::path& folder, const std::stri
   return working_for(context, [&] {
     detail::VerifyOptions options;
     options.folder = folder, options.scene.scene = scene;
-    std::vector<Promise> promises;
-    for (const Json& row : detail::verify(options).json.at("promises"))
-      promises.push_back({row.at("promise").get<std::string>(), row.at("value").get<std::string>(),
-                          row.at("kept").get<bool>()});
-    return promises;
+    return detail::verify(options).promises.rows();
   });
 }
 
@@ -65,8 +63,7 @@ std::filesystem::path write_report(const std::filesystem::path& folder, const st
   return working_for(context, [&] {
     std::optional<fs::path> to;
     if (!file.empty()) to = file;
-    detail::report(folder, to);
-    return file.empty() ? folder / "report.html" : file;
+    return detail::report(folder, to).file;
   });
 }
 

@@ -184,17 +184,6 @@ struct BenchOptions {
 };
 Outcome bench(const BenchOptions&);
 
-struct VerifyOptions {
-  fs::path folder;
-  std::optional<fs::path> observables;  // of a work folder: also a CSV with the figures of every frame
-  SceneOptions scene;                   // the one that the plan must be of; none where its `scene` is empty
-  bool remake = false;                  // of large bodies shells are made again, too
-};
-Outcome verify(const VerifyOptions&);
-
-// One HTML page about a planned folder, that needs nothing else: docs/files.md. Default: report.html there.
-Outcome report(const fs::path& folder, const std::optional<fs::path>& file = {});
-
 struct RobustOptions {
   fs::path folder;
   int perturbations = 16;

@@ -1,3 +1,5 @@
+#include "limber/detail/report/report.h"
+
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -9,7 +11,6 @@
 #include "core/log.h"
 #include "core/version.h"
 #include "fem/observe.h"
-#include "limber/detail/commands.h"
 #include "limber/detail/plan/manifest.h"
 #include "limber/detail/plan/plan_folder.h"
 #include "limber/detail/plan/tree_plot.h"
@@ -56,8 +57,7 @@ struct Findings {
   const fem::World& world;
   const FemSystem& system;
   const MotionFigures& figures;
-  const Json& promises;
-  const Json& measured;
+  const Promises& promises;
   const fs::path& folder;
 
   const plan::Plan& plan() const { return planned.plan; }
@@ -73,8 +73,7 @@ void summary(const Findings& f, Page& page) {
   const plan::Statistics& s = f.plan().statistics;
   double volume = 0;
   for (const double v : f.figures.largest_volume_change) volume = std::max(volume, v);
-  const bool all_kept = std::all_of(f.promises.begin(), f.promises.end(),
-                                    [](const Json& p) { return p.at("kept").get<bool>(); });
+  const bool all_kept = f.promises.all_kept();
   page.add("<dl class=\"card figures\">\n");
   const auto figure = [&](const char* what, const std::string& value, const std::string& more,
                           const char* kind = "") {
@@ -88,8 +87,8 @@ void summary(const Findings& f, Page& page) {
     figure("Plan", f.plan().solved() ? "solved" : "not solved",
            fmt::format("ends {:.3g} m from the goal", f.plan().best_distance_m),
            f.plan().solved() ? "kept" : "broken");
-  figure("Promises", all_kept ? "all kept" : "not all kept", fmt::format("{} checked", f.promises.size()),
-         all_kept ? "kept" : "broken");
+  figure("Promises", all_kept ? "all kept" : "not all kept",
+         fmt::format("{} checked", f.promises.rows().size()), all_kept ? "kept" : "broken");
   figure("Motion",
          fmt::format("{:.2f} s",
                      double(f.plan().trajectory.end.step - f.plan().tree.states.steps()[0]) * f.world.dt_s),
@@ -182,47 +181,39 @@ void plots(const Findings& f, Page& page) {
   page.add("</div>\n");
 }
 
-void film(const Findings& f, Page& page, Json& result) {
+FilmInPage film(const Findings& f, Page& page) {
   const fs::path path = f.folder / "film.mp4";
   const std::string of_plan =
       read_manifest(f.folder).value("render", Json::object()).value("trajectory_hash", std::string());
-  if (!fs::exists(path)) {
-    result["film"] = "none";
-    return;
-  }
+  if (!fs::exists(path)) return FilmInPage::none;
   if (of_plan != hex(plan::hash_of(f.plan().trajectory))) {
-    result["film"] = "left out: of another plan";
     log::warn("{}: is not known to show this plan, and is left out; make it with limber render {}",
               path.string(), f.folder.string());
-    return;
+    return FilmInPage::of_another_plan;
   }
   if (fs::file_size(path) > largest_film_bytes) {
-    result["film"] = "left out: large";
     log::info("{}: has more than {} MB, and is left out", path.string(), largest_film_bytes / 1'000'000);
-    return;
+    return FilmInPage::too_large;
   }
-  result["film"] = "embedded";
   page.add(
       "<h2>Film</h2>\n<div class=\"card\"><video controls preload=\"metadata\" "
       "src=\"data:video/mp4;base64,{}\"></video></div>\n",
       base64(read_file(path)));
+  return FilmInPage::embedded;
 }
 
 void promises(const Findings& f, Page& page) {
-  const auto found = [](const Json& row) {  // a promise that is kept may have nothing to tell
-    const std::string value = row.at("value").get<std::string>();
+  const auto found = [](const std::string& value) {  // a promise that is kept may have nothing to tell
     return value.empty() ? "–" : escaped(value);
   };
   page.add(
       "<h2>Promises</h2>\n<div class=\"card wide\"><table "
       "id=\"promises\">\n<tr><th></th><th>promise</th><th>found</th></tr>\n");
-  for (const Json& p : f.promises)
-    page.add("<tr><td class=\"{0}\">{1} {0}</td><td>{2}</td><td>{3}</td></tr>\n",
-             p.at("kept").get<bool>() ? "kept" : "broken", p.at("kept").get<bool>() ? "✓" : "✗",
-             escaped(p.at("promise").get<std::string>()), found(p));
-  for (const Json& m : f.measured)
-    page.add("<tr><td>found</td><td>{}</td><td>{}</td></tr>\n", escaped(m.at("what").get<std::string>()),
-             found(m));
+  for (const Promise& p : f.promises.rows())
+    page.add("<tr><td class=\"{0}\">{1} {0}</td><td>{2}</td><td>{3}</td></tr>\n", p.kept ? "kept" : "broken",
+             p.kept ? "✓" : "✗", escaped(p.name), found(p.value));
+  for (const Finding& m : f.promises.measured())
+    page.add("<tr><td>found</td><td>{}</td><td>{}</td></tr>\n", escaped(m.what), found(m.value));
   page.add(
       "</table></div>\n<p class=\"note\">Checked anew for this page, as by <code>limber "
       "verify</code>; what is found is no promise.</p>\n");
@@ -401,36 +392,31 @@ void end(const Findings& f, Page& page) {
 
 }  // namespace
 
-Outcome report(const fs::path& folder, const std::optional<fs::path>& file) {
+WrittenReport report(const fs::path& folder, const std::optional<fs::path>& file) {
   const PlanFolder planned = read_plan_folder(folder);
   const std::vector<PreparedBody> bodies = read_bodies_of(planned, folder);
   const fem::World world = build_world(planned.scene, bodies);
   const FemSystem system = system_of(planned, world, bodies);
   MotionFigures figures;
-  const Outcome verified = verify_plan(folder, planned, bodies, world, figures);
-  const Findings findings{
-      planned, bodies, world, system, figures, verified.json.at("promises"), verified.json.at("measured"),
-      folder};
+  const Verified verified = verify_plan(folder, planned, bodies, world, figures);
+  const Findings findings{planned, bodies, world, system, figures, verified.promises, folder};
 
-  const fs::path path = file.value_or(folder / "report.html");
-  Json result{{"file", path.string()}, {"bytes", 0}, {"all_kept", verified.json.at("all_kept")}};
+  WrittenReport written{.file = file.value_or(folder / "report.html"),
+                        .all_kept = verified.promises.all_kept()};
   Page page;
   begin(findings, page);
   summary(findings, page);
   stage(page);
-  film(findings, page, result);
+  written.film = film(findings, page);
   plots(findings, page);
   promises(findings, page);
   if (!planned.plan.simulation) tree(findings, page);
   tables(findings, page);
   scene_text(findings, page);
   end(findings, page);
-  write_file(path, page.html());
-  result["bytes"] = page.html().size();
-  return {exit_done, result,
-          fmt::format("{} ({:.2f} MB; film: {}){}\n", path.string(), 1e-6 * double(page.html().size()),
-                      result.at("film").get<std::string>(),
-                      verified.exit_code == exit_done ? "" : "; not every promise is kept")};
+  write_file(written.file, page.html());
+  written.bytes = page.html().size();
+  return written;
 }
 
 }  // namespace limber::detail

@@ -1,29 +1,32 @@
-// The table that `limber verify` prints.
+// What is promised of a folder, and whether it is kept.
 #pragma once
 
 #include <string>
 #include <vector>
 
-#include "core/json.h"
+#include "limber/work_folder.h"
 
 namespace limber::detail {
+
+// What no promise is made of.
+struct Finding {
+  std::string what, value;
+};
 
 class Promises {
  public:
   void row(const std::string& promise, bool kept, const std::string& value) {
-    rows_.push_back({{"promise", promise}, {"kept", kept}, {"value", value}});
+    rows_.push_back({promise, value, kept});
     all_kept_ = all_kept_ && kept;
   }
-  // What no promise is made of.
-  void measured(const std::string& what, const std::string& value) {
-    measured_.push_back({{"what", what}, {"value", value}});
-  }
+  void measured(const std::string& what, const std::string& value) { measured_.push_back({what, value}); }
   bool all_kept() const { return all_kept_; }
-  const std::vector<Json>& rows() const { return rows_; }          // promise, kept, value
-  const std::vector<Json>& measured() const { return measured_; }  // what, value
+  const std::vector<Promise>& rows() const { return rows_; }
+  const std::vector<Finding>& measured() const { return measured_; }
 
  private:
-  std::vector<Json> rows_, measured_;
+  std::vector<Promise> rows_;
+  std::vector<Finding> measured_;
   bool all_kept_ = true;
 };
 

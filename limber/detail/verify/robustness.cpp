@@ -176,8 +176,8 @@ std::vector<Fate> replay(const Planned& planned, const RobustOptions& options, b
     fate.asked_n = asked[i], fate.force_n = figures.largest_force_n;
     Promises table;
     check_shapes(figures, world, table);
-    for (const Json& row : table.rows())
-      if (!row.at("kept").get<bool>()) fate.broken.push_back(row.at("promise"));
+    for (const Promise& row : table.rows())
+      if (!row.kept) fate.broken.push_back(row.name);
   }
   return fates;
 }

@@ -3,8 +3,6 @@
 #include "core/error.h"
 #include "core/hash.h"
 #include "core/progress.h"
-#include "limber/detail/commands.h"
-#include "limber/detail/verify/promises.h"
 #include "limber/detail/verify/verify_body.h"
 #include "limber/detail/verify/verify_plan.h"
 #include "limber/detail/world/scene_world.h"
@@ -13,38 +11,6 @@
 namespace limber::detail {
 
 namespace {
-
-// What scene it is that all is derived from.
-std::string text_of_scene(const Json& scene) {
-  if (scene.is_null()) return "";
-  std::string edits;
-  for (const Json& set : scene.at("sets")) edits += " --set " + set.get<std::string>();
-  return fmt::format("a plan of scene {} (hash of its text {}){}\n", scene.at("name").get<std::string>(),
-                     scene.at("hash").get<std::string>(), edits.empty() ? "" : ", edited by" + edits);
-}
-
-Outcome outcome_of(const Promises& table, const Json& motion, const Json& scene) {
-  std::string text = text_of_scene(scene);
-  for (const Json& r : table.rows())
-    text += fmt::format("  {:6}  {:48}  {}\n", r.at("kept").get<bool>() ? "kept" : "BROKEN",
-                        r.at("promise").get<std::string>(), r.at("value").get<std::string>());
-  for (const Json& r : table.measured())
-    text += fmt::format("  {:8}{:48}  {}\n", "found", r.at("what").get<std::string>(),
-                        r.at("value").get<std::string>());
-  if (!motion.is_null())
-    text += fmt::format(
-        "largest strain {:.3f} ({}), strongest contact {:.1f} N ({})\n",
-        motion.at("largest_strain").get<double>(), motion.at("largest_strain_of").get<std::string>(),
-        motion.at("largest_contact_force_n").get<double>(), motion.at("contact_between").get<std::string>());
-  text += table.all_kept() ? "every promise is kept\n" : "not every promise is kept\n";
-  return {table.all_kept() ? exit_done : exit_defect,
-          {{"all_kept", table.all_kept()},
-           {"promises", table.rows()},
-           {"measured", table.measured()},
-           {"motion", motion},
-           {"scene", scene}},
-          text};
-}
 
 // Each body by itself, and whether it is the scene's.
 void check_bodies(const fs::path& folder, const scenes::Scene& scene, const std::vector<PreparedBody>& bodies,
@@ -61,9 +27,9 @@ void check_bodies(const fs::path& folder, const scenes::Scene& scene, const std:
 
 }  // namespace
 
-Outcome verify_plan(const fs::path& folder, const PlanFolder& planned,
-                    const std::vector<PreparedBody>& bodies, const fem::World& world, MotionFigures& figures,
-                    const VerifyDepth& depth) {
+Verified verify_plan(const fs::path& folder, const PlanFolder& planned,
+                     const std::vector<PreparedBody>& bodies, const fem::World& world, MotionFigures& figures,
+                     const VerifyDepth& depth) {
   const std::optional<TrustedScene>& trusted = depth.trusted;
   const NothingToKeep nothing_to_keep;
   Promises table;
@@ -82,12 +48,11 @@ Outcome verify_plan(const fs::path& folder, const PlanFolder& planned,
   check_goal_cage(goal_cage_of(scene, data, bodies), trusted.has_value(), table);
   check_plan(folder, planned, bodies, world, figures, table);
   check_pictures(folder, planned, world, figures, table);
-  return outcome_of(
-      table, json_of(figures),
-      {{"name", scene.name}, {"hash", hex(hash_of(std::string_view(scene.text)))}, {"sets", scene.sets}});
+  return {std::move(table), figures,
+          Verified::Scene{scene.name, hex(hash_of(std::string_view(scene.text))), scene.sets}};
 }
 
-Outcome verify(const VerifyOptions& options) {
+Verified verify(const VerifyOptions& options) {
   const fs::path& folder = options.folder;
   if (!fs::is_directory(folder))
     throw InputError(fmt::format("{}: is not a folder; name a work folder of limber", folder.string()));
@@ -113,13 +78,13 @@ Outcome verify(const VerifyOptions& options) {
       if (trusted) scene.folder = trusted->scene.folder;
       check_bodies(folder, scene, bodies, depth, table);
       if (table.all_kept()) throw;
-      return outcome_of(table, {}, {});
+      return {std::move(table), {}, {}};
     }
     const fem::World world = build_world(planned.scene, bodies);
     MotionFigures figures;
-    const Outcome outcome = verify_plan(folder, planned, bodies, world, figures, depth);
+    Verified verified = verify_plan(folder, planned, bodies, world, figures, depth);
     if (options.observables) write_observables(*options.observables, world, figures);
-    return outcome;
+    return verified;
   }
   if (fs::exists(folder / "report.json")) {
     if (options.observables || scene_is_named)
@@ -129,7 +94,7 @@ Outcome verify(const VerifyOptions& options) {
                       folder.string()));
     Promises table;
     check_body("body", read_body(folder), folder, std::nullopt, options.remake, table);
-    return outcome_of(table, {}, {});
+    return {std::move(table), {}, {}};
   }
   throw InputError(
       fmt::format("{}: holds neither plan.npz nor report.json; make them with limber run or limber prepare",

@@ -1,7 +1,10 @@
-// The promises that limber makes of a planned folder.
+// The promises that limber makes of a planned folder, or of a body's.
 #pragma once
 
+#include <optional>
+
 #include "limber/detail/plan/plan_folder.h"
+#include "limber/detail/verify/promises.h"
 #include "limber/detail/world/analysis.h"
 
 namespace limber::detail {
@@ -19,9 +22,29 @@ struct VerifyDepth {
   bool remake = false;  // shells, too, are made again, whatever that costs
 };
 
-// Checks every promise of a work folder, as `limber verify` prints them; `figures` are overwritten by those
-// of the replay.
-Outcome verify_plan(const fs::path& folder, const PlanFolder&, const std::vector<PreparedBody>&,
-                    const fem::World&, MotionFigures& figures, const VerifyDepth& = {});
+struct Verified {
+  Promises promises;
+  std::optional<MotionFigures>
+      motion;  // of the replay; nothing of a body, and of a plan that cannot be replayed
+  // What scene it is that all is derived from; likewise.
+  struct Scene {
+    std::string name, text_hash;
+    std::vector<std::string> sets;
+  };
+  std::optional<Scene> scene;
+};
+
+// Checks every promise of a work folder; `figures` are overwritten by those of the replay.
+Verified verify_plan(const fs::path& folder, const PlanFolder&, const std::vector<PreparedBody>&,
+                     const fem::World&, MotionFigures& figures, const VerifyDepth& = {});
+
+struct VerifyOptions {
+  fs::path folder;
+  std::optional<fs::path> observables;  // of a work folder: also a CSV with the figures of every frame
+  SceneOptions scene;                   // the one that the plan must be of; none where its `scene` is empty
+  bool remake = false;                  // of large bodies shells are made again, too
+};
+// Of a work folder, or of one that prepare has written. Throws InputError where it is neither.
+Verified verify(const VerifyOptions&);
 
 }  // namespace limber::detail

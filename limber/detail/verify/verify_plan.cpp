@@ -121,10 +121,8 @@ void check_goals(const PlanFolder& planned, const fem::World& world, const Repla
     terms.push_back({"reached after all others", false, "the path does not get so far"});
   add_terms(name, terms, table);
   bool met = true;
-  for (const Json& row : table.rows())
-    if (const auto& promise = row.at("promise").get_ref<const std::string&>();
-        promise.starts_with("via ") || promise.starts_with(name + ":"))
-      met = met && row.at("kept").get<bool>();
+  for (const Promise& row : table.rows())
+    if (row.name.starts_with("via ") || row.name.starts_with(name + ":")) met = met && row.kept;
   table.row("the plan says that it is solved, and is", plan.solved() && met,
             plan.solved() ? "it says so" : plan::explain(plan));
 }
