@@ -607,7 +607,7 @@ int run_command_line(int argc, const char* const* argv) {
                   "frames to export: 0-300:2; beyond the last is left out with a warning; default: all")
       ->check(no_empty_list());
   add_global(export_command, global);
-  export_command.callback([&] { chosen = [&] { return detail::export_motion(export_options); }; });
+  export_command.callback([&] { chosen = [&] { return cli::export_motion(export_options); }; });
 
   CLI::App& run_command =
       *program.add_subcommand("run", "all of it: prepare, plan, render; what is up to date is skipped");

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "limber/detail/commands.h"
+#include "limber/detail/exports/export_motion.h"
 #include "limber/detail/report/report.h"
 #include "limber/detail/verify/verify.h"
 #include "core/error.h"
@@ -50,10 +51,11 @@ std::vector<std::filesystem::path> export_motion(const std::filesystem::path& fo
     detail::ExportOptions options;
     options.folder = folder, options.formats = formats;
     if (!out.empty()) options.out = out;
+    const detail::ExportedMotion exported = detail::export_motion(options);
     std::vector<std::filesystem::path> files;
-    const Json written = detail::export_motion(options).json.at("formats");
     for (const std::string& format : formats)
-      files.push_back(written.at(format).at("open").get<std::string>());
+      for (const auto& [name, written] : exported.formats)
+        if (name == format) files.push_back(written.open);
     return files;
   });
 }

@@ -153,16 +153,6 @@ struct ScenePrepareOptions {
 // may make some of them.
 Outcome prepare_scene(const ScenePrepareOptions&);
 
-inline const std::vector<std::string> motion_formats{"gltf", "pc2", "usd", "vtu"};
-struct ExportOptions {
-  fs::path folder;
-  std::vector<std::string> formats;  // of motion_formats
-  std::optional<fs::path> out;       // default: export in the folder
-  std::string frames;                // as of RenderOptions
-};
-// The planned motion as files for other programs.
-Outcome export_motion(const ExportOptions&);
-
 // prepare, plan and render; stages that are up to date are skipped.
 Outcome run(const PlanOptions&, const RenderOptions&);
 

@@ -1,3 +1,5 @@
+#include "limber/detail/exports/export_motion.h"
+
 #include <algorithm>
 #include <set>
 
@@ -6,8 +8,6 @@
 #include "core/log.h"
 #include "core/temporary_files.h"
 #include "fem/observe.h"
-#include "limber/detail/commands.h"
-#include "limber/detail/exports/motion_files.h"
 #include "limber/detail/film/frame_list.h"
 #include "limber/detail/plan/exported_files.h"
 #include "limber/detail/plan/manifest.h"
@@ -77,7 +77,7 @@ std::vector<fs::path> exported_files(const fs::path& folder) {
   return files;
 }
 
-Outcome export_motion(const ExportOptions& options) {
+ExportedMotion export_motion(const ExportOptions& options) {
   const PlanFolder planned = read_plan_folder(options.folder);
   const std::vector<PreparedBody> bodies = read_bodies_of(planned, options.folder);
   const fem::World world = world_of(planned, bodies);
@@ -102,28 +102,31 @@ Outcome export_motion(const ExportOptions& options) {
   const FolderLock lock(out, FolderLock::alone);
   remove_abandoned(out);
 
-  Json formats;
-  std::string text;
-  for (const auto& [format, write] : writers) {
-    if (std::find(options.formats.begin(), options.formats.end(), format) == options.formats.end()) continue;
-    const WrittenFiles written = write(motion, out);
-    formats[format] = {{"open", written.open.string()}, {"files", written.files}, {"bytes", written.bytes}};
-    text += fmt::format("  {:4}  {} ({}{:.2f} MB)\n", format, written.open.string(),
-                        written.files > 1 ? fmt::format("{} files, ", written.files) : "",
-                        1e-6 * double(written.bytes));
-  }
-  Json deformations;
+  ExportedMotion exported{.frames = motion.wanted,
+                          .frames_of_motion = count,
+                          .trajectory_hash = hex(plan::hash_of(path)),
+                          .folder = out};
+  for (const auto& [format, write] : writers)
+    if (std::find(options.formats.begin(), options.formats.end(), format) != options.formats.end())
+      exported.formats.emplace_back(format, write(motion, out));
   for (const scenes::BodySpec& body : planned.scene.bodies)
-    deformations[body.name] = body.deformation == scenes::Deformation::phong ? "phong" : "linear";
-  const Json result{{"frames", motion.wanted.size()},
-                    {"frame_list", motion.wanted},
-                    {"trajectory_hash", hex(plan::hash_of(path))},
-                    {"folder", out.string()},
-                    {"deformation", deformations},
-                    {"formats", formats}};
-  if (recorded) update_manifest(options.folder, "export", result);
-  return {exit_done, result,
-          fmt::format("{} of {} frames, {} bodies\n{}", motion.wanted.size(), count, bodies.size(), text)};
+    exported.bodies.emplace_back(body.name, body.deformation);
+  if (recorded) update_manifest(options.folder, "export", json_of(exported));
+  return exported;
+}
+
+Json json_of(const ExportedMotion& exported) {
+  Json formats, deformations;
+  for (const auto& [format, written] : exported.formats)
+    formats[format] = {{"open", written.open.string()}, {"files", written.files}, {"bytes", written.bytes}};
+  for (const auto& [body, deformation] : exported.bodies)
+    deformations[body] = deformation == scenes::Deformation::phong ? "phong" : "linear";
+  return {{"frames", exported.frames.size()},
+          {"frame_list", exported.frames},
+          {"trajectory_hash", exported.trajectory_hash},
+          {"folder", exported.folder.string()},
+          {"deformation", deformations},
+          {"formats", formats}};
 }
 
 }  // namespace limber::detail
