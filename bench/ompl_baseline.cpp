@@ -33,7 +33,7 @@
 #include "core/threads.h"
 #include "limber/detail/bench/bench.h"
 #include "limber/detail/film/frame_list.h"
-#include "limber/detail/plan/plan_folder.h"
+#include "limber/detail/plan/plan.h"
 #include "limber/detail/world/scene_world.h"
 
 namespace limber::detail {

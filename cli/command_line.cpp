@@ -535,14 +535,14 @@ int run_command_line(int argc, const char* const* argv) {
   plan_command.add_flag("--resume", plan_options.resume,
                         "go on from the plan in the work folder: more iterations, or after it was stopped");
   add_global(plan_command, global), add_threads(plan_command, global), add_progress(plan_command, global);
-  plan_command.callback([&] { chosen = [&] { return detail::plan(plan_options); }; });
+  plan_command.callback([&] { chosen = [&] { return cli::plan(plan_options); }; });
 
   CLI::App& simulate_command = *program.add_subcommand(
       "simulate", "scene left to itself → bodies, motion: velocities, forces and motions that it tells");
   add_scene(simulate_command, simulate_options.scene), add_simulate(simulate_command, simulate_options);
   add_global(simulate_command, global), add_threads(simulate_command, global),
       add_progress(simulate_command, global);
-  simulate_command.callback([&] { chosen = [&] { return detail::simulate(simulate_options); }; });
+  simulate_command.callback([&] { chosen = [&] { return cli::simulate(simulate_options); }; });
 
   CLI::App& render_command = *program.add_subcommand("render", "path → frames, contact sheet, film");
   render_command.add_option("DIR", render_options.folder, "work folder with a plan; with --still a scene")
@@ -577,7 +577,7 @@ int run_command_line(int argc, const char* const* argv) {
     still_flag->excludes(of_a_film);
   render_command.callback([&] {
     chosen = [&] {
-      if (!still) return detail::render(render_options);
+      if (!still) return cli::render(render_options);
       still_options.scene.scene = render_options.folder.string();
       still_options.scene.sets = render_options.sets;
       still_options.camera = render_options.camera, still_options.size = render_options.size;
@@ -614,7 +614,7 @@ int run_command_line(int argc, const char* const* argv) {
   add_scene(run_command, plan_options.scene), add_plan(run_command, plan_options),
       add_shortcut(run_command, plan_options), add_render(run_command, render_options);
   add_global(run_command, global), add_threads(run_command, global), add_progress(run_command, global);
-  run_command.callback([&] { chosen = [&] { return detail::run(plan_options, render_options); }; });
+  run_command.callback([&] { chosen = [&] { return cli::run(plan_options, render_options); }; });
 
   CLI::App& bench_command = *program.add_subcommand(
       "bench", "many runs: scenes × seeds × presets → a record a run, a table; what is done is skipped");
@@ -703,7 +703,7 @@ int run_command_line(int argc, const char* const* argv) {
   add_store(refine_command, refine_options.store, "none");
   add_limits(refine_command, refine_options);
   add_global(refine_command, global), add_threads(refine_command, global);
-  refine_command.callback([&] { chosen = [&] { return detail::refine(refine_options); }; });
+  refine_command.callback([&] { chosen = [&] { return cli::refine(refine_options); }; });
 
   CLI::App& info_command = *program.add_subcommand("info", "what is in a file or folder");
   info_command

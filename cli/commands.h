@@ -3,6 +3,10 @@
 
 #include "limber/detail/commands.h"
 #include "limber/detail/exports/export_motion.h"
+#include "limber/detail/film/render.h"
+#include "limber/detail/plan/plan.h"
+#include "limber/detail/plan/refine.h"
+#include "limber/detail/plan/simulate.h"
 #include "limber/detail/verify/verify.h"
 
 namespace limber::cli {
@@ -13,7 +17,13 @@ using enum detail::ExitCode;
 Outcome export_motion(const detail::ExportOptions&);
 Outcome info(const fs::path& path);
 Outcome list_scenes();
+Outcome plan(const detail::PlanOptions&);
+Outcome refine(const detail::RefineOptions&);
+Outcome render(const detail::RenderOptions&);
 Outcome report(const fs::path& folder, const std::optional<fs::path>& file = {});
+// plan and render; what is up to date is skipped.
+Outcome run(const detail::PlanOptions&, const detail::RenderOptions&);
+Outcome simulate(const detail::SimulateOptions&);
 Outcome verify(const detail::VerifyOptions&);
 
 }  // namespace limber::cli

@@ -395,7 +395,7 @@ void Plan::save(const std::filesystem::path& folder, const Context& context) con
         }
     plan::Plan plan = impl_->plan;
     detail::keep_measured_plan(folder, p.scene.impl().scene, p.prepared, p.world, system_of(*impl_), plan,
-                            impl_->motion_figures(), impl_->extra, "");
+                            impl_->motion_figures(), impl_->extra);
   });
 }
 

@@ -2,8 +2,8 @@
 
 #include <algorithm>
 
-#include "limber/detail/commands.h"
 #include "limber/detail/exports/export_motion.h"
+#include "limber/detail/film/render.h"
 #include "limber/detail/report/report.h"
 #include "limber/detail/verify/verify.h"
 #include "core/error.h"
@@ -32,11 +32,8 @@ Film render_film(const std::filesystem::path& folder, const FilmOptions& options
       command.size = fmt::format("{}x{}", options.width, options.height);
     command.camera = options.camera, command.name = options.name, command.sets = options.sets;
     if (!options.video.empty()) command.video = options.video;
-    const Json told = detail::render(command).json;
-    Film film;
-    film.frames_painted = told.at("painted").get<int>(), film.frames_failed = told.at("failed").get<int>();
-    if (told.contains("film")) film.video = told.at("film").get<std::string>();
-    return film;
+    const detail::RenderedFilm rendered = detail::render(command);
+    return Film{rendered.film.value_or(""), int(rendered.painted), int(rendered.failed)};
   });
 }
 

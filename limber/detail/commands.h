@@ -9,6 +9,8 @@
 
 #include "core/file.h"
 #include "core/json.h"
+#include "limber/detail/film/render.h"
+#include "limber/detail/world/scene_world.h"
 
 namespace limber::detail {
 
@@ -71,61 +73,6 @@ struct BatchOptions {
 };
 Outcome prepare_many(const BatchOptions&);
 
-struct SceneOptions {
-  std::string scene;              // a file, or the name of a scene that comes with limber
-  std::vector<std::string> sets;  // --set a.b=value
-  std::vector<fs::path> data;     // more folders to look for model files in
-  fs::path store = {};            // of bodies (limber/detail/body/body_store.h); empty: none
-};
-
-struct PlanOptions {
-  SceneOptions scene;
-  fs::path out;
-  std::optional<std::int64_t> seed, iterations;
-  int portfolio = 1;   // searches, with this seed and those after it, of which the quickest wins
-  std::string preset;  // empty: the scene's
-  double time_limit_s = std::numeric_limits<double>::infinity();
-  int in_flight = 0;  // 0: chosen from threads and lanes
-  bool resume = false;
-  std::optional<fs::path> stats;  // JSON lines: how the search went
-  fs::path from;                  // a folder with a plan or a simulation; empty: the scene's start
-  std::optional<int> frame;       // of `from`; nothing: its last
-
-  std::optional<int> shortcut_rounds;  // nothing: the scene's
-  std::string cost = "duration";       // what shortcutting and improving make less of
-  bool improve = false;                // go on after the first solution
-};
-Outcome plan(const PlanOptions&);
-
-struct SimulateOptions {
-  SceneOptions scene;
-  fs::path out;
-  std::optional<double> duration_s;  // > 0, from the start; nothing: 5 s, or as long as the plan followed
-  fs::path script;                   // more forces and motions; empty: the scene's alone
-  fs::path from;                     // a folder with a plan or a simulation; empty: the scene's start
-  std::optional<int> frame;          // of `from`
-  bool resume = false;               // go on from the simulation in `out`
-  fs::path follow;  // a folder with a plan that is followed by feedback; empty: no control acts
-};
-// The scene left to itself: initial velocities, forces and motions that it tells, no search.
-Outcome simulate(const SimulateOptions&);
-
-struct RenderOptions {
-  fs::path folder;
-  std::string frames;   // "1-30,47-327:2"; empty: all
-  std::string chunk;    // "i/n"; empty: 1/1
-  bool resume = false;  // keep the frames that already show what they should
-  std::string size;     // "1920x1080"; empty: the scene's
-  std::string camera = "main";
-  std::vector<std::string> passes;  // of depth, normal, object, scalar
-  int bits = 8;                     // a channel, 8 or 16
-  std::vector<std::string> sets;    // of film, cameras and the looks of bodies
-  // Names frames-NAME/, film-NAME.mp4 and sheet-NAME.png; empty: the camera's, and none for "main".
-  std::string name;
-  std::optional<fs::path> video;  // default film.mp4 in the folder, made when every frame is there
-};
-Outcome render(const RenderOptions&);
-
 // The start of a scene, before any plan.
 struct StillOptions {
   SceneOptions scene;
@@ -152,9 +99,6 @@ struct ScenePrepareOptions {
 // The bodies of a scene in its work folder, as plan and run would make them first: of several machines each
 // may make some of them.
 Outcome prepare_scene(const ScenePrepareOptions&);
-
-// prepare, plan and render; stages that are up to date are skipped.
-Outcome run(const PlanOptions&, const RenderOptions&);
 
 // Scenes × seeds × presets, each planned as `plan` would, one record a run. docs/bench.md.
 struct BenchOptions {
@@ -185,19 +129,6 @@ struct RobustOptions {
 };
 // The found plan replayed in worlds that are a little different: a report, no verdict.
 Outcome robust(const RobustOptions&);
-
-struct RefineOptions {
-  fs::path folder, out;
-  double tets_factor = 4;
-  std::vector<std::string> sets;  // after those of the plan and of the factor
-  std::vector<fs::path> data;
-  fs::path store;  // as of SceneOptions
-  std::optional<std::int64_t> iterations;
-  double time_limit_s = std::numeric_limits<double>::infinity();
-  int in_flight = 0;
-};
-// Carries a plan to finer cages of the same bodies, in another work folder.
-Outcome refine(const RefineOptions&);
 
 struct NewSceneOptions {
   fs::path from, out;  // models in one frame: a folder, a label map, an atlas; the scene file to write

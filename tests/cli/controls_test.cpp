@@ -2,7 +2,7 @@
 // of thirty seeds are in docs/planning.md.
 #include <algorithm>
 
-#include "limber/detail/plan/plan_folder.h"
+#include "limber/detail/plan/plan.h"
 #include "limber/detail/world/fem_system.h"
 #include "limber/detail/world/scene_world.h"
 #include "scenes/library.h"

@@ -6,7 +6,7 @@
 #include "core/hash.h"
 #include "core/mesh_files.h"
 #include "limber/detail/film/shot.h"
-#include "limber/detail/plan/plan_folder.h"
+#include "limber/detail/plan/plan.h"
 #include "limber/detail/world/fem_system.h"
 #include "limber/detail/world/scene_world.h"
 #include "scenes/detail/schema.h"

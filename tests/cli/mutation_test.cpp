@@ -11,7 +11,7 @@
 #include "core/npz.h"
 #include "ffd/binding_file.h"
 #include "limber/detail/plan/manifest.h"
-#include "limber/detail/plan/plan_folder.h"
+#include "limber/detail/plan/plan.h"
 #include "limber/detail/world/fem_system.h"
 #include "limber/detail/world/scene_world.h"
 #include "meshing/cage.h"

@@ -1,3 +1,5 @@
+#include "limber/detail/film/render.h"
+
 #include <atomic>
 #include <chrono>
 #include <mutex>
@@ -12,12 +14,8 @@
 #include "core/progress.h"
 #include "core/temporary_files.h"
 #include "core/threads.h"
-#include "limber/detail/commands.h"
 #include "limber/detail/film/frame_list.h"
-#include "limber/detail/film/shot.h"
 #include "limber/detail/plan/manifest.h"
-#include "limber/detail/plan/plan_folder.h"
-#include "limber/detail/world/scene_world.h"
 #include "render/film.h"
 #include "render/png_file.h"
 
@@ -121,17 +119,6 @@ scenes::Scene filmed_as(const scenes::Scene& planned, const std::vector<std::str
   return scenes::read_scene(planned.text, planned.name, all, planned.script);
 }
 
-std::string told(const Json& time) {
-  const double slowest = time["speed"][0], quickest = time["speed"][1], left_out_s = time["left_out_s"];
-  std::string text = fmt::format("{:.1f} s of film show {:.2f} s of the motion, at {}× its speed",
-                                 time["seconds"].get<double>(), time["motion_s"].get<double>(),
-                                 slowest == quickest ? fmt::format("{:.3g}", slowest)
-                                                     : fmt::format("{:.2g} to {:.2g}", slowest, quickest));
-  if (left_out_s > 0)
-    text += fmt::format("; the last {:.2f} s, in which nothing is seen to move, are left out", left_out_s);
-  return text + "\n";
-}
-
 std::string suffix_of(const RenderOptions& options) {
   const std::string name = !options.name.empty()      ? options.name
                            : options.camera == "main" ? ""
@@ -144,7 +131,7 @@ std::string suffix_of(const RenderOptions& options) {
 
 }  // namespace
 
-Outcome render(const RenderOptions& options) {
+RenderedFilm render(const RenderOptions& options) {
   const std::string suffix = suffix_of(options);
   PlanFolder planned = read_plan_folder(options.folder);
   planned.scene = filmed_as(planned.scene, options.sets);
@@ -194,22 +181,18 @@ Outcome render(const RenderOptions& options) {
   throw_if_stopped();
   for (const Failure& failure : failures) log::warn("frame {}: {}", failure.frame, failure.why);
 
-  Json result{{"frames", frame_count},
-              {"wanted", wanted.size()},
-              {"painted", missing.size() - failures.size()},
-              {"failed", failures.size()},
-              {"size", {size.first, size.second}},
-              {"camera", options.camera},
-              {"time", shot.time_told()},
-              {"trajectory_hash", hex(plan::hash_of(planned.plan.trajectory))},
-              {"cpu_s", cpu_s},
-              {"folder", folder.string()}};
-  std::string text =
-      fmt::format("{} of {} frames in {}: {} painted, {} kept, {} failed; {:.2f} CPU s\n", wanted.size(),
-                  frame_count, folder.string(), missing.size() - failures.size(),
-                  wanted.size() - missing.size(), failures.size(), cpu_s) +
-      told(result["time"]);
-
+  RenderedFilm result{.frames = frame_count,
+                      .wanted = wanted.size(),
+                      .painted = missing.size() - failures.size(),
+                      .failed = failures.size(),
+                      .size_px = size,
+                      .camera = options.camera,
+                      .time = shot.time_told(),
+                      .trajectory_hash = hex(plan::hash_of(planned.plan.trajectory)),
+                      .cpu_s = cpu_s,
+                      .folder = folder,
+                      .film = {},
+                      .sheet = {}};
   std::vector<fs::path> paths;
   for (int f = 0; f < frame_count; ++f) paths.push_back(files.of(f));
   bool complete = true;
@@ -230,13 +213,30 @@ Outcome render(const RenderOptions& options) {
     // Frames of an earlier, longer motion would only confuse.
     for (int f = frame_count; fs::remove(files.of(f)); ++f) {
     }
-    result["film"] = video.string(), result["sheet"] = sheet.string();
-    text += fmt::format("film {}, contact sheet {}\n", video.string(), sheet.string());
-  } else if (failures.empty()) {
-    text += "no film yet: not all frames are there\n";
+    result.film = video, result.sheet = sheet;
   }
-  update_manifest(options.folder, "render" + suffix, result);
-  return {failures.empty() ? exit_done : exit_frames_failed, result, text};
+  update_manifest(options.folder, "render" + suffix, json_of(result));
+  return result;
+}
+
+Json json_of(const RenderedFilm& film) {
+  Json json{{"frames", film.frames},
+            {"wanted", film.wanted},
+            {"painted", film.painted},
+            {"failed", film.failed},
+            {"size", {film.size_px.first, film.size_px.second}},
+            {"camera", film.camera},
+            {"time",
+             {{"seconds", film.time.seconds},
+              {"motion_s", film.time.motion_s},
+              {"left_out_s", film.time.left_out_s},
+              {"speed", {film.time.slowest, film.time.quickest}}}},
+            {"trajectory_hash", film.trajectory_hash},
+            {"cpu_s", film.cpu_s},
+            {"folder", film.folder.string()}};
+  if (film.film) json["film"] = film.film->string();
+  if (film.sheet) json["sheet"] = film.sheet->string();
+  return json;
 }
 
 namespace {
@@ -254,32 +254,28 @@ void film_otherwise(const fs::path& folder, const PlanFolder& planned, const sce
 
 }  // namespace
 
-Outcome run(const PlanOptions& plan_options, const RenderOptions& render_options) {
-  const scenes::Scene scene = read_scene(plan_options);
-  if (render_options.frames.empty() && render_options.chunk.empty())
-    render::require_film_possible(scene.film.frames_per_second, render_options.video.value_or("film.mp4"));
+PlannedFilm plan_and_film(const PlanOptions& options, RenderOptions film) {
+  const scenes::Scene scene = read_scene(options);
+  if (film.frames.empty() && film.chunk.empty())
+    render::require_film_possible(scene.film.frames_per_second, film.video.value_or("film.mp4"));
   require_letters(scene.film);
-  make_folder(plan_options.out);
-  FolderLock lock(plan_options.out, FolderLock::alone);
-  Outcome planned;
-  if (plan_is_up_to_date(plan_options, scene)) {
-    log::info("{}: up to date", (plan_options.out / "plan.npz").string());
-    const PlanFolder folder = read_plan_folder(plan_options.out);
-    planned = {folder.plan.solved() ? exit_done : exit_no_plan, folder.summary, ""};
-    if (folder.scene.text != scene.text || folder.scene.sets != scene.sets)  // it may be filmed otherwise
-      film_otherwise(plan_options.out, folder, scene);
+  make_folder(options.out);
+  FolderLock lock(options.out, FolderLock::alone);
+  PlannedFilm both;
+  if (plan_is_up_to_date(options, scene)) {
+    const fs::path file = options.out / "plan.npz";
+    log::info("{}: up to date", file.string());
+    const PlanFolder kept = read_plan_folder(options.out);
+    both.plan = {.file = file, .summary = kept.summary, .reached = kept.plan.solved(), .up_to_date = true};
+    if (kept.scene.text != scene.text || kept.scene.sets != scene.sets)  // it may be filmed otherwise
+      film_otherwise(options.out, kept, scene);
   } else {
-    planned = plan(plan_options, scene);
+    both.plan = plan(options, scene);
   }
   lock.share();
-  RenderOptions options = render_options;
-  options.folder = plan_options.out;
-  options.resume = true;
-  const Outcome rendered = render(options);
-  Outcome both{rendered.exit_code != exit_done ? rendered.exit_code : planned.exit_code,
-               {},
-               planned.text + rendered.text};
-  both.json["plan"] = planned.json, both.json["render"] = rendered.json;
+  film.folder = options.out;
+  film.resume = true;
+  both.film = render(film);
   return both;
 }
 

@@ -211,15 +211,13 @@ int Shot::frames() const { return int(moments_.size()); }
 
 double Shot::time_s(int frame) const { return moment_of(frame) / plan_.trajectory.frames_per_second; }
 
-Json Shot::time_told() const {
+TimeTold Shot::time_told() const {
   const scenes::FilmSpec& film = scene_.film;
   double least = std::numeric_limits<double>::infinity(), most = 0;
   for (const Moment& moment : moments_)
     least = std::min(least, moment.pace * film.speed), most = std::max(most, moment.pace * film.speed);
-  return {{"seconds", double(frames()) / film.frames_per_second},
-          {"motion_s", time_s(frames() - 1)},
-          {"left_out_s", double(stored() - 1) / plan_.trajectory.frames_per_second - time_s(frames() - 1)},
-          {"speed", {least, most}}};
+  return {double(frames()) / film.frames_per_second, time_s(frames() - 1),
+          double(stored() - 1) / plan_.trajectory.frames_per_second - time_s(frames() - 1), least, most};
 }
 
 void Shot::find_controls() {

@@ -34,6 +34,13 @@ struct Picture {
   std::map<std::string, std::variant<render::Raster8, render::Raster16>> passes;  // docs/files.md
 };
 
+// How a film tells its motion.
+struct TimeTold {
+  double seconds = 0, motion_s = 0;  // of film, and of the motion that they show
+  double left_out_s = 0;             // at the end, in which nothing is seen to move
+  double slowest = 0, quickest = 0;  // of the motion's own speed
+};
+
 std::string length_words(double length_m);  // "20 cm"
 // Throws InputError when the film's caption has letters that there is no picture of.
 void require_letters(const scenes::FilmSpec&);
@@ -52,8 +59,7 @@ class Shot {
   // Frames before the motion, and those of it; what is left over comes after it.
   int frames_before() const { return before_; }
   int frames_of_motion() const { return of_motion_; }
-  // {"seconds": …, "motion_s": …, "left_out_s": …, "speed": [least, most]}: how the film tells the motion.
-  Json time_told() const;
+  TimeTold time_told() const;
   // {"depth_m": [near, far], "objects": ["", NAME…], "scalar": {…}, "contacts": […]}: what the levels of the
   // passes mean, and where in the pictures the robot is touched. docs/files.md.
   Json key_of_passes() const;

@@ -5,7 +5,7 @@
 #include <mutex>
 #include <vector>
 
-#include "limber/detail/plan/plan_folder.h"
+#include "limber/detail/plan/plan.h"
 #include "limber/detail/world/scene_world.h"
 #include "limber/scene.h"
 

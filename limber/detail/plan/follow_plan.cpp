@@ -4,6 +4,7 @@
 
 #include "core/error.h"
 #include "core/hash.h"
+#include "limber/detail/plan/plan.h"
 #include "limber/detail/world/scene_world.h"
 
 namespace limber::detail {

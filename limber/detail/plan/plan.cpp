@@ -1,3 +1,5 @@
+#include "limber/detail/plan/plan.h"
+
 #include "core/error.h"
 #include "core/hash.h"
 #include "core/lock.h"
@@ -5,19 +7,15 @@
 #include "core/progress.h"
 #include "core/temporary_files.h"
 #include "core/threads.h"
-#include "limber/detail/commands.h"
 #include "limber/detail/plan/diagnosis.h"
 #include "limber/detail/plan/exported_files.h"
 #include "limber/detail/plan/manifest.h"
-#include "limber/detail/plan/plan_folder.h"
 #include "limber/detail/plan/search_log.h"
 #include "limber/detail/plan/simulate.h"
 #include "limber/detail/plan/tree_plot.h"
 #include "limber/detail/world/analysis.h"
 #include "limber/detail/world/fem_system.h"
 #include "limber/detail/world/scene_world.h"
-#include "plan/anytime.h"
-#include "plan/portfolio.h"
 #include "scenes/library.h"
 
 namespace limber::detail {
@@ -52,51 +50,6 @@ Json legs_of(const plan::Plan& plan) {
   return legs;
 }
 
-std::string text_of_shortcut(const Json& report) {
-  const Json &before = report.at("before"), &after = report.at("after");
-  const auto change = [&](const char* key, double unit) {
-    return fmt::format("{:.3g} → {:.3g}", unit * before.at(key).get<double>(),
-                       unit * after.at(key).get<double>());
-  };
-  return fmt::format(
-      "  shortcut     {} changes accepted in {} rounds, {:.2f} CPU s: {} s, effort {} N s, elastic energy {} "
-      "J, "
-      "volume change {} %\n",
-      report.at("accepted").get<int>(), report.at("rounds").get<int>(), report.at("cpu_s").get<double>(),
-      change("duration_s", 1), change("effort_n_s", 1), change("strain_energy_j", 1),
-      change("volume_change", 100));
-}
-
-std::string text_of_portfolio(const plan::PortfolioReport& report, const plan::Plan& plan) {
-  const std::uint64_t first = report.searches.front().seed, last = report.searches.back().seed;
-  return fmt::format(
-      "  portfolio    seeds {} to {}, {} iterations in all, {:.2f} CPU s, {:.2f} s; {} seed {}\n", first,
-      last, report.iterations, report.cpu_s, report.wall_s,
-      plan.solved() ? "the quickest is" : "none solves it, the nearest is", plan.settings.seed);
-}
-
-std::string text_of_improvements(const plan::AnytimeReport& report) {
-  std::string text = fmt::format(
-      "  improve      {} searches, {} of them reached the goal, {} iterations in all; {:.2f} CPU s, {:.2f} "
-      "s\n",
-      report.searches, report.solved, report.iterations, report.cpu_s, report.wall_s);
-  for (const plan::Improvement& i : report.improvements)
-    text += fmt::format("               {} {:.4g} after {:.2f} s and {} iterations\n",
-                        plan::name_of(report.settings.cost), plan::cost_in(i.costs, report.settings.cost),
-                        i.wall_s, i.iterations);
-  return text;
-}
-
-std::string text_of_legs(const Json& legs) {
-  std::string text;
-  for (const Json& leg : legs)
-    text += fmt::format("{}{} {} after {} iterations", text.empty() ? "  legs         " : ", ",
-                        leg.at("goal").get<std::string>(),
-                        leg.at("reached").get<bool>() ? "reached" : "not reached",
-                        leg.at("iterations").get<std::int64_t>());
-  return text + "\n";
-}
-
 // What was done where bodies overlap at the start.
 Json json_of(const fem::Parting& parting, const fem::World& world, const MotionFigures& figures) {
   const auto name = [&](int body) { return world.bodies[std::size_t(body)].name; };
@@ -111,82 +64,6 @@ Json json_of(const fem::Parting& parting, const fem::World& world, const MotionF
     if (world.bodies[b].moving) json["largest_move_m"][name(int(b))] = parting.largest_move_m[b];
   json["largest_move_of_robot_size"] = *largest / figures.robot_surface_size_m;
   return json;
-}
-
-std::string text_of_parting(const Json& s) {
-  std::string text;
-  const Json& parted = s.at("parted");
-  const auto mm = [](const Json& m) { return 1e3 * m.get<double>(); };
-  for (const Json& pair : parted.at("pairs"))
-    text += fmt::format(
-        "  start        {} and {} overlapped by {:.3g} mm: parted by {:.3g} and {:.3g} mm, {:.2g} mm apart "
-        "now\n",
-        pair.at("bodies").at(0).get<std::string>(), pair.at("bodies").at(1).get<std::string>(),
-        mm(pair.at("depth_m")), mm(pair.at("moved_m").at(0)), mm(pair.at("moved_m").at(1)),
-        mm(pair.at("gap_m")));
-  return text +
-         fmt::format(
-             "               in {} steps{}; no node was moved by more than {:.2f} % of the robot's size\n",
-             parted.at("steps").get<int>(),
-             s.contains("dynamics")
-                 ? fmt::format(", {:.2f} CPU s", s.at("dynamics").at("parting_cpu_s").get<double>())
-                 : "",
-             100 * parted.at("largest_move_of_robot_size").get<double>());
-}
-
-// Of the motion: what a plan and a simulation tell alike.
-std::string text_of_motion(const Json& s) {
-  std::string volumes;
-  for (const auto& [name, percent] : s.at("largest_volume_change_percent").items())
-    volumes += fmt::format("{}{} {:.2f} %", volumes.empty() ? "" : ", ", name, percent.get<double>());
-  return fmt::format(
-      "  motion       {:.2f} s in {} frames, time step {:.3g} ms\n"
-      "  volume       changes at most: {}\n"
-      "  penetration  at most {:.4f} m, {:.2f} % of the robot's size ({})\n"
-      "  surfaces     overlap at most {:.2f} % ({}), in themselves {:.2f} % ({}), gap where they press "
-      "{:.2f} % "
-      "in the median\n"
-      "  strain       at most {:.3f} ({})\n"
-      "  contact      at most {:.1f} N ({})\n",
-      s.at("motion_s").get<double>(), s.at("frames").get<int>(), 1e3 * s.at("dt_s").get<double>(), volumes,
-      s.at("deepest_penetration_m").get<double>(),
-      100 * s.at("deepest_penetration_of_robot_size").get<double>(),
-      s.at("penetration_between").get<std::string>(),
-      100 * s.at("deepest_overlap_of_robot_size").get<double>(), s.at("overlap_between").get<std::string>(),
-      100 * s.at("deepest_self_overlap_of_robot_size").get<double>(),
-      s.at("self_overlap_of").get<std::string>(),
-      100 * s.at("gap_at_contact").at("median_of_robot_size").get<double>(),
-      s.at("largest_strain").get<double>(), s.at("largest_strain_of").get<std::string>(),
-      s.at("largest_contact_force_n").get<double>(), s.at("contact_between").get<std::string>());
-}
-
-std::string text_of_simulation(const Json& s, const std::string& extra, const fs::path& file) {
-  return fmt::format("{}\n{}{}{}  hashes       trajectory {}\n  file         {}\n",
-                     s.at("explanation").get<std::string>(), s.contains("parted") ? text_of_parting(s) : "",
-                     text_of_motion(s), extra, s.at("trajectory_hash").get<std::string>(), file.string());
-}
-
-std::string text_of(const Json& s, const std::string& extra, const fs::path& file) {
-  const Json &t = s.at("statistics"), &d = s.at("dynamics");
-  return fmt::format(
-      "{}\n"
-      "{}{}"
-      "  search       {} iterations, {} nodes, {} diverged, {} rejected, {} ways refused; {:.2f} CPU s, "
-      "{:.2f} s\n"
-      "  memory       {:.1f} kB a node, {:.1f} where nothing is shared with the parent\n"
-      "  dynamics     contact {:.2f} × the force step; a lane takes {:.1f} µs to load, {:.1f} µs to store\n"
-      "{}"
-      "{}"
-      "  hashes       tree {}, trajectory {}\n"
-      "  file         {}\n",
-      s.at("explanation").get<std::string>(), s.contains("parted") ? text_of_parting(s) : "",
-      s.contains("legs") ? text_of_legs(s.at("legs")) : "", t.at("iterations").get<std::int64_t>(),
-      s.at("nodes").get<int>(), t.at("diverged").get<std::int64_t>(), t.at("rejected").get<std::int64_t>(),
-      t.at("refused").get<std::int64_t>(), t.at("cpu_s").get<double>(), t.at("wall_s").get<double>(),
-      1e-3 * s.at("node_bytes").get<double>(), 1e-3 * s.at("node_bytes_unshared").get<double>(),
-      d.at("contact_of_force_step").get<double>(), d.at("load_us").get<double>(),
-      d.at("store_us").get<double>(), text_of_motion(s), extra, s.at("tree_hash").get<std::string>(),
-      s.at("trajectory_hash").get<std::string>(), file.string());
 }
 
 // `earlier` is the summary of the plan that this one goes on from, null for none: a solved one has its rounds
@@ -319,7 +196,7 @@ scenes::Scene read_scene(const PlanOptions& options) {
   return scene;
 }
 
-Outcome plan(const PlanOptions& options) {
+KeptPlan plan(const PlanOptions& options) {
   const scenes::Scene scene = read_scene(options);
   require_other_folder(options.from, options.out);
   make_folder(options.out);
@@ -330,7 +207,7 @@ Outcome plan(const PlanOptions& options) {
     // What a film shows otherwise is told by the text alone.
     if (kept.scene.text == scene.text && kept.scene.sets == scene.sets) {
       log::info("{}: up to date", file.string());
-      return {kept.plan.solved() ? exit_done : exit_no_plan, kept.summary, text_of(kept.summary, "", file)};
+      return {.file = file, .summary = kept.summary, .reached = kept.plan.solved(), .up_to_date = true};
     }
   }
   return plan(options, scene);
@@ -356,22 +233,21 @@ Found find_plan(const scenes::Scene& scene, const FemSystem& system, const PlanO
     if (earlier_summary.contains(later)) found.extra[later] = earlier_summary.at(later);
   if (several) {
     found.extra["portfolio"] = plan::json_of(searches);
-    found.extra_text += text_of_portfolio(searches, plan);
+    found.how.portfolio = std::move(searches);
   }
   if (plan.solved() && shortcuts.rounds > shortcuts.rounds_done) {
-    found.extra["shortcut"] = plan::json_of(plan::shorten(system, plan, shortcuts));
-    found.extra_text += text_of_shortcut(found.extra.at("shortcut"));
+    found.how.shortcut = plan::shorten(system, plan, shortcuts);
+    found.extra["shortcut"] = plan::json_of(*found.how.shortcut);
   }
   if (plan.solved() && options.improve) {
-    const plan::AnytimeReport report =
+    found.how.improve =
         plan::improve(system, plan, {.cost = shortcuts.cost, .shortcut_rounds = shortcuts.rounds});
-    found.extra["improve"] = plan::json_of(report);
-    found.extra_text += text_of_improvements(report);
+    found.extra["improve"] = plan::json_of(*found.how.improve);
   }
   return found;
 }
 
-Outcome plan(const PlanOptions& options, const scenes::Scene& scene) {
+KeptPlan plan(const PlanOptions& options, const scenes::Scene& scene) {
   make_folder(options.out);
   remove_abandoned(options.out);
   const std::vector<PreparedBody> bodies =
@@ -402,24 +278,19 @@ Outcome plan(const PlanOptions& options, const scenes::Scene& scene) {
   }
   Found found = find_plan(scene, system, options, std::move(earlier), earlier_summary);
   plan::Plan& plan = found.plan;
-  if (beginning.start) {
-    found.extra["from"] = beginning.from;
-    found.extra_text = fmt::format("  from         frame {} of {}\n", beginning.from.at("frame").get<int>(),
-                                   options.from.string()) +
-                       found.extra_text;
-  }
+  if (beginning.start) found.extra["from"] = beginning.from;
   // Whatever comes of a search, of shortcuts or of better paths is in the tree.
   if (stop_signal() != 0 && plan.tree.size() == nodes_kept) {
     log::info("{}: is as it was; go on with --resume", file.string());
     throw_if_stopped();
   }
-  const Outcome outcome =
-      keep_plan(options.out, scene, bodies, world, system, plan, found.extra, found.extra_text);
+  KeptPlan kept = keep_plan(options.out, scene, bodies, world, system, plan, found.extra);
+  kept.how = std::move(found.how);
   if (stop_signal() != 0) {
     log::info("{}: the plan so far is kept; go on with --resume", file.string());
     throw_if_stopped();
   }
-  return outcome;
+  return kept;
 }
 
 namespace {
@@ -438,9 +309,9 @@ void remove_what_shows_another_plan(const fs::path& folder, const Json& summary)
 
 }  // namespace
 
-Outcome keep_plan(const fs::path& folder, const scenes::Scene& scene, const std::vector<PreparedBody>& bodies,
-                  const fem::World& world, const FemSystem& system, plan::Plan& plan, const Json& extra,
-                  const std::string& extra_text) {
+KeptPlan keep_plan(const fs::path& folder, const scenes::Scene& scene,
+                   const std::vector<PreparedBody>& bodies, const fem::World& world, const FemSystem& system,
+                   plan::Plan& plan, const Json& extra) {
   MotionFigures figures;
   try {
     const NothingToKeep nothing_to_keep;
@@ -450,13 +321,13 @@ Outcome keep_plan(const fs::path& folder, const scenes::Scene& scene, const std:
   } catch (const Interrupted&) {
     plan.measured = false;
   }
-  return keep_measured_plan(folder, scene, bodies, world, system, plan, figures, extra, extra_text);
+  return keep_measured_plan(folder, scene, bodies, world, system, plan, figures, extra);
 }
 
-Outcome keep_measured_plan(const fs::path& folder, const scenes::Scene& scene,
-                           const std::vector<PreparedBody>& bodies, const fem::World& world,
-                           const FemSystem& system, const plan::Plan& plan, const MotionFigures& figures,
-                           const Json& extra, const std::string& extra_text) {
+KeptPlan keep_measured_plan(const fs::path& folder, const scenes::Scene& scene,
+                            const std::vector<PreparedBody>& bodies, const fem::World& world,
+                            const FemSystem& system, const plan::Plan& plan, const MotionFigures& figures,
+                            const Json& extra) {
   Json summary = facts_of(plan, world, system, figures);
   if (!plan.simulation) {  // whose bytes depend on no clock
     summary["dynamics"] = json_of(system.cost());
@@ -470,11 +341,12 @@ Outcome keep_measured_plan(const fs::path& folder, const scenes::Scene& scene,
     if (!pictures.contains(name)) fs::remove(folder / name);  // of what was here before
   for (const auto& [name, bytes] : pictures) write_file(folder / name, bytes);
   update_manifest(folder, "plan", summary);
-  if (plan.simulation)
-    return {plan.simulation->ending == plan::Simulation::diverged ? exit_no_plan : exit_done, summary,
-            is_unmeasured(plan) ? "" : text_of_simulation(summary, extra_text, folder / "plan.npz")};
-  return {plan.solved() ? exit_done : exit_no_plan, summary,
-          is_unmeasured(plan) ? "" : text_of(summary, extra_text, folder / "plan.npz")};
+  const bool is_simulation = plan.simulation.has_value();
+  return {.file = folder / "plan.npz",
+          .summary = std::move(summary),
+          .is_simulation = is_simulation,
+          .reached = is_simulation ? plan.simulation->ending != plan::Simulation::diverged : plan.solved(),
+          .measured = !is_unmeasured(plan)};
 }
 
 bool plan_is_up_to_date(const PlanOptions& options, const scenes::Scene& scene) {

@@ -3,10 +3,10 @@
 #pragma once
 
 #include <map>
+#include <string>
 #include <vector>
 
 #include "limber/detail/body/body.h"
-#include "limber/detail/commands.h"
 #include "limber/detail/world/analysis.h"
 #include "limber/detail/world/fem_system.h"
 #include "plan/search.h"
@@ -26,17 +26,6 @@ struct PlanFolder {
 
 void write_plan_folder(const fs::path& folder, const plan::Plan&, const scenes::Scene&,
                        const std::vector<PreparedBody>&, const Json& summary);
-
-// Measures the plan's motion, writes plan.npz, volume.svg and the manifest, and says all that there is to
-// say; after a stop signal writes it unmeasured. `extra` goes into the summary, `extra_text` among its lines.
-Outcome keep_plan(const fs::path& folder, const scenes::Scene&, const std::vector<PreparedBody>&,
-                  const fem::World&, const FemSystem&, plan::Plan&, const Json& extra,
-                  const std::string& extra_text);
-
-// The same of a motion that is measured already.
-Outcome keep_measured_plan(const fs::path& folder, const scenes::Scene&, const std::vector<PreparedBody>&,
-                           const fem::World&, const FemSystem&, const plan::Plan&, const MotionFigures&,
-                           const Json& extra, const std::string& extra_text);
 
 // Of what a signal ended nothing is measured, so that it ends at once: no figures, no pictures.
 inline bool is_unmeasured(const plan::Plan& plan) {
@@ -81,20 +70,5 @@ std::vector<PreparedBody> read_caged_bodies_of(const PlanFolder&, const fs::path
 // The bodies that the plan was made with. Throws InputError when one has changed since, or the plan is not of
 // their world.
 std::vector<PreparedBody> read_bodies_of(const PlanFolder&, const fs::path& folder);
-
-// What `limber plan` finds before it keeps it: a search, or several, and what makes their path better.
-// `extra` and `extra_text` as of keep_plan. `earlier` and its summary: the plan that this one goes on from.
-struct Found {
-  plan::Plan plan;
-  Json extra;
-  std::string extra_text;
-};
-Found find_plan(const scenes::Scene&, const FemSystem&, const PlanOptions&,
-                std::optional<plan::Plan> earlier = std::nullopt, const Json& earlier_summary = {});
-
-scenes::Scene read_scene(const PlanOptions&);
-plan::Settings settings_of(const scenes::Scene&, const PlanOptions&);
-Outcome plan(const PlanOptions&, const scenes::Scene&);
-bool plan_is_up_to_date(const PlanOptions&, const scenes::Scene&);
 
 }  // namespace limber::detail

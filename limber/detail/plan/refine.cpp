@@ -1,14 +1,13 @@
-#include "plan/refine.h"
+#include "limber/detail/plan/refine.h"
 
 #include <cmath>
 
 #include "core/error.h"
 #include "core/lock.h"
 #include "core/progress.h"
-#include "limber/detail/commands.h"
-#include "limber/detail/plan/plan_folder.h"
 #include "limber/detail/world/fem_system.h"
 #include "limber/detail/world/scene_world.h"
+#include "plan/refine.h"
 
 namespace limber::detail {
 
@@ -48,7 +47,7 @@ int same_node(const TetMesh& coarse, int node, const TetMesh& fine) {
 
 }  // namespace
 
-Outcome refine(const RefineOptions& options) {
+KeptPlan refine(const RefineOptions& options) {
   const PlanFolder planned = read_folder_from_the_start(options.folder, "limber refine");
   if (!planned.plan.solved())
     throw InputError(
@@ -88,16 +87,10 @@ Outcome refine(const RefineOptions& options) {
   Json json = plan::json_of(report);
   json["coarse_tets"] = tets_of(coarse_bodies);
   json["tets"] = tets_of(bodies);
-  const std::string text = fmt::format(
-      "  refine       {}; replayed to {:.3f} m from the goal, followed for {:.2f} s, at most {:.3f} m off; "
-      "{} "
-      "iterations; CPU s: replay {:.2f}, following {:.2f}, search {:.2f}\n",
-      json.at("how").get<std::string>(), report.replay_distance_m, report.tracked_s, report.largest_error_m,
-      report.iterations, report.replay_cpu_s, report.track_cpu_s, report.search_cpu_s);
-  const Outcome outcome =
-      keep_plan(options.out, scene, bodies, world, system, plan, {{"refine", json}}, text);
+  KeptPlan kept = keep_plan(options.out, scene, bodies, world, system, plan, {{"refine", json}});
   throw_if_stopped();
-  return outcome;
+  kept.how.refine = report;
+  return kept;
 }
 
 }  // namespace limber::detail

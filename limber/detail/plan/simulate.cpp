@@ -8,7 +8,6 @@
 #include "core/progress.h"
 #include "core/temporary_files.h"
 #include "fem/observe.h"
-#include "limber/detail/commands.h"
 #include "limber/detail/plan/follow_plan.h"
 #include "limber/detail/world/scene_world.h"
 #include "plan/simulation.h"
@@ -45,16 +44,6 @@ void require_bodies_of(const fem::World& there, const fem::World& world, const s
         "{}: is of another scene: there {} can be pushed, and here {}; name a folder in which one "
         "of these moves",
         what, fmt::join(theirs, ", "), fmt::join(ours, ", ")));
-}
-
-std::string text_of_following(const Json& follows, const fs::path& folder) {
-  return fmt::format(
-      "  follows      {}; at most {:.3f} m from its path, with at most {:.4g} N\n"
-      "  goal         {}: {:.3f} m from it at {:.4f} m/s\n",
-      folder.string(), follows.at("farthest_from_path_m").get<double>(),
-      follows.at("largest_force_n").get<double>(),
-      follows.at("reaches").get<bool>() ? "reached" : "not reached", follows.at("distance_m").get<double>(),
-      follows.at("speed_m_s").get<double>());
 }
 
 void require_options(const SimulateOptions& options) {
@@ -125,7 +114,7 @@ State start_from(const fs::path& folder, const PlanFolder& other, int frame, con
   return start;
 }
 
-Outcome simulate(const SimulateOptions& options) {
+KeptPlan simulate(const SimulateOptions& options) {
   require_options(options);
   require_other_folder(options.from, options.out);
   const scenes::Scene scene =
@@ -170,22 +159,14 @@ Outcome simulate(const SimulateOptions& options) {
   }
   Json extra;
   if (!beginning.from.is_null()) extra["from"] = beginning.from;
-  std::string extra_text = extra.is_null()
-                               ? ""
-                               : fmt::format("  from         frame {} of {}\n",
-                                             extra.at("from").at("frame").get<int>(), options.from.string());
-  if (followed) {
-    extra["follows"] = followed->facts(plan, options.out);
-    extra_text = text_of_following(extra.at("follows"), options.follow);
-  }
-  const Outcome outcome =
-      keep_measured_plan(options.out, scene, bodies, world, system, plan, figures, extra, extra_text);
+  if (followed) extra["follows"] = followed->facts(plan, options.out);
+  KeptPlan kept = keep_measured_plan(options.out, scene, bodies, world, system, plan, figures, extra);
   if (stop_signal() != 0) {
     log::info("{}: what was simulated is kept; {}", file.string(),
               followed ? "simulate anew for the rest" : "go on with --resume");
     throw_if_stopped();
   }
-  return outcome;
+  return kept;
 }
 
 }  // namespace limber::detail

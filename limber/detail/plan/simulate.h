@@ -1,9 +1,22 @@
-// A motion that begins where another one was.
+// Scenes left to themselves, and motions that begin where another one was.
 #pragma once
 
-#include "limber/detail/plan/plan_folder.h"
+#include "limber/detail/plan/plan.h"
 
 namespace limber::detail {
+
+struct SimulateOptions {
+  SceneOptions scene;
+  fs::path out;
+  std::optional<double> duration_s;  // > 0, from the start; nothing: 5 s, or as long as the plan followed
+  fs::path script;                   // more forces and motions; empty: the scene's alone
+  fs::path from;                     // a folder with a plan or a simulation; empty: the scene's start
+  std::optional<int> frame;          // of `from`
+  bool resume = false;               // go on from the simulation in `out`
+  fs::path follow;  // a folder with a plan that is followed by feedback; empty: no control acts
+};
+// Initial velocities, forces and motions that the scene tells; no search. Throws as plan().
+KeptPlan simulate(const SimulateOptions&);
 
 // Frame `frame` of the plan or simulation in `folder`, as plan.npz has it, positions and velocities bit for
 // bit: of each body that moves in both worlds, at the step nearest to the time of that frame. Bodies that the

@@ -6,6 +6,7 @@
 #include "limber/detail/plan/plan_folder.h"
 #include "limber/detail/verify/promises.h"
 #include "limber/detail/world/analysis.h"
+#include "limber/detail/world/scene_world.h"
 
 namespace limber::detail {
 

@@ -10,6 +10,13 @@
 
 namespace limber::detail {
 
+struct SceneOptions {
+  std::string scene;              // a file, or the name of a scene that comes with limber
+  std::vector<std::string> sets;  // --set a.b=value
+  std::vector<fs::path> data;     // more folders to look for model files in
+  fs::path store = {};            // of bodies (limber/detail/body/body_store.h); empty: none
+};
+
 fs::path body_folder(const fs::path& work_folder, const scenes::BodySpec&);
 
 // Prepares what is not up to date; meshes are in world coordinates, where the scene puts them. `data` are

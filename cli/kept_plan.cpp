@@ -1,0 +1,164 @@
+#include "cli/kept_plan.h"
+
+#include <fmt/format.h>
+
+namespace limber::cli {
+
+namespace {
+
+std::string text_of(const plan::ShortcutReport& report) {
+  const plan::Costs &before = report.before, &after = report.after;
+  return fmt::format(
+      "  shortcut     {} changes accepted in {} rounds, {:.2f} CPU s: {:.3g} → {:.3g} s, effort {:.3g} → "
+      "{:.3g} "
+      "N s, elastic energy {:.3g} → {:.3g} J, volume change {:.3g} → {:.3g} %\n",
+      report.accepted, report.settings.rounds_done, report.cpu_s, before.duration_s, after.duration_s,
+      before.effort_n_s, after.effort_n_s, before.strain_energy_j, after.strain_energy_j,
+      100 * before.volume_change, 100 * after.volume_change);
+}
+
+std::string text_of(const plan::PortfolioReport& report, const Json& summary) {
+  return fmt::format(
+      "  portfolio    seeds {} to {}, {} iterations in all, {:.2f} CPU s, {:.2f} s; {} seed {}\n",
+      report.searches.front().seed, report.searches.back().seed, report.iterations, report.cpu_s,
+      report.wall_s, summary.at("solved").get<bool>() ? "the quickest is" : "none solves it, the nearest is",
+      summary.at("seed").get<std::uint64_t>());
+}
+
+std::string text_of(const plan::AnytimeReport& report) {
+  std::string text = fmt::format(
+      "  improve      {} searches, {} of them reached the goal, {} iterations in all; {:.2f} CPU s, {:.2f} "
+      "s\n",
+      report.searches, report.solved, report.iterations, report.cpu_s, report.wall_s);
+  for (const plan::Improvement& i : report.improvements)
+    text += fmt::format("               {} {:.4g} after {:.2f} s and {} iterations\n",
+                        plan::name_of(report.settings.cost), plan::cost_in(i.costs, report.settings.cost),
+                        i.wall_s, i.iterations);
+  return text;
+}
+
+std::string text_of(const plan::RefineReport& report, const Json& summary) {
+  return fmt::format(
+      "  refine       {}; replayed to {:.3f} m from the goal, followed for {:.2f} s, at most {:.3f} m off; "
+      "{} "
+      "iterations; CPU s: replay {:.2f}, following {:.2f}, search {:.2f}\n",
+      summary.at("refine").at("how").get<std::string>(), report.replay_distance_m, report.tracked_s,
+      report.largest_error_m, report.iterations, report.replay_cpu_s, report.track_cpu_s,
+      report.search_cpu_s);
+}
+
+std::string text_of(const detail::HowFound& how, const Json& summary) {
+  std::string text;
+  if (how.portfolio) text += text_of(*how.portfolio, summary);
+  if (how.shortcut) text += text_of(*how.shortcut);
+  if (how.improve) text += text_of(*how.improve);
+  if (how.refine) text += text_of(*how.refine, summary);
+  return text;
+}
+
+std::string text_of_legs(const Json& legs) {
+  std::string text;
+  for (const Json& leg : legs)
+    text += fmt::format("{}{} {} after {} iterations", text.empty() ? "  legs         " : ", ",
+                        leg.at("goal").get<std::string>(),
+                        leg.at("reached").get<bool>() ? "reached" : "not reached",
+                        leg.at("iterations").get<std::int64_t>());
+  return text + "\n";
+}
+
+std::string text_of_parting(const Json& s) {
+  std::string text;
+  const Json& parted = s.at("parted");
+  const auto mm = [](const Json& m) { return 1e3 * m.get<double>(); };
+  for (const Json& pair : parted.at("pairs"))
+    text += fmt::format(
+        "  start        {} and {} overlapped by {:.3g} mm: parted by {:.3g} and {:.3g} mm, {:.2g} mm apart "
+        "now\n",
+        pair.at("bodies").at(0).get<std::string>(), pair.at("bodies").at(1).get<std::string>(),
+        mm(pair.at("depth_m")), mm(pair.at("moved_m").at(0)), mm(pair.at("moved_m").at(1)),
+        mm(pair.at("gap_m")));
+  return text +
+         fmt::format(
+             "               in {} steps{}; no node was moved by more than {:.2f} % of the robot's size\n",
+             parted.at("steps").get<int>(),
+             s.contains("dynamics")
+                 ? fmt::format(", {:.2f} CPU s", s.at("dynamics").at("parting_cpu_s").get<double>())
+                 : "",
+             100 * parted.at("largest_move_of_robot_size").get<double>());
+}
+
+// Of the motion: what a plan and a simulation tell alike.
+std::string text_of_motion(const Json& s) {
+  std::string volumes;
+  for (const auto& [name, percent] : s.at("largest_volume_change_percent").items())
+    volumes += fmt::format("{}{} {:.2f} %", volumes.empty() ? "" : ", ", name, percent.get<double>());
+  return fmt::format(
+      "  motion       {:.2f} s in {} frames, time step {:.3g} ms\n"
+      "  volume       changes at most: {}\n"
+      "  penetration  at most {:.4f} m, {:.2f} % of the robot's size ({})\n"
+      "  surfaces     overlap at most {:.2f} % ({}), in themselves {:.2f} % ({}), gap where they press "
+      "{:.2f} % "
+      "in the median\n"
+      "  strain       at most {:.3f} ({})\n"
+      "  contact      at most {:.1f} N ({})\n",
+      s.at("motion_s").get<double>(), s.at("frames").get<int>(), 1e3 * s.at("dt_s").get<double>(), volumes,
+      s.at("deepest_penetration_m").get<double>(),
+      100 * s.at("deepest_penetration_of_robot_size").get<double>(),
+      s.at("penetration_between").get<std::string>(),
+      100 * s.at("deepest_overlap_of_robot_size").get<double>(), s.at("overlap_between").get<std::string>(),
+      100 * s.at("deepest_self_overlap_of_robot_size").get<double>(),
+      s.at("self_overlap_of").get<std::string>(),
+      100 * s.at("gap_at_contact").at("median_of_robot_size").get<double>(),
+      s.at("largest_strain").get<double>(), s.at("largest_strain_of").get<std::string>(),
+      s.at("largest_contact_force_n").get<double>(), s.at("contact_between").get<std::string>());
+}
+
+std::string text_of_simulation(const Json& s, const std::string& extra, const fs::path& file) {
+  return fmt::format("{}\n{}{}{}  hashes       trajectory {}\n  file         {}\n",
+                     s.at("explanation").get<std::string>(), s.contains("parted") ? text_of_parting(s) : "",
+                     text_of_motion(s), extra, s.at("trajectory_hash").get<std::string>(), file.string());
+}
+
+std::string text_of_search(const Json& s, const std::string& extra, const fs::path& file) {
+  const Json &t = s.at("statistics"), &d = s.at("dynamics");
+  return fmt::format(
+      "{}\n"
+      "{}{}"
+      "  search       {} iterations, {} nodes, {} diverged, {} rejected, {} ways refused; {:.2f} CPU s, "
+      "{:.2f} s\n"
+      "  memory       {:.1f} kB a node, {:.1f} where nothing is shared with the parent\n"
+      "  dynamics     contact {:.2f} × the force step; a lane takes {:.1f} µs to load, {:.1f} µs to store\n"
+      "{}"
+      "{}"
+      "  hashes       tree {}, trajectory {}\n"
+      "  file         {}\n",
+      s.at("explanation").get<std::string>(), s.contains("parted") ? text_of_parting(s) : "",
+      s.contains("legs") ? text_of_legs(s.at("legs")) : "", t.at("iterations").get<std::int64_t>(),
+      s.at("nodes").get<int>(), t.at("diverged").get<std::int64_t>(), t.at("rejected").get<std::int64_t>(),
+      t.at("refused").get<std::int64_t>(), t.at("cpu_s").get<double>(), t.at("wall_s").get<double>(),
+      1e-3 * s.at("node_bytes").get<double>(), 1e-3 * s.at("node_bytes_unshared").get<double>(),
+      d.at("contact_of_force_step").get<double>(), d.at("load_us").get<double>(),
+      d.at("store_us").get<double>(), text_of_motion(s), extra, s.at("tree_hash").get<std::string>(),
+      s.at("trajectory_hash").get<std::string>(), file.string());
+}
+
+}  // namespace
+
+std::string text_of_beginning(const detail::KeptPlan& kept, const fs::path& from) {
+  if (from.empty()) return "";
+  return fmt::format("  from         frame {} of {}\n", kept.summary.at("from").at("frame").get<int>(),
+                     from.string());
+}
+
+std::string text_of(const detail::KeptPlan& kept, const std::string& more) {
+  if (!kept.measured) return "";
+  const std::string lines = more + text_of(kept.how, kept.summary);
+  return kept.is_simulation ? text_of_simulation(kept.summary, lines, kept.file)
+                            : text_of_search(kept.summary, lines, kept.file);
+}
+
+Outcome outcome_of(const detail::KeptPlan& kept, const std::string& more) {
+  return {kept.reached ? exit_done : exit_no_plan, kept.summary, text_of(kept, more)};
+}
+
+}  // namespace limber::cli

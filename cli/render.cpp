@@ -1,0 +1,55 @@
+#include "limber/detail/film/render.h"
+
+#include <fmt/format.h>
+
+#include "cli/kept_plan.h"
+
+namespace limber::cli {
+
+namespace {
+
+std::string text_of(const detail::TimeTold& time) {
+  std::string text = fmt::format(
+      "{:.1f} s of film show {:.2f} s of the motion, at {}× its speed", time.seconds, time.motion_s,
+      time.slowest == time.quickest ? fmt::format("{:.3g}", time.slowest)
+                                    : fmt::format("{:.2g} to {:.2g}", time.slowest, time.quickest));
+  if (time.left_out_s > 0)
+    text +=
+        fmt::format("; the last {:.2f} s, in which nothing is seen to move, are left out", time.left_out_s);
+  return text + "\n";
+}
+
+std::string text_of(const detail::RenderedFilm& film) {
+  std::string text = fmt::format("{} of {} frames in {}: {} painted, {} kept, {} failed; {:.2f} CPU s\n",
+                                 film.wanted, film.frames, film.folder.string(), film.painted,
+                                 film.wanted - film.painted - film.failed, film.failed, film.cpu_s) +
+                     text_of(film.time);
+  if (film.film)
+    text += fmt::format("film {}, contact sheet {}\n", film.film->string(), film.sheet->string());
+  else if (film.failed == 0)
+    text += "no film yet: not all frames are there\n";
+  return text;
+}
+
+int exit_code_of(const detail::RenderedFilm& film) {
+  return film.failed == 0 ? exit_done : exit_frames_failed;
+}
+
+}  // namespace
+
+Outcome render(const detail::RenderOptions& options) {
+  const detail::RenderedFilm film = detail::render(options);
+  return {exit_code_of(film), json_of(film), text_of(film)};
+}
+
+Outcome run(const detail::PlanOptions& plan_options, const detail::RenderOptions& render_options) {
+  const auto [kept, film] = detail::plan_and_film(plan_options, render_options);
+  Outcome both = outcome_of(kept);
+  if (kept.up_to_date) both.text.clear();
+  if (film.failed > 0) both.exit_code = exit_code_of(film);
+  both.text += text_of(film);
+  both.json = {{"plan", both.json}, {"render", json_of(film)}};
+  return both;
+}
+
+}  // namespace limber::cli

@@ -1,0 +1,47 @@
+// Films of work folders.
+#pragma once
+
+#include "limber/detail/film/shot.h"
+#include "limber/detail/plan/plan.h"
+
+namespace limber::detail {
+
+struct RenderOptions {
+  fs::path folder;
+  std::string frames;   // "1-30,47-327:2"; empty: all
+  std::string chunk;    // "i/n"; empty: 1/1
+  bool resume = false;  // keep the frames that already show what they should
+  std::string size;     // "1920x1080"; empty: the scene's
+  std::string camera = "main";
+  std::vector<std::string> passes;  // of depth, normal, object, scalar
+  int bits = 8;                     // a channel, 8 or 16
+  std::vector<std::string> sets;    // of film, cameras and the looks of bodies
+  // Names frames-NAME/, film-NAME.mp4 and sheet-NAME.png; empty: the camera's, and none for "main".
+  std::string name;
+  std::optional<fs::path> video;  // default film.mp4 in the folder, made when every frame is there
+};
+
+struct RenderedFilm {
+  int frames = 0;  // of the film
+  std::size_t wanted = 0, painted = 0, failed = 0;
+  std::pair<int, int> size_px;
+  std::string camera;
+  TimeTold time;
+  std::string trajectory_hash;
+  double cpu_s = 0;
+  fs::path folder;                      // of the frames
+  std::optional<fs::path> film, sheet;  // where every frame is there
+};
+// A frame that fails does not stop the others. Throws InputError, DiskError, and Interrupted with the frames
+// that are finished kept.
+RenderedFilm render(const RenderOptions&);
+Json json_of(const RenderedFilm&);  // as manifest.json has it
+
+// Plans and films, as far as that is not done.
+struct PlannedFilm {
+  KeptPlan plan;
+  RenderedFilm film;
+};
+PlannedFilm plan_and_film(const PlanOptions&, RenderOptions);
+
+}  // namespace limber::detail
