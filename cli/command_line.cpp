@@ -356,6 +356,7 @@ int run_command_line(int argc, const char* const* argv) {
   GlobalOptions global;
   detail::BatchOptions batch_options;
   detail::PrepareOptions& prepare_options = batch_options.each;
+  std::string format;
   detail::PlanOptions plan_options;
   detail::SimulateOptions simulate_options;
   detail::RenderOptions render_options;
@@ -450,7 +451,7 @@ int run_command_line(int argc, const char* const* argv) {
                   "make shells alone, or the cage alone with its certificate, and nothing else")
       ->check(CLI::IsMember({"shells", "cage"}));
   prepare_command
-      .add_option("--format", prepare_options.format,
+      .add_option("--format", format,
                   "of a model on stdin: the ending that its file would have, as glb; OBJ, OFF, PLY and STL "
                   "mostly need none")
       ->check(CLI::Validator(
@@ -514,9 +515,9 @@ int run_command_line(int argc, const char* const* argv) {
     chosen = [&] {
       const std::vector<std::string>& models = batch_options.models;
       if (models.size() > 1 || detail::is_of_many(models.front())) {
-        if (!prepare_options.format.empty())
+        if (!format.empty())
           throw InputError("--format is of a model on stdin; leave it out, files are named by their endings");
-        return detail::prepare_many(batch_options);
+        return cli::prepare_many(batch_options);
       }
       for (const CLI::Option* option : of_many)
         if (option->count() > 0)
@@ -525,7 +526,7 @@ int run_command_line(int argc, const char* const* argv) {
                           "list or more models",
                           option->get_name(), models.front()));
       prepare_options.model = models.front();
-      return detail::prepare(prepare_options);
+      return cli::prepare(prepare_options, format);
     };
   });
 
@@ -788,8 +789,7 @@ int run_command_line(int argc, const char* const* argv) {
       ->delimiter(',')
       ->allow_extra_args(false);
   add_global(scene_prepare_command, global), add_threads(scene_prepare_command, global);
-  scene_prepare_command.callback(
-      [&] { chosen = [&] { return detail::prepare_scene(scene_prepare_options); }; });
+  scene_prepare_command.callback([&] { chosen = [&] { return cli::prepare_scene(scene_prepare_options); }; });
 
   detail::SceneCheckOptions check_options;
   CLI::App& check_command = *scene_command.add_subcommand(

@@ -1,6 +1,7 @@
 // The subcommands of the program, each as a function from its options to what it prints.
 #pragma once
 
+#include "limber/detail/batch/prepare_many.h"
 #include "limber/detail/commands.h"
 #include "limber/detail/exports/export_motion.h"
 #include "limber/detail/film/render.h"
@@ -8,6 +9,7 @@
 #include "limber/detail/plan/refine.h"
 #include "limber/detail/plan/simulate.h"
 #include "limber/detail/verify/verify.h"
+#include "limber/detail/world/prepare_scene.h"
 
 namespace limber::cli {
 
@@ -17,6 +19,10 @@ using enum detail::ExitCode;
 Outcome export_motion(const detail::ExportOptions&);
 Outcome info(const fs::path& path);
 Outcome list_scenes();
+// `format`: of a model on stdin, the ending that its file would have.
+Outcome prepare(const detail::PrepareOptions&, const std::string& format = {});
+Outcome prepare_many(const detail::BatchOptions&);
+Outcome prepare_scene(const detail::ScenePrepareOptions&);
 Outcome plan(const detail::PlanOptions&);
 Outcome refine(const detail::RefineOptions&);
 Outcome render(const detail::RenderOptions&);

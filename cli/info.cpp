@@ -1,3 +1,4 @@
+#include "cli/body_report.h"
 #include "cli/commands.h"
 #include "core/error.h"
 #include "core/hash.h"
@@ -113,7 +114,7 @@ Outcome info_of_body(const fs::path& folder) {
   const detail::PreparedBody body = detail::read_body(folder);
   Json json = body.report;
   json["shell_list"] = info_of_shells(body, read_obj_shells(folder / "shells.obj"));
-  std::string text = detail::summary_of_report(body.report);
+  std::string text = text_of_report(body.report);
   const auto place = [](const Json& v) {
     return fmt::format("({:8.4g} {:8.4g} {:8.4g})", v[0].get<double>(), v[1].get<double>(),
                        v[2].get<double>());

@@ -1,3 +1,5 @@
+#include "limber/detail/batch/prepare_many.h"
+
 #include <fmt/ranges.h>
 #include <signal.h>
 #include <unistd.h>
@@ -18,10 +20,9 @@
 #include "core/progress.h"
 #include "core/temporary_files.h"
 #include "core/threads.h"
-#include "limber/detail/batch/batch.h"
 #include "limber/detail/batch/limited_process.h"
-#include "limber/detail/body/prepare.h"
 #include "limber/detail/body/preview.h"
+#include "limber/detail/exit_codes.h"
 
 namespace limber::detail {
 
@@ -58,7 +59,7 @@ class Batch {
     store_folder_ = options.each.store.empty() ? out_ / "store" : options.each.store;
   }
 
-  Outcome run() {
+  PreparedMany run() {
     require_agreeing(options_.each);
     const std::vector<ListedModel> listed = list_models(options_.models, {out_, store_folder_});
     make_folder(out_);
@@ -352,45 +353,27 @@ class Batch {
     for (const fs::path& file : others) fs::remove(file);
   }
 
-  Outcome finish() {
+  PreparedMany finish() {
     write_quarantine();
     std::vector<BatchModel> results;
     std::map<Found, int> count;
-    std::map<std::string, int> reasons;
+    PreparedMany prepared;
     for (const Work& work : work_) {
       results.push_back(work.result);
       ++count[work.found];
-      if (!work.result.reason.empty()) ++reasons[work.result.reason];
+      if (work.result.reason.empty()) continue;
+      ++prepared.reasons[work.result.reason];
+      prepared.not_prepared.push_back(work.result);
     }
     write_tables(out_, results, *journal_);
     write_pages(out_, results);
-    const int failed = count[Found::failed] + count[Found::failed_before], models = int(work_.size());
-    Json json{{"models", models},
-              {"done", models - failed},
-              {"made", count[Found::made]},
-              {"in_store", count[Found::in_store]},
-              {"up_to_date", count[Found::up_to_date]},
-              {"failed", failed},
-              {"failed_before", count[Found::failed_before]},
-              {"reasons", reasons},
-              {"manifest", (out_ / "manifest.jsonl").string()},
-              {"table", (out_ / "manifest.csv").string()},
-              {"page", (out_ / "index.html").string()}};
-    std::string text;
-    for (const Work& work : work_)
-      if (!work.result.reason.empty())
-        text += fmt::format("{:8} {}: {}\n", work.result.reason, work.result.model.name, work.result.message);
-    text += fmt::format("{} models: {} done ({} made, {} from the store, {} up to date), {} failed", models,
-                        models - failed, count[Found::made], count[Found::in_store], count[Found::up_to_date],
-                        failed);
-    std::vector<std::string> parts;
-    for (const auto& [reason, number] : reasons) parts.push_back(fmt::format("{} {}", number, reason));
-    if (count[Found::failed_before] > 0)
-      parts.push_back(
-          fmt::format("{} as before, --retry-failed tries them again", count[Found::failed_before]));
-    if (!parts.empty()) text += fmt::format(" ({})", fmt::join(parts, ", "));
-    text += fmt::format("; {}\n", (out_ / "index.html").string());
-    return {failed > 0 ? exit_models_failed : exit_done, json, text};
+    prepared.models = int(work_.size());
+    prepared.made = count[Found::made], prepared.in_store = count[Found::in_store];
+    prepared.up_to_date = count[Found::up_to_date];
+    prepared.failed = count[Found::failed], prepared.failed_before = count[Found::failed_before];
+    prepared.manifest = out_ / "manifest.jsonl", prepared.table = out_ / "manifest.csv";
+    prepared.page = out_ / "index.html";
+    return prepared;
   }
 
   const BatchOptions& options_;
@@ -405,6 +388,6 @@ class Batch {
 
 }  // namespace
 
-Outcome prepare_many(const BatchOptions& options) { return Batch(options).run(); }
+PreparedMany prepare_many(const BatchOptions& options) { return Batch(options).run(); }
 
 }  // namespace limber::detail

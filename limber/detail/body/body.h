@@ -138,7 +138,4 @@ void deform(const PreparedBody&, const Points& cage_positions, Points& surface_p
 void deform(const PreparedBody&, const ffd::Binding& part, const Points& cage_positions,
             Points& surface_positions);
 
-// The figures of a report as a few lines.
-std::string summary_of_report(const Json& report);
-
 }  // namespace limber::detail

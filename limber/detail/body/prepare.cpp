@@ -1,58 +1,17 @@
 #include "limber/detail/body/prepare.h"
 
 #include <fmt/format.h>
-#include <unistd.h>
 
-#include <cerrno>
-#include <cstring>
 #include <iterator>
 
 #include "core/error.h"
 #include "core/mesh_files.h"
-#include "core/progress.h"
 #include "imaging/surface_nets.h"
 #include "limber/detail/body/export.h"
 #include "limber/detail/body/model_content.h"
 #include "limber/detail/body/preview.h"
 
 namespace limber::detail {
-
-namespace {
-
-// What comes on stdin, as a file for as long as this lives.
-class ModelOnStdin {
- public:
-  explicit ModelOnStdin(const std::string& format)
-      : file_((fs::temp_directory_path() / "limber-XXXXXX/stdin").string()) {
-    std::string folder = file_.parent_path().string();
-    if (!::mkdtemp(folder.data()))
-      throw DiskError(fmt::format("{}: a folder in it cannot be made: {}", fs::temp_directory_path().string(),
-                                  std::strerror(errno)));
-    file_ = fs::path(folder) / (format.empty() ? "stdin" : "stdin." + format);
-    FileWriter writer(file_);
-    char buffer[1 << 16];
-    for (ssize_t got; (got = ::read(STDIN_FILENO, buffer, sizeof buffer)) != 0;) {
-      throw_if_stopped();
-      if (got < 0 && errno == EINTR) continue;
-      if (got < 0) throw InputError(fmt::format("stdin: reading failed: {}", std::strerror(errno)));
-      writer.append({buffer, std::size_t(got)});
-    }
-    if (writer.size() == 0) throw InputError("stdin: holds nothing; give a model's bytes, or name a file");
-    writer.commit();
-  }
-  ~ModelOnStdin() {
-    std::error_code ignored;
-    fs::remove_all(file_.parent_path(), ignored);
-  }
-  ModelOnStdin(const ModelOnStdin&) = delete;
-  ModelOnStdin& operator=(const ModelOnStdin&) = delete;
-  const fs::path& file() const { return file_; }
-
- private:
-  fs::path file_;
-};
-
-}  // namespace
 
 void require_agreeing(const PrepareOptions& options) {
   if (options.concavity > 0 && options.threshold > 0)
@@ -130,24 +89,18 @@ BodySource source_of(const PrepareOptions& options, const fs::path& file) {
   return source;
 }
 
-Outcome prepare(const PrepareOptions& options) {
+PreparedModel prepare(const PrepareOptions& options, const fs::path& file) {
   require_agreeing(options);
-  std::optional<ModelOnStdin> on_stdin;
-  if (options.model == "-")
-    on_stdin.emplace(options.format);
-  else if (!options.format.empty())
-    throw InputError("--format is of a model on stdin; name the model - or leave it out");
   std::optional<BodyStore> store;
   if (!options.store.empty()) store.emplace(options.store);
 
-  const BodySource source = source_of(options, on_stdin ? on_stdin->file() : options.model);
-  const PrepareSettings settings = settings_of(options);
-  Json report = prepare_body(source, settings, options.out, store ? &*store : nullptr);
-  std::string text = summary_of_report(report);
-  std::vector<std::string> written;
+  const BodySource source = source_of(options, file);
+  PreparedModel prepared{prepare_body(source, settings_of(options), options.out, store ? &*store : nullptr),
+                         {}};
+  std::vector<std::string>& written = prepared.also_written;
   if (options.picture) {
     if (!has_picture(options.out)) write_picture(options.out);
-    if (store) store->keep(BodyStore::key_of(source, report.at("input")), options.out);
+    if (store) store->keep(BodyStore::key_of(source, prepared.report.at("input")), options.out);
     written.push_back(picture_file);
   }
   if (!options.exports.empty() || options.preview) {
@@ -160,10 +113,7 @@ Outcome prepare(const PrepareOptions& options) {
       written.insert(written.end(), std::begin(preview_files), std::end(preview_files));
     }
   }
-  if (written.empty()) return {exit_done, report, text};
-  report["also_written"] = written;
-  text += fmt::format("  also         {}\n", fmt::join(written, ", "));
-  return {exit_done, report, text};
+  return prepared;
 }
 
 }  // namespace limber::detail
