@@ -582,7 +582,7 @@ int run_command_line(int argc, const char* const* argv) {
       still_options.scene.scene = render_options.folder.string();
       still_options.scene.sets = render_options.sets;
       still_options.camera = render_options.camera, still_options.size = render_options.size;
-      return detail::render_still(still_options);
+      return cli::render_still(still_options);
     };
   });
 
@@ -811,7 +811,7 @@ int run_command_line(int argc, const char* const* argv) {
                   "pixels of the still, 16x16 … 8192x8192; default: the scene's")
       ->type_name("WxH");
   add_global(check_command, global), add_threads(check_command, global);
-  check_command.callback([&] { chosen = [&] { return detail::check_scene(check_options); }; });
+  check_command.callback([&] { chosen = [&] { return cli::check_scene(check_options); }; });
 
   CLI::App& scenes_command = *program.add_subcommand("scenes", "the scenes that come with limber");
   add_global(scenes_command, global);

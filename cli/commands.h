@@ -1,10 +1,12 @@
 // The subcommands of the program, each as a function from its options to what it prints.
 #pragma once
 
+#include "limber/detail/authoring/scene_check.h"
 #include "limber/detail/batch/prepare_many.h"
 #include "limber/detail/commands.h"
 #include "limber/detail/exports/export_motion.h"
 #include "limber/detail/film/render.h"
+#include "limber/detail/film/start.h"
 #include "limber/detail/plan/plan.h"
 #include "limber/detail/plan/refine.h"
 #include "limber/detail/plan/simulate.h"
@@ -16,6 +18,8 @@ namespace limber::cli {
 using detail::Outcome;
 using enum detail::ExitCode;
 
+// Exit code 2, with all that is wrong, where it cannot even be simulated.
+Outcome check_scene(const detail::SceneCheckOptions&);
 Outcome export_motion(const detail::ExportOptions&);
 Outcome info(const fs::path& path);
 Outcome list_scenes();
@@ -25,6 +29,7 @@ Outcome prepare_many(const detail::BatchOptions&);
 Outcome prepare_scene(const detail::ScenePrepareOptions&);
 Outcome plan(const detail::PlanOptions&);
 Outcome refine(const detail::RefineOptions&);
+Outcome render_still(const detail::StillOptions&);
 Outcome render(const detail::RenderOptions&);
 Outcome report(const fs::path& folder, const std::optional<fs::path>& file = {});
 // plan and render; what is up to date is skipped.

@@ -21,24 +21,6 @@ struct Outcome {
   std::string text;  // what is printed otherwise
 };
 
-// The start of a scene, before any plan.
-struct StillOptions {
-  SceneOptions scene;
-  std::string camera = "main", size;  // as of RenderOptions
-  std::optional<fs::path> out;        // a PNG; default: the scene's name
-};
-Outcome render_still(const StillOptions&);
-
-struct SceneCheckOptions {
-  SceneOptions scene;
-  std::string preset;             // empty: the scene's
-  std::optional<fs::path> work;   // a work folder: bodies are prepared there, and a search is tried
-  std::optional<fs::path> still;  // a PNG of the start
-  std::string camera = "main", size;
-};
-// What can be said of a scene before it is planned; exit code 2 with all that is wrong where it cannot be.
-Outcome check_scene(const SceneCheckOptions&);
-
 // Scenes × seeds × presets, each planned as `plan` would, one record a run. docs/bench.md.
 struct BenchOptions {
   std::vector<std::string> scenes;  // files, or names of scenes that come with limber
@@ -82,7 +64,5 @@ struct NewSceneOptions {
   std::string goal = "front";  // or back, left, right, up, down
 };
 Outcome new_scene(const NewSceneOptions&);
-
-Outcome info_of_scene(const fs::path& file);
 
 }  // namespace limber::detail

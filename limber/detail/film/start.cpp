@@ -5,8 +5,11 @@
 #include <chrono>
 
 #include "core/error.h"
+#include "core/progress.h"
+#include "limber/detail/film/frame_list.h"
 #include "limber/detail/film/shot.h"
 #include "render/png_file.h"
+#include "scenes/library.h"
 
 namespace limber::detail {
 
@@ -120,6 +123,21 @@ double write_still(const Start& start, const std::string& camera, std::pair<int,
       },
       picture.frame);
   return seconds;
+}
+
+WrittenStill render_still(const StillOptions& options) {
+  const fs::path file = scenes::find_scene(options.scene.scene);
+  const scenes::Scene scene = scenes::read_scene_file(file, options.scene.sets);
+  const fs::path still = options.out.value_or(scene.name + ".png");
+  const auto size =
+      options.size.empty() ? std::pair(scene.film.width_px, scene.film.height_px) : parse_size(options.size);
+  std::vector<LoadedModel> models;
+  for (const scenes::BodySpec& body : scene.bodies) {
+    throw_if_stopped();
+    models.push_back(load_model(scene, body, options.scene.data));
+  }
+  write_still(loaded_start(scene, models, options.scene.data), options.camera, size, still);
+  return {still, size};
 }
 
 }  // namespace limber::detail

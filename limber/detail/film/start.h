@@ -1,6 +1,7 @@
 // The start of a scene, before there is a plan: what a check looks at and a still shows.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -31,5 +32,17 @@ Start loaded_start(const scenes::Scene&, const std::vector<LoadedModel>&, const 
 // `file` does not end in .png, or as Shot does.
 double write_still(const Start&, const std::string& camera, std::pair<int, int> size_px,
                    const fs::path& file);
+
+// The start of a scene, before any plan.
+struct StillOptions {
+  SceneOptions scene;
+  std::string camera = "main", size;  // as of RenderOptions
+  std::optional<fs::path> out;        // a PNG; default: the scene's name
+};
+struct WrittenStill {
+  fs::path file;
+  std::pair<int, int> size_px;
+};
+WrittenStill render_still(const StillOptions&);
 
 }  // namespace limber::detail
