@@ -621,7 +621,7 @@ int run_command_line(int argc, const char* const* argv) {
       "bench", "many runs: scenes × seeds × presets → a record a run, a table; what is done is skipped");
   add_bench(bench_command, bench_options);
   add_global(bench_command, global), add_threads(bench_command, global), add_progress(bench_command, global);
-  bench_command.callback([&] { chosen = [&] { return detail::bench(bench_options); }; });
+  bench_command.callback([&] { chosen = [&] { return cli::bench(bench_options); }; });
 
   CLI::App& verify_command =
       *program.add_subcommand("verify", "replays the plan bit for bit, checks every promise, prints a table");
@@ -684,7 +684,7 @@ int run_command_line(int argc, const char* const* argv) {
   robust_command.add_flag("--follow", robust_options.follow,
                           "also follow the plan's path by feedback in the same worlds under the same errors");
   add_global(robust_command, global), add_threads(robust_command, global);
-  robust_command.callback([&] { chosen = [&] { return detail::robust(robust_options); }; });
+  robust_command.callback([&] { chosen = [&] { return cli::robust(robust_options); }; });
 
   detail::RefineOptions refine_options;
   CLI::App& refine_command =
@@ -772,7 +772,7 @@ int run_command_line(int argc, const char* const* argv) {
         ->check(CLI::IsMember({"+x", "-x", "+y", "-y", "+z", "-z"}))
         ->capture_default_str();
   add_global(new_command, global);
-  new_command.callback([&] { chosen = [&] { return detail::new_scene(new_options); }; });
+  new_command.callback([&] { chosen = [&] { return cli::new_scene(new_options); }; });
 
   detail::ScenePrepareOptions scene_prepare_options;
   CLI::App& scene_prepare_command = *scene_command.add_subcommand(

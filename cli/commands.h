@@ -1,40 +1,58 @@
 // The subcommands of the program, each as a function from its options to what it prints.
 #pragma once
 
+#include <optional>
+#include <string>
+
+#include "core/json.h"
+#include "limber/detail/authoring/new_scene.h"
 #include "limber/detail/authoring/scene_check.h"
 #include "limber/detail/batch/prepare_many.h"
-#include "limber/detail/commands.h"
+#include "limber/detail/bench/bench.h"
+#include "limber/detail/exit_codes.h"
 #include "limber/detail/exports/export_motion.h"
 #include "limber/detail/film/render.h"
 #include "limber/detail/film/start.h"
 #include "limber/detail/plan/plan.h"
 #include "limber/detail/plan/refine.h"
 #include "limber/detail/plan/simulate.h"
+#include "limber/detail/verify/robustness.h"
 #include "limber/detail/verify/verify.h"
 #include "limber/detail/world/prepare_scene.h"
 
 namespace limber::cli {
 
-using detail::Outcome;
 using enum detail::ExitCode;
 
-// Exit code 2, with all that is wrong, where it cannot even be simulated.
-Outcome check_scene(const detail::SceneCheckOptions&);
-Outcome export_motion(const detail::ExportOptions&);
-Outcome info(const fs::path& path);
-Outcome list_scenes();
+struct Outcome {
+  int exit_code = exit_done;
+  Json json;         // what --json prints
+  std::string text;  // what is printed otherwise
+};
+
 // `format`: of a model on stdin, the ending that its file would have.
 Outcome prepare(const detail::PrepareOptions&, const std::string& format = {});
 Outcome prepare_many(const detail::BatchOptions&);
 Outcome prepare_scene(const detail::ScenePrepareOptions&);
+
 Outcome plan(const detail::PlanOptions&);
+Outcome simulate(const detail::SimulateOptions&);
 Outcome refine(const detail::RefineOptions&);
-Outcome render_still(const detail::StillOptions&);
 Outcome render(const detail::RenderOptions&);
-Outcome report(const fs::path& folder, const std::optional<fs::path>& file = {});
 // plan and render; what is up to date is skipped.
 Outcome run(const detail::PlanOptions&, const detail::RenderOptions&);
-Outcome simulate(const detail::SimulateOptions&);
+Outcome export_motion(const detail::ExportOptions&);
+
 Outcome verify(const detail::VerifyOptions&);
+Outcome robust(const detail::RobustOptions&);
+Outcome report(const fs::path& folder, const std::optional<fs::path>& file = {});
+Outcome bench(const detail::BenchOptions&);
+
+Outcome new_scene(const detail::NewSceneOptions&);
+// Exit code 2, with all that is wrong, where it cannot even be simulated.
+Outcome check_scene(const detail::SceneCheckOptions&);
+Outcome render_still(const detail::StillOptions&);
+Outcome info(const fs::path& path);
+Outcome list_scenes();
 
 }  // namespace limber::cli

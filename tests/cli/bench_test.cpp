@@ -9,6 +9,7 @@
 #include <set>
 #include <sstream>
 
+#include "cli/bench_table.h"
 #include "core/progress.h"
 #include "plan/plan_file.h"
 #include "tests/cli/program.h"
@@ -92,7 +93,7 @@ TEST(BenchReport, UnsolvedRunsCountInTheSearchAndNotInTheMotion) {
   EXPECT_EQ(robot.at("largest_percent"), 4);
   EXPECT_EQ(robot.at("frames"), 200);
   EXPECT_EQ(robot.at("within_3_percent"), 91 + 92);
-  const std::string text = text_of_report(report);
+  const std::string text = cli::text_of_benchmark(report);
   for (const char* words : {"2/3", "15 20 60", "91.50", "fast: not solved with seeds 3"})
     EXPECT_NE(text.find(words), std::string::npos) << words << " in\n" << text;
 }

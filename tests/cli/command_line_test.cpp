@@ -16,7 +16,7 @@
 #include "core/progress.h"
 #include "limber/detail/body/body.h"
 #include "limber/detail/body/preview.h"
-#include "limber/detail/commands.h"
+#include "limber/detail/exit_codes.h"
 #include "render/png_file.h"
 #include "tests/cli/program.h"
 #include "tests/places.h"

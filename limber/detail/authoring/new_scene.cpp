@@ -1,3 +1,5 @@
+#include "limber/detail/authoring/new_scene.h"
+
 // A scene to begin with, from a folder of models in one frame: what a producer of scenes edits further.
 #include <fmt/ranges.h>
 
@@ -13,7 +15,6 @@
 #include "limber/detail/authoring/layout.h"
 #include "limber/detail/authoring/line_of_sight.h"
 #include "limber/detail/authoring/part_models.h"
-#include "limber/detail/commands.h"
 #include "limber/detail/world/scene_world.h"
 #include "meshing/cage.h"
 #include "meshing/contact_shape.h"
@@ -429,8 +430,8 @@ scenes::Scene laid_out(const NewSceneOptions& options, const std::vector<Organ>&
 namespace {
 
 // `where` is how the scene calls the folder: its models' names begin with that.
-Outcome scene_of_folder(const NewSceneOptions& options, const std::string& where,
-                        std::vector<std::string> notes) {
+NewScene scene_of_folder(const NewSceneOptions& options, const std::string& where,
+                         std::vector<std::string> notes) {
   std::vector<Organ> organs = read_organs(options);
   std::vector<std::string> deformable;
   for (Organ& organ : organs) {
@@ -453,32 +454,20 @@ Outcome scene_of_folder(const NewSceneOptions& options, const std::string& where
   const double scale = come_apart(options, organs);
   const scenes::Scene scene = laid_out(options, organs, scale);
   write_file(options.out, scene.text);
-  const std::string next =
-      fmt::format("limber run {}{} -o DIR", options.out.string(),
-                  where.empty() ? fmt::format(" --data {}", options.from.string()) : std::string());
-  Json moved_m = Json::object();
-  std::string text = fmt::format("{}: {} bodies at {:g} of their size, {} only seen\n", options.out.string(),
-                                 scene.bodies.size(), scale, scene.scenery.size());
+  NewScene made{.file = options.out,
+                .bodies = scene.bodies.size(),
+                .scenery = scene.scenery.size(),
+                .scale = scale,
+                .moved_m = {},
+                .notes = std::move(notes),
+                .data = where.empty() ? options.from : fs::path()};
   for (const Organ& organ : organs)
-    if (const double way = organ.way_m.norm(); way > 0) {
-      moved_m[organ.name] = way;
-      text += fmt::format("  {} stands {:.1f} mm off its true place\n", organ.name, 1e3 * way);
-    }
-  for (const std::string& note : notes) text += fmt::format("  {}\n", note);
-  text += fmt::format("next: {}\n", next);
-  return {exit_done,
-          {{"scene", options.out.string()},
-           {"bodies", scene.bodies.size()},
-           {"scenery", scene.scenery.size()},
-           {"scale", scale},
-           {"moved_m", moved_m},
-           {"notes", notes},
-           {"next", next}},
-          text};
+    if (const double way = organ.way_m.norm(); way > 0) made.moved_m.emplace_back(organ.name, way);
+  return made;
 }
 
 // Models are made beside the scene, which is then of those.
-Outcome scene_of_parts(NewSceneOptions options) {
+NewScene scene_of_parts(NewSceneOptions options) {
   const NewSceneOptions usual;
   if (options.scale != usual.scale || options.up != usual.up || options.front != usual.front)
     throw InputError(
@@ -499,7 +488,7 @@ Outcome scene_of_parts(NewSceneOptions options) {
 
 }  // namespace
 
-Outcome new_scene(const NewSceneOptions& options) {
+NewScene new_scene(const NewSceneOptions& options) {
   if (fs::exists(options.out))
     throw InputError(
         fmt::format("{}: is there already; choose another name, or remove it", options.out.string()));

@@ -17,10 +17,9 @@
 #include "core/temporary_files.h"
 #include "core/threads.h"
 #include "core/version.h"
-#include "limber/detail/commands.h"
 #include "limber/detail/film/frame_list.h"
 #include "limber/detail/plan/diagnosis.h"
-#include "limber/detail/plan/plan_folder.h"
+#include "limber/detail/plan/plan.h"
 #include "limber/detail/world/analysis.h"
 #include "limber/detail/world/scene_world.h"
 
@@ -219,7 +218,7 @@ std::vector<fs::path> write_ompl_logs(const RunRecords& records, const fs::path&
 
 }  // namespace
 
-Outcome bench(const BenchOptions& options) {
+Benchmark bench(const BenchOptions& options) {
   if (options.merge.empty()) {
     if (options.scenes.empty()) throw InputError("bench: name one scene at least, or folders with --merge");
     if (options.out.empty()) throw InputError("bench: say with -o where the records go");
@@ -239,27 +238,19 @@ Outcome bench(const BenchOptions& options) {
   }
   const RunRecords records =
       read_records(options.merge.empty() ? std::vector<fs::path>{options.out} : options.merge);
-  Json report = report_of(records);
-  std::string text = text_of_report(report);
+  Benchmark benchmark{
+      .report = report_of(records), .runs = records.size(), .records = {}, .page = {}, .ompl_logs = {}};
   // Machines that share a folder would write this file at the same time; --merge makes it for them.
   if (!options.out.empty() && options.chunk.empty()) {
     make_folder(options.out);
     std::string lines;
     for (const Json& record : records) lines += text_of(record) + "\n";
-    write_file(options.out / "runs.jsonl", lines);
-    write_file(options.out / "bench.html", page_of_bench(records, report));
-    report["runs"] = (options.out / "runs.jsonl").string();
-    report["page"] = (options.out / "bench.html").string();
-    text += fmt::format("{} runs in {}, curves and tables in {}\n", records.size(),
-                        (options.out / "runs.jsonl").string(), (options.out / "bench.html").string());
+    benchmark.records = options.out / "runs.jsonl", benchmark.page = options.out / "bench.html";
+    write_file(*benchmark.records, lines);
+    write_file(*benchmark.page, page_of_bench(records, benchmark.report));
   }
-  if (options.ompl_log) {
-    for (const fs::path& file : write_ompl_logs(records, *options.ompl_log)) {
-      report["ompl_logs"].push_back(file.string());
-      text += fmt::format("OMPL's log {}\n", file.string());
-    }
-  }
-  return {exit_done, report, text};
+  if (options.ompl_log) benchmark.ompl_logs = write_ompl_logs(records, *options.ompl_log);
+  return benchmark;
 }
 
 }  // namespace limber::detail

@@ -1,6 +1,10 @@
-// What a benchmark of many runs says: records, their quartiles, a table, OMPL's benchmark log. docs/bench.md.
+// Benchmarks of many runs, and what they say: records, their quartiles, a table, OMPL's benchmark log.
+// docs/bench.md.
 #pragma once
 
+#include <cstdint>
+#include <limits>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -8,6 +12,36 @@
 #include "core/json.h"
 
 namespace limber::detail {
+
+// Scenes × seeds × presets, each planned as `plan` would, one record a run. docs/bench.md.
+struct BenchOptions {
+  std::vector<std::string> scenes;  // files, or names of scenes that come with limber
+  std::vector<std::string> sets;
+  std::vector<fs::path> data;
+  fs::path store;  // as of SceneOptions
+  std::string seeds = "1-30";
+  std::vector<std::string> presets;  // empty: each scene's own
+  std::optional<std::int64_t> iterations;
+  double time_limit_s = std::numeric_limits<double>::infinity();  // of a run
+  int in_flight = 0;
+  std::string chunk;                 // "i/n": the i-th of n parts of the runs; empty: all
+  std::vector<fs::path> merge;       // nothing is run: folders whose records make one table
+  fs::path out;                      // may be empty with `merge`
+  std::optional<fs::path> ompl_log;  // also OMPL's benchmark log
+};
+struct Benchmark {
+  Json report;  // of all records, as report_of has it
+  std::size_t runs = 0;
+  std::optional<fs::path> records, page;  // where this call wrote them
+  std::vector<fs::path> ompl_logs;
+};
+// Runs what is missing. Throws InputError, DiskError, and Interrupted with the finished runs kept.
+Benchmark bench(const BenchOptions&);
+
+// Of the frames of solved runs those within so many per cent of a body's volume are counted, under such a
+// key.
+inline constexpr double volume_limits_percent[] = {3, 5, 6, 10};
+std::string within_key(double percent);
 
 // Each is one run, as docs/bench.md describes it; ordered by scene, preset and seed, each of these once.
 using RunRecords = std::vector<Json>;
@@ -25,7 +59,6 @@ Quartiles quartiles(std::vector<double> values);
 // A group for each scene and preset. Iterations and times are of all its runs, an unsolved one with what it
 // took; duration, volumes, penetration, inversions and forces are of the solved ones.
 Json report_of(const RunRecords&);
-std::string text_of_report(const Json& report);
 
 // One page in HTML: the tables, and for each scene the share of its runs that are solved over iterations and
 // over CPU time.

@@ -1,3 +1,5 @@
+#include "limber/detail/verify/robustness.h"
+
 #include <algorithm>
 #include <cmath>
 #include <map>
@@ -5,7 +7,6 @@
 #include "core/error.h"
 #include "core/progress.h"
 #include "core/random.h"
-#include "limber/detail/commands.h"
 #include "limber/detail/plan/plan_folder.h"
 #include "limber/detail/verify/promises.h"
 #include "limber/detail/verify/verify_plan.h"
@@ -23,19 +24,6 @@ namespace {
 constexpr int most_worlds = 4;
 // Streams of random numbers: worlds, and after them perturbations of forces.
 constexpr std::uint64_t first_world_stream = std::uint64_t(1) << 61;
-
-// What became of one perturbed replay.
-struct Fate {
-  int world = 0;
-  bool reaches = false;
-  const char* end = "";
-  double distance_m = 0, speed_m_s = 0, duration_s = 0;
-  Vec3 end_center_m = Vec3::Zero();
-  double volume_change = 0, penetration_m = 0;
-  double least_stretch = 1, largest_stretch = 1, overlap_m = 0, self_overlap_m = 0;
-  double asked_n = 0, force_n = 0;  // the largest that a control asked for, and that acted
-  std::vector<std::string> broken;  // of the promises that `limber verify` looks at
-};
 
 double factor(Rng& rng, double share) { return 1 + share * rng.uniform(-1, 1); }
 
@@ -182,38 +170,6 @@ std::vector<Fate> replay(const Planned& planned, const RobustOptions& options, b
   return fates;
 }
 
-Json json_of(const Fate& f) {
-  return {{"world", f.world},
-          {"reaches", f.reaches},
-          {"end", f.end},
-          {"distance_m", f.distance_m},
-          {"speed_m_s", f.speed_m_s},
-          {"duration_s", f.duration_s},
-          {"end_center_m", {f.end_center_m.x(), f.end_center_m.y(), f.end_center_m.z()}},
-          {"largest_volume_change_percent", 100 * f.volume_change},
-          {"deepest_penetration_m", f.penetration_m},
-          {"least_stretch", f.least_stretch},
-          {"largest_stretch", f.largest_stretch},
-          {"deepest_overlap_m", f.overlap_m},
-          {"deepest_self_overlap_m", f.self_overlap_m},
-          {"largest_force_asked_n", f.asked_n},
-          {"largest_force_n", f.force_n},
-          {"broken_promises", f.broken}};
-}
-
-}  // namespace
-
-namespace {
-
-// The same worlds and errors, followed or open loop.
-struct Tally {
-  std::vector<Fate> fates;
-  int reached = 0, keep_all = 0;
-  double spread_m = 0, farthest_m = 0;
-  Fate worst;  // of each figure
-  std::map<std::string, int> broken;
-};
-
 Tally tally_of(std::vector<Fate> fates, const Vec3& planned_end) {
   Tally tally;
   Fate& worst = tally.worst;
@@ -236,63 +192,9 @@ Tally tally_of(std::vector<Fate> fates, const Vec3& planned_end) {
   return tally;
 }
 
-Json json_of(const Tally& tally) {
-  const Fate& worst = tally.worst;
-  Json rows = Json::array();
-  for (const Fate& fate : tally.fates) rows.push_back(json_of(fate));
-  return {{"reached", tally.reached},
-          {"share_reached", double(tally.reached) / double(tally.fates.size())},
-          {"end_spread_m", tally.spread_m},
-          {"end_farthest_m", tally.farthest_m},
-          {"largest_volume_change_percent", 100 * worst.volume_change},
-          {"deepest_penetration_m", worst.penetration_m},
-          {"least_stretch", worst.least_stretch},
-          {"largest_stretch", worst.largest_stretch},
-          {"deepest_overlap_m", worst.overlap_m},
-          {"deepest_self_overlap_m", worst.self_overlap_m},
-          {"largest_force_asked_n", worst.asked_n},
-          {"largest_force_n", worst.force_n},
-          {"keep_all_promises", tally.keep_all},
-          {"broken_promises", tally.broken},
-          {"replays", rows}};
-}
-
-std::string text_of(const Tally& tally, const RobustOptions& options, const plan::Settings& settings) {
-  std::string text =
-      "  world  end                      from the goal  speed       lasts   volume  stretch      overlap   "
-      "penetration  force    promises\n";
-  for (const Fate& f : tally.fates)
-    text += fmt::format(
-        "  {:5}  {:23}  {:8.3f} m     {:.4f} m/s  {:5.2f} s  {:5.2f} %  {:.2f} … {:.2f}  {:.4f} m  {:.4f} m  "
-        "   "
-        "{:5.4g} N  {}\n",
-        f.world, f.end, f.distance_m, f.speed_m_s, f.duration_s, 100 * f.volume_change, f.least_stretch,
-        f.largest_stretch, std::max(f.overlap_m, f.self_overlap_m), f.penetration_m, f.asked_n,
-        f.broken.empty() ? "kept" : fmt::format("{} broken", f.broken.size()));
-  const Fate& worst = tally.worst;
-  text += fmt::format(
-      "{} of {} {} in the goal (materials ± {:g} %, forces ± {:g} %, turned by up to {:g} degrees, "
-      "seed {})\n"
-      "  end          {:.3f} m from the plan's (root mean square), at most {:.3f} m\n"
-      "  volume       changes by at most {:.2f} %\n"
-      "  stretch      within {:.3f} and {:.3f}\n"
-      "  surfaces     overlap at most {:.4f} m, in themselves {:.4f} m\n"
-      "  penetration  at most {:.4f} m\n"
-      "  force        asked for at most {:.4g} of {:.4g} N; what acted {:.4g} N\n"
-      "  promises     all kept in {} of {}\n",
-      tally.reached, tally.fates.size(), settings.settle.max_duration_s > 0 ? "come to rest" : "end",
-      100 * options.material_share, 100 * options.force_share, options.force_deg, options.seed,
-      tally.spread_m, tally.farthest_m, 100 * worst.volume_change, worst.least_stretch, worst.largest_stretch,
-      worst.overlap_m, worst.self_overlap_m, worst.penetration_m, worst.asked_n, settings.max_force_n,
-      worst.force_n, tally.keep_all, tally.fates.size());
-  for (const auto& [promise, times] : tally.broken)
-    text += fmt::format("    broken in {}: {}\n", times, promise);
-  return text;
-}
-
 }  // namespace
 
-Outcome robust(const RobustOptions& options) {
+Robustness robust(const RobustOptions& options) {
   const NothingToKeep nothing_to_keep;
   const PlanFolder planned = read_folder_from_the_start(options.folder, "limber robust");
   if (!planned.plan.solved())
@@ -320,21 +222,12 @@ Outcome robust(const RobustOptions& options) {
     }
     return tally_of(std::move(fates), planned_end);
   };
-  const Tally open_loop = tally(false);
-  Json json{{"perturbations", n},
-            {"seed", options.seed},
-            {"material_share", options.material_share},
-            {"force_share", options.force_share},
-            {"force_deg", options.force_deg},
-            {"max_force_n", planned.plan.settings.max_force_n}};
-  json.update(json_of(open_loop));
-  std::string text = text_of(open_loop, options, planned.plan.settings);
-  if (options.follow) {
-    const Tally followed = tally(true);
-    json["followed"] = json_of(followed);
-    text = "open loop\n" + text + "followed\n" + text_of(followed, options, planned.plan.settings);
-  }
-  return {exit_done, json, text};
+  Robustness result{.open_loop = tally(false),
+                    .followed = {},
+                    .max_force_n = planned.plan.settings.max_force_n,
+                    .settles = planned.plan.settings.settle.max_duration_s > 0};
+  if (options.follow) result.followed = tally(true);
+  return result;
 }
 
 }  // namespace limber::detail

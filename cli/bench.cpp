@@ -1,0 +1,27 @@
+#include "limber/detail/bench/bench.h"
+
+#include <fmt/format.h>
+
+#include "cli/bench_table.h"
+#include "cli/commands.h"
+
+namespace limber::cli {
+
+Outcome bench(const detail::BenchOptions& options) {
+  detail::Benchmark benchmark = detail::bench(options);
+  Json& report = benchmark.report;
+  std::string text = text_of_benchmark(report);
+  if (benchmark.records) {
+    report["runs"] = benchmark.records->string();
+    report["page"] = benchmark.page->string();
+    text += fmt::format("{} runs in {}, curves and tables in {}\n", benchmark.runs,
+                        benchmark.records->string(), benchmark.page->string());
+  }
+  for (const fs::path& log : benchmark.ompl_logs) {
+    report["ompl_logs"].push_back(log.string());
+    text += fmt::format("OMPL's log {}\n", log.string());
+  }
+  return {exit_done, report, text};
+}
+
+}  // namespace limber::cli
