@@ -1,11 +1,13 @@
-# limber_module(NAME SOURCES … [CGAL_SOURCES …] [USES module …] [OPENS module …] [LINKS target …]
-#               [OWNS include-prefix …])
+# limber_module(NAME SOURCES … [CGAL_SOURCES …] [USES module …] [OPENS module …] [OF_CORE header …] [ROOMS folder …]
+#               [LINKS target …] [OWNS include-prefix …])
 #
 # A static library limber_NAME. USES are the modules whose public headers it may include (core always), OPENS those
-# whose detail/ it may include, too; OWNS are the prefixes of third-party headers that only this module's .cpp files may
-# include. CGAL_SOURCES are compiled one at a time. The ctest `layering` reads what is said here and every #include in the tree.
+# whose detail/ it may include, too; OF_CORE, where it is given, all headers of core that it may include. ROOMS are the
+# folders of its detail/, each of which may include those before it. OWNS are the prefixes of third-party headers that
+# only this module's .cpp files may include. CGAL_SOURCES are compiled one at a time. The ctest `layering` reads what is
+# said here and every #include in the tree.
 function(limber_module NAME)
-  cmake_parse_arguments(M "" "" "SOURCES;CGAL_SOURCES;USES;OPENS;LINKS;OWNS" ${ARGN})
+  cmake_parse_arguments(M "" "" "SOURCES;CGAL_SOURCES;USES;OPENS;OF_CORE;ROOMS;LINKS;OWNS" ${ARGN})
   add_library(limber_${NAME} STATIC ${M_SOURCES})
   if(M_CGAL_SOURCES)
     add_library(limber_${NAME}_cgal OBJECT ${M_CGAL_SOURCES})
@@ -24,9 +26,14 @@ function(limber_module NAME)
   endforeach()
   target_link_libraries(limber_${NAME} PUBLIC ${M_LINKS})
   set_property(GLOBAL APPEND PROPERTY LIMBER_MODULES ${NAME})
-  set_property(GLOBAL PROPERTY LIMBER_USES_${NAME} "${used}")
-  set_property(GLOBAL PROPERTY LIMBER_OPENS_${NAME} "${M_OPENS}")
-  set_property(GLOBAL PROPERTY LIMBER_OWNS_${NAME} "${M_OWNS}")
+  set(uses "${used}")
+  set(opens "${M_OPENS}")
+  set(of_core "${M_OF_CORE}")
+  set(rooms "${M_ROOMS}")
+  set(owns "${M_OWNS}")
+  foreach(what uses opens of_core rooms owns)
+    set_property(GLOBAL APPEND_STRING PROPERTY LIMBER_MAP "set(${what}_${NAME} ${${what}})\n")
+  endforeach()
 endfunction()
 
 # limber_tests(NAME [LONG] SOURCES … USES module …): the executable NAME_tests; one ctest a TEST, labelled NAME, or NAME_slow
@@ -66,12 +73,6 @@ endfunction()
 # Writes the module map where the layering test reads it.
 function(limber_write_module_map FILE)
   get_property(modules GLOBAL PROPERTY LIMBER_MODULES)
-  set(text "set(modules ${modules})\n")
-  foreach(module ${modules})
-    get_property(uses GLOBAL PROPERTY LIMBER_USES_${module})
-    get_property(opens GLOBAL PROPERTY LIMBER_OPENS_${module})
-    get_property(owns GLOBAL PROPERTY LIMBER_OWNS_${module})
-    string(APPEND text "set(uses_${module} ${uses})\nset(opens_${module} ${opens})\nset(owns_${module} ${owns})\n")
-  endforeach()
-  file(GENERATE OUTPUT ${FILE} CONTENT "${text}")
+  get_property(map GLOBAL PROPERTY LIMBER_MAP)
+  file(GENERATE OUTPUT ${FILE} CONTENT "set(modules ${modules})\n${map}")
 endfunction()

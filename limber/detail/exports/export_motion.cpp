@@ -7,7 +7,6 @@
 #include "core/lock.h"
 #include "core/log.h"
 #include "core/temporary_files.h"
-#include "fem/observe.h"
 #include "limber/detail/film/frame_list.h"
 #include "limber/detail/plan/exported_files.h"
 #include "limber/detail/plan/manifest.h"
@@ -24,22 +23,8 @@ constexpr std::pair<const char*, WrittenFiles (*)(const PlannedMotion&, const fs
 
 }  // namespace
 
-Points surface_at(const fem::World& world, const PreparedBody& prepared, const State& state, int body) {
-  if (!world.bodies[std::size_t(body)].moving) return prepared.surface.positions;
-  Points surface;
-  deform(prepared, fem::body_positions(world, state, body), surface);
-  return surface;
-}
-
 Points surface_at(const PlannedMotion& motion, int body, int frame) {
   return surface_at(motion.world, motion.bodies[std::size_t(body)], motion.frames[std::size_t(frame)], body);
-}
-
-Points surface_at_rest(const fem::Body& body, const PreparedBody& prepared) {
-  if (!body.moving) return prepared.surface.positions;
-  Points surface;
-  deform(prepared, prepared.cage.positions, surface);
-  return surface;
 }
 
 const Appearance& appearance_shown(const PlannedMotion& motion, int body) {

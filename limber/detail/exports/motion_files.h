@@ -8,6 +8,7 @@
 #include "core/state.h"
 #include "fem/world.h"
 #include "limber/detail/body/body.h"
+#include "limber/detail/world/surface_at.h"
 #include "scenes/scene.h"
 
 namespace limber::detail {
@@ -22,13 +23,8 @@ struct PlannedMotion {
   double time_s(int frame) const { return frame / frames_per_second; }
 };
 
-// (V × 3), metres: the fine surface of a body as it is drawn in that state, or frame.
-Points surface_at(const fem::World&, const PreparedBody&, const State&, int body);
+// (V × 3), metres: the fine surface of a body as it is drawn in that frame.
 Points surface_at(const PlannedMotion&, int body, int frame);
-
-// The same where the cage is at rest. Not quite surface.ply where a vertex far outside its cage is bound with
-// clamped weights.
-Points surface_at_rest(const fem::Body&, const PreparedBody&);
 
 // What the scene shows of the colors that a body's model has; empty: the scene's color.
 const Appearance& appearance_shown(const PlannedMotion&, int body);

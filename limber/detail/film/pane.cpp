@@ -25,14 +25,6 @@ std::vector<Eigen::Vector2d> outline(const Eigen::Vector2d& half, double radius)
 
 }  // namespace
 
-Wall wall_at(const Box& bounds, const Vec3& place) {
-  const Vec3 below = bounds.lower - place, above = place - bounds.upper;
-  Wall wall;
-  wall.upper = above.maxCoeff() > below.maxCoeff();
-  (wall.upper ? above : below).maxCoeff(&wall.axis);
-  return wall;
-}
-
 std::vector<double> faded(const std::vector<bool>& touching, int frames) {
   std::vector<double> shares(touching.size(), 0);
   for (int f = 0; f < int(touching.size()); ++f) {

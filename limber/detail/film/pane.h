@@ -3,18 +3,9 @@
 
 #include <vector>
 
-#include "core/mesh.h"
+#include "limber/detail/world/wall.h"
 
 namespace limber::detail {
-
-// A side of a box.
-struct Wall {
-  int axis = 0;
-  bool upper = false;
-  auto operator<=>(const Wall&) const = default;
-};
-// The side that a place is farthest beyond, or nearest to.
-Wall wall_at(const Box& bounds, const Vec3& place);
 
 // 0 … 1 a frame: 1 where something touches, over `frames` rising before and falling after.
 std::vector<double> faded(const std::vector<bool>& touching, int frames);

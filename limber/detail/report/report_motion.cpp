@@ -5,7 +5,7 @@
 #include <set>
 
 #include "fem/observe.h"
-#include "limber/detail/exports/motion_files.h"
+#include "limber/detail/world/surface_at.h"
 #include "render/image.h"
 
 namespace limber::detail {

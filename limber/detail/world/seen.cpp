@@ -6,8 +6,8 @@
 #include "core/progress.h"
 #include "core/threads.h"
 #include "fem/observe.h"
-#include "limber/detail/exports/motion_files.h"
-#include "limber/detail/film/pane.h"
+#include "limber/detail/world/surface_at.h"
+#include "limber/detail/world/wall.h"
 
 namespace limber::detail {
 
