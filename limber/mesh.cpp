@@ -2,6 +2,7 @@
 
 #include "limber/detail/body/model_content.h"
 #include "limber/detail/body/prepare.h"
+#include "limber/detail/body/preview.h"
 #include "core/error.h"
 #include "core/hash.h"
 #include "core/json_text.h"
@@ -10,6 +11,7 @@
 #include "core/mesh_files.h"
 #include "limber/detail/interface/arrays.h"
 #include "limber/detail/interface/body.h"
+#include "limber/detail/interface/work_folder.h"
 #include "limber/detail/interface/working_for.h"
 
 namespace limber {
@@ -211,6 +213,15 @@ void Body::save(const std::filesystem::path& folder) const {
   for (const auto& [name, any] : impl_->report.at("files").items())
     write_file(folder / name, read_file(impl_->folder / name));
   write_file(folder / "report.json", read_file(impl_->folder / "report.json"));
+}
+
+std::string Body::picture_png(const Context& context) const {
+  return working_for(context, [&] {
+    const detail::WorkFolder folder{{}};  // a temporary one
+    save(folder.path());
+    detail::write_picture(folder.path());
+    return read_file(folder.path() / detail::picture_file);
+  });
 }
 
 Body detail::body_of(const detail::PreparedBody& prepared, const std::filesystem::path& folder) {

@@ -116,6 +116,8 @@ class LIMBER_API Body {
   std::string report_json() const;
   // Where the surface is when the cage's nodes are there. Throws InputError where the numbers do not fit.
   Vertices deform(const Vertices& nodes) const;
+  // The cage over the surface, small, as the bytes of a PNG.
+  std::string picture_png(const Context& = {}) const;
   // The files of docs/files.md. Throws DiskError.
   void save(const std::filesystem::path& folder) const;
 

@@ -1,7 +1,5 @@
 #include "limber/scene.h"
 
-#include <stdlib.h>
-
 #include <atomic>
 #include <climits>
 
@@ -49,28 +47,6 @@ std::vector<std::string> scene_names() {
   for (const scenes::KnownScene& known : scenes::known_scenes()) names.push_back(known.name);
   return names;
 }
-
-namespace detail {
-
-namespace {
-
-std::filesystem::path temporary_folder() {
-  std::string name = (std::filesystem::temp_directory_path() / "limber-XXXXXX").string();
-  if (!mkdtemp(name.data())) throw DiskError(fmt::format("{}: creating it failed", name));
-  return name;
-}
-
-}  // namespace
-
-WorkFolder::WorkFolder(std::filesystem::path path)
-    : temporary_(path.empty()), path_(temporary_ ? temporary_folder() : std::move(path)) {}
-
-WorkFolder::~WorkFolder() {
-  std::error_code ignored;
-  if (temporary_) std::filesystem::remove_all(path_, ignored);
-}
-
-}  // namespace detail
 
 namespace {
 

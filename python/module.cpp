@@ -388,6 +388,12 @@ PYBIND11_MODULE(_limber, m) {
                              py::return_value_policy::reference_internal)
       .def_property_readonly("binding", &limber::Body::binding, py::return_value_policy::reference_internal)
       .def("report_json", &limber::Body::report_json)
+      .def("picture_png",
+           [](const limber::Body& self) {
+             return py::bytes(call(py::none(), 0, [&](const limber::Context& context) {
+               return self.picture_png(context);
+             }));
+           })
       .def(
           "deform",
           [](const limber::Body& self, const py::object& nodes) {

@@ -13,8 +13,14 @@ total, note)` where one is given. What depends on a seed depends on nothing else
 
 from __future__ import annotations
 
+import base64
 import json
 import os
+import signal
+import subprocess
+import tempfile
+import threading
+import warnings as _warnings
 from html import escape as _escape
 from typing import Any, Callable, Dict, List, NamedTuple, Optional, Sequence, Tuple, Union
 
@@ -26,9 +32,9 @@ from ._limber import (Binding, Body, Cage, Certificate, DiskError, InputError, I
 
 __all__ = [
     "Binding", "Body", "Cage", "Certificate", "Decomposition", "DiskError", "Film", "InputError", "InternalError",
-    "Mesh", "Plan", "Promise", "Scene", "States", "World", "bind", "build_cage", "certify", "decompose", "export",
-    "load_body", "load_mesh", "load_plan", "plan", "prepare", "push_dtype", "pushes", "render", "report",
-    "scene_names", "simulate", "verify", "__version__",
+    "Mesh", "Plan", "Prepared", "Promise", "Scene", "States", "World", "bind", "build_cage", "certify", "decompose",
+    "export", "load_body", "load_mesh", "load_plan", "plan", "prepare", "prepare_many", "push_dtype", "pushes",
+    "render", "report", "scene_names", "simulate", "verify", "__version__",
 ]
 
 Path = Union[str, "os.PathLike[str]"]
@@ -114,6 +120,130 @@ def prepare(model: Any, faces: Any = None, *, shells: int = 32, concavity: float
 def load_body(folder: Path) -> Body:
     """What Body.save, or `limber prepare`, has written."""
     return Body.load(folder)
+
+
+def _table(rows: Dict[str, str]) -> str:
+    return "<table>" + "".join(
+        f"<tr><th style='text-align:left'>{_escape(name)}</th><td style='text-align:left'>{_escape(text)}</td></tr>"
+        for name, text in rows.items()) + "</table>"
+
+
+def _html_of_body(body: Body) -> str:
+    certificate = body.certificate
+    rows = {"surface": f"{len(body.vertices)} vertices, {len(body.faces)} triangles",
+            "hulls": str(len(body.hulls)),
+            "cage": f"{len(body.cage.tets)} tets, {len(body.cage.vertices)} nodes, dihedrals "
+                    f"{certificate.min_dihedral_deg:.1f} … {certificate.max_dihedral_deg:.1f} degrees",
+            "certificate": "holds" if certificate.holds else
+                           f"does not hold: {certificate.vertices_outside} vertices outside, "
+                           f"{certificate.triangles_crossing} triangles cross",
+            "binding": f"{body.binding.outside} vertices outside their tets"}
+    picture = base64.b64encode(body.picture_png()).decode()
+    return _table(rows) + f"<img alt='the cage over the surface' src='data:image/png;base64,{picture}'>"
+
+
+Body._repr_html_ = _html_of_body  # type: ignore[attr-defined]
+
+
+class Prepared(NamedTuple):
+    """A model of many: a body, or why there is none."""
+    name: str                # of its folder in the batch
+    source: str              # the model's file
+    folder: Optional[str]    # of the body, for load_body; None where there is none
+    reason: str              # "", "refused", "time", "memory", "crash", "defect"
+    message: str
+    figures: Dict[str, Any]  # its row of manifest.jsonl
+
+
+def prepare_many(models: Union[Path, Sequence[Path]], out: Path, *, jobs: int = 0, time_limit: float = 600,
+                 memory_limit: Optional[float] = None, retry_failed: bool = False, store: Path = "",
+                 shells: int = 32, concavity: float = 0, threshold: float = 0, inflate: float = 0,
+                 max_hull_vertices: int = 64, exact: bool = False, tets: int = 1000, mode: str = "lattice",
+                 scale: float = 1, y_up: bool = False, program: Path = "limber",
+                 progress: Optional[Progress] = None, threads: int = 0) -> List[Prepared]:
+    """Bodies of many models, files and folders, in the folder `out`, where they are found again.
+
+    As `limber prepare` does it, whose program this calls: each in a process of its own, with an end to its CPU
+    time (seconds) and memory (MB); one that hangs, crashes or is no model is told of, and the others go on.
+    """
+    words = [os.fspath(program), "prepare"]
+    with tempfile.TemporaryDirectory() as lists:
+        # Files go in lists: there may be more of them than a command line holds.
+        listed: List[bytes] = []
+
+        def end_list() -> None:
+            if listed:
+                name = os.path.join(lists, f"{len(words)}.txt")
+                with open(name, "wb") as file:
+                    file.write(b"\0".join(listed) + b"\0")
+                words.append("@" + name)
+                listed.clear()
+        for model in [models] if isinstance(models, (str, os.PathLike)) else models:
+            where = os.path.abspath(os.fspath(model))
+            if os.path.isdir(where):
+                end_list()
+                words.append(where)
+            else:
+                listed.append(os.fsencode(where))
+        end_list()
+        if len(words) == 2:
+            raise InputError("prepare_many: there is no model")
+        told: Dict[str, Any] = {"--jobs": jobs, "--time-limit": time_limit, "--shells": shells,
+                                "--concavity": concavity, "--inflate": inflate,
+                                "--max-hull-vertices": max_hull_vertices, "--tets": tets, "--mode": mode,
+                                "--scale": scale, "--threads": threads}
+        if threshold:
+            told["--threshold"] = threshold
+        if memory_limit is not None:
+            told["--memory-limit"] = memory_limit
+        if os.fspath(store):
+            told["--store"] = os.fspath(store)
+        for name, value in told.items():
+            words += [name, str(value)]
+        words += [flag for flag, wanted in (("--exact", exact), ("--y-up", y_up), ("--retry-failed", retry_failed))
+                  if wanted]
+        said = _run(words + ["-o", os.fspath(out)], progress)
+    with open(said["manifest"], encoding="utf-8") as file:
+        rows = [json.loads(line) for line in file]
+    return [Prepared(row["name"], row["source"],
+                     os.path.join(os.fspath(out), row["folder"]) if row["status"] == "done" else None,
+                     row.get("reason", ""), row.get("message", ""), row) for row in rows]
+
+
+def _run(words: List[str], progress: Optional[Progress]) -> Dict[str, Any]:
+    """What the command says with --json; its errors as ours."""
+    try:
+        version = subprocess.run([words[0], "--version"], capture_output=True, text=True, check=True).stdout.split()
+    except (OSError, subprocess.CalledProcessError) as error:
+        raise InputError(f"{words[0]}: cannot be run ({error}); install the program limber, or name it by program=")
+    if version != ["limber", __version__]:
+        raise InputError(f"{words[0]}: is {' '.join(version)}, and this is limber {__version__}; "
+                         "name another by program=")
+    process = subprocess.Popen(words + ["--json", "--progress", "json"], stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+                               encoding="utf-8", start_new_session=True)
+    assert process.stdout and process.stderr
+    out: List[str] = []
+    reader = threading.Thread(target=lambda: out.append(process.stdout.read()))  # type: ignore[union-attr]
+    reader.start()
+    try:
+        for line in process.stderr:
+            event = json.loads(line) if line.startswith("{") else {}
+            if event.get("event") == "warning":
+                _warnings.warn(event["text"], UserWarning, stacklevel=3)
+            elif event.get("event") == "model" and progress is not None:
+                progress("prepare", event["done"], event["total"], event["name"])
+    except BaseException:
+        process.send_signal(signal.SIGTERM)
+        raise
+    finally:
+        code = process.wait()
+        reader.join()
+        process.stdout.close()
+        process.stderr.close()
+    if code in (0, 6):
+        return json.loads(out[0])  # type: ignore[no-any-return]
+    what = json.loads(out[0]).get("error", "") if out[0].startswith("{") else f"ended with {code}"
+    raise {2: InputError, 5: DiskError}.get(code, InternalError)(what)
 
 
 # ---- Scenes and motions
@@ -288,11 +418,18 @@ class Plan:
         return f"<limber.Plan: {len(self)} frames, {self.duration_s:.2f} s. {self.why}>"
 
     def _repr_html_(self) -> str:
+        figures = self.summary
         rows = {"result": self.why, "motion": f"{self.duration_s:.2f} s in {len(self)} frames",
-                "iterations": str(self.iterations), "tree": self.tree_hash, "trajectory": self.trajectory_hash}
-        return "<table>" + "".join(
-            f"<tr><th style='text-align:left'>{_escape(name)}</th><td style='text-align:left'>{_escape(text)}</td></tr>"
-            for name, text in rows.items()) + "</table>"
+                "iterations": str(self.iterations)}
+        if "largest_volume_change_percent" in figures:
+            rows["volume"] = "changes at most: " + ", ".join(
+                f"{name} {percent:.2f} %" for name, percent in figures["largest_volume_change_percent"].items())
+            rows["penetration"] = (f"at most {100 * figures['deepest_penetration_of_robot_size']:.2f} % of the robot's "
+                                   f"size ({figures['penetration_between']})")
+            rows["strain"] = f"at most {figures['largest_strain']:.3f} ({figures['largest_strain_of']})"
+            rows["contact"] = f"at most {figures['largest_contact_force_n']:.1f} N ({figures['contact_between']})"
+        rows.update({"tree": self.tree_hash, "trajectory": self.trajectory_hash})
+        return _table(rows)
 
 
 def plan(scene: Union[Scene, Path], out: Optional[Path] = None, *, preset: str = "",

@@ -73,6 +73,45 @@ class Meshes(unittest.TestCase):
         del body
         np.testing.assert_array_equal(vertices, kept)
 
+    def test_a_body_shows_itself_in_a_notebook(self):
+        html = limber.prepare(CUBE, FACES, tets=100)._repr_html_()
+        self.assertRegex(html, "[0-9]+ triangles")
+        self.assertIn("holds", html)
+        self.assertIn("src='data:image/png;base64,iVBORw0KGgo", html)
+
+    def test_many_models_are_the_commands_and_one_that_is_none_stops_no_other(self):
+        with tempfile.TemporaryDirectory() as folder:
+            def path(name):
+                return os.path.join(folder, name)
+            os.mkdir(path("models"))
+            for name, size in (("a.obj", 1), ("b.obj", 2)):
+                with open(path("models/" + name), "w") as file:
+                    file.write("".join(f"v {x} {y} {z}\n" for x, y, z in size * CUBE))
+                    file.write("".join(f"f {a + 1} {b + 1} {c + 1}\n" for a, b, c in FACES))
+            with open(path("models/c.obj"), "w") as file:
+                file.write("nothing\n")
+            told = command("prepare", path("models/a.obj"), "-o", path("one"), "--tets", "100")
+            heard = []
+            with self.assertWarnsRegex(UserWarning, "c.obj"):
+                many = limber.prepare_many(path("models"), path("out"), tets=100, program=PROGRAM,
+                                           progress=lambda *event: heard.append(event))
+            self.assertEqual([(m.name, m.reason) for m in many], [("a.obj", ""), ("b.obj", ""), ("c.obj", "refused")])
+            self.assertEqual(sorted(event[1] for event in heard), [1, 2, 3])
+            body = limber.load_body(many[0].folder)
+            self.assertEqual(json.loads(body.report_json())["files"]["cage.msh"], told["files"]["cage.msh"])
+            with warnings.catch_warnings():
+                warnings.simplefilter("error")
+                again = limber.prepare_many([path("models/a.obj"), path("models/b.obj")], path("out"), tets=100,
+                                            program=PROGRAM)
+            self.assertEqual([m.folder for m in again], [m.folder for m in many[:2]])
+            with self.assertRaisesRegex(limber.InputError, "no.such"):
+                limber.prepare_many(path("models"), path("out"), program=path("no.such"))
+            with self.assertRaisesRegex(limber.InputError, "mode"):
+                limber.prepare_many(path("models"), path("out"), mode="slow", program=PROGRAM)
+            with self.assertRaises(KeyError):
+                limber.prepare_many(path("models"), path("again"), tets=100, program=PROGRAM,
+                                    progress=lambda *event: {}["enough"])
+
     def test_warnings_are_pythons(self):
         with self.assertWarnsRegex(UserWarning, "boundary edges"):
             limber.prepare(CUBE, FACES[:-1], tets=100)

@@ -5,6 +5,7 @@
 #include <mutex>
 #include <vector>
 
+#include "limber/detail/interface/work_folder.h"
 #include "limber/detail/plan/plan.h"
 #include "limber/detail/world/scene_world.h"
 #include "limber/scene.h"
@@ -15,25 +16,6 @@ struct Scene::Impl {
   scenes::Scene scene;
   std::vector<std::filesystem::path> data;
 };
-
-namespace detail {
-
-// A folder that goes with it, if it is a temporary one.
-class WorkFolder {
- public:
-  // Empty: a temporary one. Throws DiskError.
-  explicit WorkFolder(std::filesystem::path);
-  ~WorkFolder();
-  WorkFolder(const WorkFolder&) = delete;
-  WorkFolder& operator=(const WorkFolder&) = delete;
-  const std::filesystem::path& path() const { return path_; }
-
- private:
-  bool temporary_;  // made, and removed, by us
-  std::filesystem::path path_;
-};
-
-}  // namespace detail
 
 struct Problem::Impl {
   Scene scene;
