@@ -64,8 +64,7 @@ std::vector<fs::path> exported_files(const fs::path& folder) {
 
 ExportedMotion export_motion(const ExportOptions& options) {
   const PlanFolder planned = read_plan_folder(options.folder);
-  const std::vector<PreparedBody> bodies = read_bodies_of(planned, options.folder);
-  const fem::World world = world_of(planned, bodies);
+  const auto [bodies, world] = read_world_of(planned, options.folder);
   const plan::Trajectory& path = planned.plan.trajectory;
   const int count = int(path.frames.size());
   int left_out = 0;

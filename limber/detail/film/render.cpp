@@ -136,9 +136,8 @@ RenderedFilm render(const RenderOptions& options) {
   PlanFolder planned = read_plan_folder(options.folder);
   planned.scene = filmed_as(planned.scene, options.sets);
   const scenes::Scene& scene = planned.scene;
-  const std::vector<PreparedBody> bodies = read_bodies_of(planned, options.folder);
+  const auto [bodies, world] = read_world_of(planned, options.folder);
   const std::vector<SurfaceMesh> scenery = read_scenery(scene, options.folder);
-  const fem::World world = world_of(planned, bodies);
   const scenes::FilmSpec& film = scene.film;
   const auto size =
       options.size.empty() ? std::pair(film.width_px, film.height_px) : parse_size(options.size);

@@ -33,8 +33,7 @@ FollowedPlan::FollowedPlan(const fs::path& folder, const scenes::Scene& scene, c
         "{}: its plan does not reach the goal, so there is no path to follow; plan on with limber "
         "plan --resume",
         folder.string()));
-  const std::vector<PreparedBody> bodies = read_bodies_of(planned, folder);
-  const fem::World there = world_of(planned, bodies);
+  const fem::World there = read_world_of(planned, folder).world;
   require_same_robot(folder, there, scene, world);
   const FemSystem system(there, goal_rules_of(planned.scene));
   const plan::Trajectory& path = planned.plan.trajectory;

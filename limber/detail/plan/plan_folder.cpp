@@ -178,10 +178,15 @@ std::vector<PreparedBody> read_caged_bodies_of(const PlanFolder& planned, const 
   return bodies;
 }
 
-std::vector<PreparedBody> read_bodies_of(const PlanFolder& planned, const fs::path& folder) {
+BodiesAndWorld read_world_of(const PlanFolder& planned, const fs::path& folder) {
   std::vector<PreparedBody> bodies = read_caged_bodies_of(planned, folder);
-  require_of_world(planned.plan, world_of(planned, bodies), folder);
-  return bodies;
+  fem::World world = world_of(planned, bodies);
+  require_of_world(planned.plan, world, folder);
+  return {std::move(bodies), std::move(world)};
+}
+
+std::vector<PreparedBody> read_bodies_of(const PlanFolder& planned, const fs::path& folder) {
+  return read_world_of(planned, folder).bodies;
 }
 
 }  // namespace limber::detail

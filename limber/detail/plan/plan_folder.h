@@ -67,8 +67,14 @@ fem::World world_of(const PlanFolder&, const std::vector<PreparedBody>&);
 // The bodies of the plan's scene. Throws InputError when a cage has changed since the plan was made.
 std::vector<PreparedBody> read_caged_bodies_of(const PlanFolder&, const fs::path& folder);
 
-// The bodies that the plan was made with. Throws InputError when one has changed since, or the plan is not of
-// their world.
+// The bodies that the plan was made with, and their world, begun as the plan begins. Throws InputError when
+// one has changed since, or the plan is not of their world.
+struct BodiesAndWorld {
+  std::vector<PreparedBody> bodies;
+  fem::World world;
+};
+BodiesAndWorld read_world_of(const PlanFolder&, const fs::path& folder);
+// The bodies alone.
 std::vector<PreparedBody> read_bodies_of(const PlanFolder&, const fs::path& folder);
 
 }  // namespace limber::detail

@@ -57,7 +57,7 @@ KeptPlan refine(const RefineOptions& options) {
   if (fs::exists(options.out) && fs::equivalent(options.folder, options.out))
     throw InputError(
         fmt::format("{}: is the folder of the plan itself; name another with -o", options.out.string()));
-  const std::vector<PreparedBody> coarse_bodies = read_bodies_of(planned, options.folder);
+  const auto [coarse_bodies, coarse_world] = read_world_of(planned, options.folder);
   std::vector<std::string> sets = planned.scene.sets;
   const std::vector<std::string> finer = finer_cages(planned.scene, options.tets_factor);
   sets.insert(sets.end(), finer.begin(), finer.end());
@@ -69,7 +69,7 @@ KeptPlan refine(const RefineOptions& options) {
   const FolderLock lock(options.out, FolderLock::alone);
   const std::vector<PreparedBody> bodies = prepare_bodies(scene, options.data, options.out, options.store);
 
-  const fem::World coarse_world = world_of(planned, coarse_bodies), world = build_world(scene, bodies);
+  const fem::World world = build_world(scene, bodies);
   const FemSystem coarse(coarse_world, goal_rules_of(planned.scene)),
       system(world, bodies, goal_rules_of(scene));
   plan::Reference reference = plan::reference_of(coarse, planned.plan.trajectory);

@@ -87,7 +87,7 @@ State start_from(const fs::path& folder, const PlanFolder& other, int frame, con
   if (frame < 0 || frame >= int(frames.size()))
     throw InputError(fmt::format("{}: there is none; its frames are 0 … {}", what, frames.size() - 1));
   const State& there = frames[std::size_t(frame)];
-  const fem::World world_there = world_of(other, read_bodies_of(other, folder));
+  const fem::World world_there = read_world_of(other, folder).world;
   require_bodies_of(world_there, world, what);
   State start = fem::start_state(world);
   start.step = std::llround(double(there.step) * world_there.dt_s / world.dt_s);

@@ -202,8 +202,7 @@ Robustness robust(const RobustOptions& options) {
         fmt::format("{}: its plan does not reach the goal, so there is nothing to perturb; plan on with "
                     "limber plan --resume",
                     options.folder.string()));
-  const std::vector<PreparedBody> bodies = read_bodies_of(planned, options.folder);
-  const fem::World world = world_of(planned, bodies);
+  const auto [bodies, world] = read_world_of(planned, options.folder);
   const FemSystem system(world, goal_rules_of(planned.scene));
   const plan::Trajectory& path = planned.plan.trajectory;
   const Planned own{planned, bodies, plan::guide_of(system, planned.plan.settings, path)};
