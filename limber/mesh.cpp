@@ -1,14 +1,14 @@
 #include "limber/mesh.h"
 
-#include "limber/detail/body/model_content.h"
-#include "limber/detail/body/prepare.h"
-#include "limber/detail/body/preview.h"
 #include "core/error.h"
 #include "core/hash.h"
 #include "core/json_text.h"
 #include "core/lock.h"
 #include "core/log.h"
 #include "core/mesh_files.h"
+#include "limber/detail/body/model_content.h"
+#include "limber/detail/body/prepare.h"
+#include "limber/detail/body/preview.h"
 #include "limber/detail/interface/arrays.h"
 #include "limber/detail/interface/body.h"
 #include "limber/detail/interface/work_folder.h"
@@ -49,14 +49,9 @@ Cage cage_of(const TetMesh& mesh, const std::vector<int>& hull_from_tet) {
 }
 
 Certificate certificate_of(const meshing::Certificate& c) {
-  return {c.holds(),
-          c.vertices_outside,
-          c.triangles_crossing,
-          c.nonmanifold_edges,
-          c.nonmanifold_vertices,
-          c.inverted_tets,
-          c.min_dihedral_deg,
-          c.max_dihedral_deg};
+  return {c.holds(),           c.vertices_outside,     c.triangles_crossing,
+          c.nonmanifold_edges, c.nonmanifold_vertices, c.inverted_tets,
+          c.min_dihedral_deg,  c.max_dihedral_deg};
 }
 
 Binding binding_of(const ffd::Binding& b) {
@@ -113,13 +108,14 @@ ImportedMesh clean(const Mesh& mesh, const Context& context) {
 Decomposition decompose(const Mesh& mesh, const DecomposeOptions& options, const Context& context) {
   return working_for(context, [&] {
     require_mesh(mesh, "mesh");
-    const meshing::Decomposition made = detail::make_shells(surface_of(mesh), {.shells = options.max_convex_hull,
-                                                                            .concavity = options.concavity,
-                                                                            .threshold = options.threshold,
-                                                                            .inflate = options.inflate,
-                                                                            .exact = options.exact,
-                                                                            .corners = options.max_hull_vertices,
-                                                                            .only = {}});
+    const meshing::Decomposition made =
+        detail::make_shells(surface_of(mesh), {.shells = options.max_convex_hull,
+                                               .concavity = options.concavity,
+                                               .threshold = options.threshold,
+                                               .inflate = options.inflate,
+                                               .exact = options.exact,
+                                               .corners = options.max_hull_vertices,
+                                               .only = {}});
     Decomposition d;
     for (const ConvexShell& shell : made.shells) d.hulls.push_back(mesh_of(shell));
     d.neighbours = made.neighbours;
@@ -169,7 +165,8 @@ Vertices deform(const Binding& binding, const Tetrahedra& tets, const Vertices& 
   for (std::size_t v = 0; v < moved.size(); ++v) {
     const int t = binding.tet_from_vertex[v];
     if (t < 0 || std::size_t(t) >= tets.size())
-      throw InputError(fmt::format("binding: vertex {} is bound to tet {}, and there are {}", v, t, tets.size()));
+      throw InputError(
+          fmt::format("binding: vertex {} is bound to tet {}, and there are {}", v, t, tets.size()));
     for (std::size_t c = 0; c < 4; ++c) {
       const int n = tets[std::size_t(t)][c];
       if (n < 0 || std::size_t(n) >= nodes.size())
@@ -227,7 +224,8 @@ std::string Body::picture_png(const Context& context) const {
 Body detail::body_of(const detail::PreparedBody& prepared, const std::filesystem::path& folder) {
   auto impl = std::make_shared<Body::Impl>();
   impl->surface = mesh_of(prepared.surface);
-  for (const ConvexShell& shell : read_obj_shells(folder / "shells.obj")) impl->hulls.push_back(mesh_of(shell));
+  for (const ConvexShell& shell : read_obj_shells(folder / "shells.obj"))
+    impl->hulls.push_back(mesh_of(shell));
   impl->cage = cage_of(prepared.cage, prepared.shell_from_tet);
   const Json &report = prepared.report, &certificate = report.at("certificate");
   impl->cage.volume_ratio = report.at("cage").at("volume_ratio").get<double>();

@@ -14,9 +14,9 @@
 
 namespace limber {
 
-using Vertices = std::vector<std::array<double, 3>>;   // (V × 3), metres
-using Faces = std::vector<std::array<int, 3>>;         // (F × 3), rows of Vertices
-using Tetrahedra = std::vector<std::array<int, 4>>;    // (T × 4), rows of Vertices
+using Vertices = std::vector<std::array<double, 3>>;     // (V × 3), metres
+using Faces = std::vector<std::array<int, 3>>;           // (F × 3), rows of Vertices
+using Tetrahedra = std::vector<std::array<int, 4>>;      // (T × 4), rows of Vertices
 using Barycentric = std::vector<std::array<double, 4>>;  // (V × 4), each row sums to 1
 
 struct Mesh {
@@ -64,9 +64,9 @@ struct CageOptions {
 };
 struct Cage {
   Vertices nodes;
-  Tetrahedra tets;                     // of positive volume
+  Tetrahedra tets;                      // of positive volume
   std::vector<int> hull_from_tet = {};  // (T)
-  double volume_ratio = 0;             // over the model's; 0 of an open one
+  double volume_ratio = 0;              // over the model's; 0 of an open one
   std::vector<std::string> notes = {};  // what the user should know
 };
 // Encloses the surface, in modes lattice and fast always. Throws InputError as decompose() does.

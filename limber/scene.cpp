@@ -24,9 +24,7 @@ using detail::working_for;
 Scene::Scene(std::shared_ptr<const Impl> impl) : impl_(std::move(impl)) {}
 const std::string& Scene::name() const { return impl_->scene.name; }
 const std::string& Scene::text() const { return impl_->scene.text; }
-const std::string& Scene::robot() const {
-  return impl_->scene.bodies[std::size_t(impl_->scene.robot)].name;
-}
+const std::string& Scene::robot() const { return impl_->scene.bodies[std::size_t(impl_->scene.robot)].name; }
 std::vector<std::string> Scene::bodies() const {
   std::vector<std::string> names;
   for (const scenes::BodySpec& body : impl_->scene.bodies) names.push_back(body.name);
@@ -89,8 +87,8 @@ Control control_of(const Push& push, int row, int robot_nodes) {
   const int kind = int(push.kind);
   require(kind >= 0 && kind <= 4, fmt::format("kind {} is none", kind));
   require(push.steps > 0, fmt::format("steps is {}; it must be above 0", push.steps));
-  for (const float x : {push.force_n[0], push.force_n[1], push.force_n[2], push.target_m[0],
-                        push.target_m[1], push.target_m[2], push.radius_m, push.max_force_n})
+  for (const float x : {push.force_n[0], push.force_n[1], push.force_n[2], push.target_m[0], push.target_m[1],
+                        push.target_m[2], push.radius_m, push.max_force_n})
     require(std::isfinite(x), "a number of it is not finite");
   require(push.max_force_n >= 0 && push.radius_m >= 0, "max_force_n and radius_m must not be negative");
   if (push.kind == Push::Kind::control_point)
@@ -115,7 +113,8 @@ Push push_of(const Control& c) {
           .steps = c.steps};
 }
 
-std::vector<detail::PreparedBody> prepare_bodies(const Scene::Impl& scene, const std::filesystem::path& folder) {
+std::vector<detail::PreparedBody> prepare_bodies(const Scene::Impl& scene,
+                                                 const std::filesystem::path& folder) {
   make_folder(folder);
   const FolderLock lock(folder, FolderLock::alone);
   return detail::prepare_bodies(scene.scene, scene.data, folder);
@@ -125,7 +124,7 @@ std::vector<detail::PreparedBody> prepare_bodies(const Scene::Impl& scene, const
 
 Problem::Impl::Impl(const Scene& of, const std::filesystem::path& work_folder,
                     std::vector<detail::PreparedBody> (*prepare)(const Scene::Impl&,
-                                                              const std::filesystem::path&),
+                                                                 const std::filesystem::path&),
                     const std::vector<float>& start_positions)
     : scene(of),
       folder(work_folder),
@@ -142,12 +141,13 @@ Problem::Impl::Impl(const Scene& of, const std::filesystem::path& work_folder)
     : Impl(of, work_folder, prepare_bodies, {}) {}
 
 Problem::Impl::Impl(const detail::PlanFolder& planned, const std::filesystem::path& of_plan)
-    : Impl(Scene(std::make_shared<Scene::Impl>(planned.scene, std::vector<std::filesystem::path>{})), of_plan,
-           [](const Scene::Impl& of, const std::filesystem::path& in) {
-             return detail::read_bodies(of.scene, in);
-           },
-           detail::begins_elsewhere(planned) ? std::vector<float>{}
-                                          : State(planned.plan.tree.states[0]).positions) {}
+    : Impl(
+          Scene(std::make_shared<Scene::Impl>(planned.scene, std::vector<std::filesystem::path>{})), of_plan,
+          [](const Scene::Impl& of, const std::filesystem::path& in) {
+            return detail::read_bodies(of.scene, in);
+          },
+          detail::begins_elsewhere(planned) ? std::vector<float>{}
+                                            : State(planned.plan.tree.states[0]).positions) {}
 
 Problem::Problem(const Scene& scene, const std::filesystem::path& work_folder, const Context& context)
     : impl_(working_for(context, [&] { return std::make_shared<const Impl>(scene, work_folder); })) {}
@@ -160,7 +160,8 @@ int Problem::nodes() const { return impl_->world.moving_nodes; }
 
 Problem::Range Problem::nodes_of(int body) const {
   if (body < 0 || body >= int(impl_->world.bodies.size()))
-    throw InputError(fmt::format("there is no body {}; they are 0 … {}", body, impl_->world.bodies.size() - 1));
+    throw InputError(
+        fmt::format("there is no body {}; they are 0 … {}", body, impl_->world.bodies.size() - 1));
   const fem::Body& b = impl_->world.bodies[std::size_t(body)];
   return b.moving ? Range{b.first_node, b.node_count()} : Range{};
 }
@@ -295,8 +296,7 @@ std::string Plan::explanation() const { return plan::explain(impl_->plan); }
 std::int64_t Plan::iterations() const { return impl_->plan.statistics.iterations; }
 int Plan::nodes_in_tree() const { return impl_->plan.tree.size(); }
 double Plan::duration_s() const {
-  return double(impl_->plan.trajectory.end.step - impl_->plan.tree.states.steps()[0]) *
-         impl_->problem.dt_s();
+  return double(impl_->plan.trajectory.end.step - impl_->plan.tree.states.steps()[0]) * impl_->problem.dt_s();
 }
 double Plan::frames_per_second() const { return impl_->plan.settings.frames_per_second; }
 int Plan::frame_count() const { return int(impl_->plan.trajectory.frames.size()); }
@@ -323,8 +323,8 @@ Vertices Plan::surface(int body, int frame) const {
   if (frame < 0 || frame >= int(frames.size()))
     throw InputError(fmt::format("there is no frame {}; they are 0 … {}", frame, frames.size() - 1));
   Points moved;
-  detail::deform(p.prepared[std::size_t(body)], fem::body_positions(p.world, frames[std::size_t(frame)], body),
-              moved);
+  detail::deform(p.prepared[std::size_t(body)],
+                 fem::body_positions(p.world, frames[std::size_t(frame)], body), moved);
   return detail::vertices_of(moved);
 }
 
@@ -341,8 +341,8 @@ detail::FemSystem system_of(const Plan::Impl& plan) {
 std::string Plan::summary_json(const Context& context) const {
   if (!impl_->summary.is_null()) return text_of(impl_->summary, 2);
   return working_for(context, [&] {
-    Json summary =
-        detail::facts_of(impl_->plan, impl_->problem.impl().world, system_of(*impl_), impl_->motion_figures());
+    Json summary = detail::facts_of(impl_->plan, impl_->problem.impl().world, system_of(*impl_),
+                                    impl_->motion_figures());
     if (!impl_->extra.is_null()) summary.update(impl_->extra);
     return text_of(summary, 2);
   });
@@ -362,16 +362,17 @@ void Plan::save(const std::filesystem::path& folder, const Context& context) con
     if (!std::filesystem::equivalent(folder, p.folder.path()))
       for (const char* part : {"bodies", "scenery"})
         if (std::error_code failed; std::filesystem::exists(p.folder.path() / part)) {
-          std::filesystem::copy(p.folder.path() / part, folder / part,
-                                std::filesystem::copy_options::recursive |
-                                    std::filesystem::copy_options::overwrite_existing,
-                                failed);
+          std::filesystem::copy(
+              p.folder.path() / part, folder / part,
+              std::filesystem::copy_options::recursive | std::filesystem::copy_options::overwrite_existing,
+              failed);
           if (failed)
-            throw DiskError(fmt::format("{}: writing it failed: {}", (folder / part).string(), failed.message()));
+            throw DiskError(
+                fmt::format("{}: writing it failed: {}", (folder / part).string(), failed.message()));
         }
     plan::Plan plan = impl_->plan;
     detail::keep_measured_plan(folder, p.scene.impl().scene, p.prepared, p.world, system_of(*impl_), plan,
-                            impl_->motion_figures(), impl_->extra);
+                               impl_->motion_figures(), impl_->extra);
   });
 }
 

@@ -2,12 +2,12 @@
 
 #include <algorithm>
 
+#include "core/error.h"
 #include "limber/detail/exports/export_motion.h"
 #include "limber/detail/film/render.h"
+#include "limber/detail/interface/working_for.h"
 #include "limber/detail/report/report.h"
 #include "limber/detail/verify/verify.h"
-#include "core/error.h"
-#include "limber/detail/interface/working_for.h"
 
 namespace limber {
 

@@ -22,13 +22,13 @@ LIMBER_API std::vector<Promise> verify(const std::filesystem::path& folder, cons
                                        const Context& = {});
 
 struct FilmOptions {
-  int width = 0, height = 0;      // pixels; 0: the scene's
-  std::string frames = {};             // "0-30,47-327:2"; empty: all
+  int width = 0, height = 0;  // pixels; 0: the scene's
+  std::string frames = {};    // "0-30,47-327:2"; empty: all
   std::string camera = "main";
   std::string name = {};               // of the film, as --as
   std::vector<std::string> sets = {};  // of film, cameras and looks
   std::filesystem::path video = {};    // .mp4, .webm or .gif; empty: film.mp4 in the folder
-  bool resume = false;            // frames that are right already are kept
+  bool resume = false;                 // frames that are right already are kept
 };
 struct Film {
   std::filesystem::path video;  // empty where not every frame is there

@@ -18,7 +18,8 @@ using namespace py::literals;
 
 namespace {
 
-// ---- Calls that take long ----------------------------------------------------------------------------------
+// ---- Calls that take long
+// ----------------------------------------------------------------------------------
 
 // Hears what a call tells, and hands it to Python.
 class PythonWatcher final : public limber::Watcher {
@@ -102,7 +103,8 @@ auto call(const py::object& progress, int threads, F&& work) {
   return std::move(*result);
 }
 
-// ---- Arrays ------------------------------------------------------------------------------------------------
+// ---- Arrays
+// ------------------------------------------------------------------------------------------------
 
 // Rows of what the caller gave; a copy.
 template <class T, std::size_t columns>
@@ -155,7 +157,8 @@ py::array view(const T* data, std::vector<py::ssize_t> shape, const py::object& 
 }
 template <class T, std::size_t columns>
 py::array view(const std::vector<std::array<T, columns>>& rows, const py::object& owner) {
-  return view(reinterpret_cast<const T*>(rows.data()), {py::ssize_t(rows.size()), py::ssize_t(columns)}, owner);
+  return view(reinterpret_cast<const T*>(rows.data()), {py::ssize_t(rows.size()), py::ssize_t(columns)},
+              owner);
 }
 template <class T>
 py::array view(const std::vector<T>& row, const py::object& owner) {
@@ -218,18 +221,17 @@ py::dtype push_dtype() {
     return std::tuple(name, format, offset);
   };
   py::list names, formats, offsets;
-  for (const auto& [name, format, offset] :
-       {field("kind", "<i4", offsetof(limber::Push, kind)),
-        field("force_n", "(3,)<f4", offsetof(limber::Push, force_n)),
-        field("node", "<i4", offsetof(limber::Push, node)),
-        field("radius_m", "<f4", offsetof(limber::Push, radius_m)),
-        field("target_m", "(3,)<f4", offsetof(limber::Push, target_m)),
-        field("max_force_n", "<f4", offsetof(limber::Push, max_force_n)),
-        field("steps", "<i4", offsetof(limber::Push, steps))}) {
+  for (const auto& [name, format, offset] : {field("kind", "<i4", offsetof(limber::Push, kind)),
+                                             field("force_n", "(3,)<f4", offsetof(limber::Push, force_n)),
+                                             field("node", "<i4", offsetof(limber::Push, node)),
+                                             field("radius_m", "<f4", offsetof(limber::Push, radius_m)),
+                                             field("target_m", "(3,)<f4", offsetof(limber::Push, target_m)),
+                                             field("max_force_n", "<f4", offsetof(limber::Push, max_force_n)),
+                                             field("steps", "<i4", offsetof(limber::Push, steps))}) {
     names.append(name), formats.append(format), offsets.append(offset);
   }
-  return py::dtype::from_args(
-      py::dict("names"_a = names, "formats"_a = formats, "offsets"_a = offsets, "itemsize"_a = sizeof(limber::Push)));
+  return py::dtype::from_args(py::dict("names"_a = names, "formats"_a = formats, "offsets"_a = offsets,
+                                       "itemsize"_a = sizeof(limber::Push)));
 }
 
 std::vector<limber::Push> pushes_of(const py::array& given) {
@@ -241,7 +243,8 @@ std::vector<limber::Push> pushes_of(const py::array& given) {
 }
 
 py::array array_of(const std::vector<limber::Push>& pushes) {
-  return py::array(push_dtype(), {py::ssize_t(pushes.size())}, {py::ssize_t(sizeof(limber::Push))}, pushes.data());
+  return py::array(push_dtype(), {py::ssize_t(pushes.size())}, {py::ssize_t(sizeof(limber::Push))},
+                   pushes.data());
 }
 
 limber::PrepareOptions prepare_options(int shells, double concavity, double threshold, double inflate,
@@ -310,16 +313,14 @@ PYBIND11_MODULE(_limber, m) {
              return limber::Cage{rows_of<double, 3>(vertices, "vertices"), rows_of<int, 4>(tets, "tets"), {}};
            }),
            "vertices"_a, "tets"_a)
-      .def_property_readonly("vertices",
-                             [](const py::object& self) {
-                               return view(self.cast<const limber::Cage&>().nodes, self);
-                             })
+      .def_property_readonly(
+          "vertices",
+          [](const py::object& self) { return view(self.cast<const limber::Cage&>().nodes, self); })
       .def_property_readonly(
           "tets", [](const py::object& self) { return view(self.cast<const limber::Cage&>().tets, self); })
-      .def_property_readonly("hull_from_tet",
-                             [](const py::object& self) {
-                               return view(self.cast<const limber::Cage&>().hull_from_tet, self);
-                             })
+      .def_property_readonly(
+          "hull_from_tet",
+          [](const py::object& self) { return view(self.cast<const limber::Cage&>().hull_from_tet, self); })
       .def_readonly("volume_ratio", &limber::Cage::volume_ratio)
       .def_readonly("notes", &limber::Cage::notes);
   m.def(
@@ -350,16 +351,16 @@ PYBIND11_MODULE(_limber, m) {
                              [](const py::object& self) {
                                return view(self.cast<const limber::Binding&>().tet_from_vertex, self);
                              })
-      .def_property_readonly("weights",
-                             [](const py::object& self) {
-                               return view(self.cast<const limber::Binding&>().weights, self);
-                             })
+      .def_property_readonly(
+          "weights",
+          [](const py::object& self) { return view(self.cast<const limber::Binding&>().weights, self); })
       .def_readonly("outside", &limber::Binding::outside)
       .def_readonly("max_outside_distance_m", &limber::Binding::max_outside_distance_m)
       .def(
           "deform",
           [](const limber::Binding& self, const py::object& tets, const py::object& nodes) {
-            return owned(limber::deform(self, rows_of<int, 4>(tets, "tets"), rows_of<double, 3>(nodes, "nodes")));
+            return owned(
+                limber::deform(self, rows_of<int, 4>(tets, "tets"), rows_of<double, 3>(nodes, "nodes")));
           },
           "tets"_a, "nodes"_a);
   m.def(
@@ -378,10 +379,9 @@ PYBIND11_MODULE(_limber, m) {
                              [](const py::object& self) {
                                return view(self.cast<const limber::Body&>().surface().vertices, self);
                              })
-      .def_property_readonly("faces",
-                             [](const py::object& self) {
-                               return view(self.cast<const limber::Body&>().surface().faces, self);
-                             })
+      .def_property_readonly(
+          "faces",
+          [](const py::object& self) { return view(self.cast<const limber::Body&>().surface().faces, self); })
       .def_property_readonly("hulls", [](const limber::Body& self) { return pairs_of(self.hulls()); })
       .def_property_readonly("cage", &limber::Body::cage, py::return_value_policy::reference_internal)
       .def_property_readonly("certificate", &limber::Body::certificate,
@@ -390,9 +390,8 @@ PYBIND11_MODULE(_limber, m) {
       .def("report_json", &limber::Body::report_json)
       .def("picture_png",
            [](const limber::Body& self) {
-             return py::bytes(call(py::none(), 0, [&](const limber::Context& context) {
-               return self.picture_png(context);
-             }));
+             return py::bytes(call(
+                 py::none(), 0, [&](const limber::Context& context) { return self.picture_png(context); }));
            })
       .def(
           "deform",
@@ -414,9 +413,8 @@ PYBIND11_MODULE(_limber, m) {
           });
         }
         const limber::Mesh mesh = mesh_of(model, faces);
-        return call(progress, threads, [&](const limber::Context& context) {
-          return limber::prepare(mesh, options, context);
-        });
+        return call(progress, threads,
+                    [&](const limber::Context& context) { return limber::prepare(mesh, options, context); });
       },
       "model"_a, "faces"_a, py::kw_only(), "shells"_a, "concavity"_a, "threshold"_a, "inflate"_a,
       "max_hull_vertices"_a, "exact"_a, "tets"_a, "mode"_a, "scale"_a, "y_up"_a, "progress"_a, "threads"_a);
@@ -470,7 +468,9 @@ PYBIND11_MODULE(_limber, m) {
       .def(
           "robot_centers",
           [](const limber::Problem& self, const Floats& positions, const Floats& velocities,
-             const Steps& steps) { return owned(self.robot_centers(states_of(positions, velocities, steps))); },
+             const Steps& steps) {
+            return owned(self.robot_centers(states_of(positions, velocities, steps)));
+          },
           "positions"_a, "velocities"_a, "steps"_a)
       .def(
           "plan",
@@ -487,9 +487,8 @@ PYBIND11_MODULE(_limber, m) {
       .def(
           "simulate",
           [](const limber::Problem& self, double duration_s, const py::object& progress, int threads) {
-            return call(progress, threads, [&](const limber::Context& context) {
-              return self.simulate(duration_s, context);
-            });
+            return call(progress, threads,
+                        [&](const limber::Context& context) { return self.simulate(duration_s, context); });
           },
           "duration_s"_a, py::kw_only(), "progress"_a, "threads"_a);
 

@@ -1,4 +1,5 @@
-// Plans a scene, throws a handful of pushes at its world, and prepares a model: plan_and_look [SCENE [MODEL]].
+// Plans a scene, throws a handful of pushes at its world, and prepares a model: plan_and_look [SCENE
+// [MODEL]].
 #include <limber/limber.h>
 
 #include <cstdio>
