@@ -14,7 +14,7 @@ Json json_of(const detail::SceneFindings& found) {
   if (found.contact_offset_m) json["contact_offset_m"] = *found.contact_offset_m;
   if (found.pairs) {
     json["overlaps"] = Json::array(), json["gaps_below_offset"] = Json::array();
-    for (const detail::SceneFindings::Pair& pair : *found.pairs) {
+    for (const detail::NearPair& pair : *found.pairs) {
       Json both{{"body", pair.body}, {"other", pair.other}};
       if (pair.parted)
         both.update(
@@ -28,7 +28,7 @@ Json json_of(const detail::SceneFindings& found) {
   return json;
 }
 
-void add_start(const detail::SceneFindings::Start& start, const std::optional<fs::path>& still, Json& json) {
+void add_start(const detail::StartFindings& start, const std::optional<fs::path>& still, Json& json) {
   json["dt_s"] = start.dt_s ? Json(*start.dt_s) : Json();
   for (const detail::GoalTerm& term : start.goal)
     json["goal"].push_back({{"asked", term.asked}, {"found", term.found}, {"met", term.met}});
@@ -50,7 +50,7 @@ std::string line(const char* key, const std::string& words) {
   return fmt::format("  {:12} {}\n", key, words);
 }
 
-std::string text_of(const detail::SceneFindings::Pair& pair, double offset_m) {
+std::string text_of(const detail::NearPair& pair, double offset_m) {
   const std::string both = fmt::format("{} and {}", pair.body, pair.other);
   return pair.parted
              ? line("overlap", fmt::format("{}: {:.3g} m deep, {:.3g} % of the robot's size{}", both,
@@ -62,7 +62,7 @@ std::string text_of(const detail::SceneFindings::Pair& pair, double offset_m) {
                                 both, pair.gap_m, offset_m));
 }
 
-std::string words_of(const std::optional<detail::SceneFindings::Tried>& tried) {
+std::string words_of(const std::optional<detail::TriedSearch>& tried) {
   if (!tried) return "not known before bodies are prepared; --work DIR prepares and tries";
   if (tried->solved)
     return fmt::format("a search of {} iterations and {:.2g} s reaches the goal", tried->iterations,
@@ -74,7 +74,7 @@ std::string words_of(const std::optional<detail::SceneFindings::Tried>& tried) {
       tried->iterations, tried->wall_s, tried->of_all, tried->all_wall_s);
 }
 
-std::string text_of(const detail::SceneFindings& found, const detail::SceneFindings::Start& start,
+std::string text_of(const detail::SceneFindings& found, const detail::StartFindings& start,
                     const std::optional<fs::path>& still) {
   std::string text = line("time step", start.dt_s ? fmt::format("{:.3g} ms", 1e3 * *start.dt_s)
                                                   : "not known before cages are made; --work DIR makes them");
@@ -110,7 +110,7 @@ Outcome check_scene(const detail::SceneCheckOptions& options) {
   std::string text;
   for (const Json& body : found.bodies) text += line_of_body(body);
   if (found.pairs)
-    for (const detail::SceneFindings::Pair& pair : *found.pairs)
+    for (const detail::NearPair& pair : *found.pairs)
       text += text_of(pair, found.contact_offset_m.value_or(0));
   if (found.start) {
     add_start(*found.start, options.still, json);

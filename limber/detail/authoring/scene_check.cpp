@@ -147,7 +147,7 @@ class Check {
     });
     found_.pairs.emplace();
     for (const Pair& pair : pairs) {
-      SceneFindings::Pair found;
+      NearPair found;
       found.body = name(pair.one), found.other = name(pair.other);
       if (pair.depth_m > 0) {
         found.depth_m = pair.depth_m, found.of_robot_size = pair.depth_m / robot_size_m_;
@@ -208,7 +208,7 @@ class Check {
       found_.problems.push_back(error.what());
       return;
     }
-    SceneFindings::Start& found = found_.start.emplace();
+    StartFindings& found = found_.start.emplace();
     found.prepared = start->prepared;
     if (start->step_known) found.dt_s = start->world.dt_s;
     const bool can_be_planned = scene_.lacks.empty();

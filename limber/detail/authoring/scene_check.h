@@ -19,6 +19,27 @@ struct SceneCheckOptions {
   std::string camera = "main", size;
 };
 
+// Two surfaces in one another, or so near that they push.
+struct NearPair {
+  std::string body, other;
+  double depth_m = 0, of_robot_size = 0;
+  std::optional<bool> parted;  // of those that overlap: before a plan begins
+  double gap_m = 0;            // of those that do not
+};
+struct TriedSearch {
+  std::int64_t iterations = 0, of_all = 0;
+  double wall_s = 0, all_wall_s = 0;  // all: estimated
+  bool solved = false;
+};
+struct StartFindings {
+  bool prepared = false;
+  std::optional<double> dt_s;
+  std::vector<GoalTerm> goal;  // where it is not prepared, of the middles of surfaces
+  Json rigid_passage;          // as Diagnosis has it; null where nothing was tried
+  std::optional<TriedSearch> tried;
+  double frames_a_second = 0;     // of the film, a second of motion
+  std::optional<double> paint_s;  // of the still
+};
 // As far as the check came: the first problems leave out what needs a scene without them.
 struct SceneFindings {
   fs::path file;
@@ -27,29 +48,9 @@ struct SceneFindings {
   std::vector<Json> bodies;                // as facts_of has them, with what their models are
   std::optional<double> prepare_cpu_s;     // estimated
   std::optional<double> contact_offset_m;  // where contact is on surfaces
-  struct Pair {                            // surfaces in one another, or so near that they push
-    std::string body, other;
-    double depth_m = 0, of_robot_size = 0;
-    std::optional<bool> parted;  // of those that overlap: before a plan begins
-    double gap_m = 0;            // of those that do not
-  };
-  std::optional<std::vector<Pair>> pairs;
+  std::optional<std::vector<NearPair>> pairs;
   std::optional<bool> film_possible;
-  struct Tried {  // a search
-    std::int64_t iterations = 0, of_all = 0;
-    double wall_s = 0, all_wall_s = 0;  // all: estimated
-    bool solved = false;
-  };
-  struct Start {
-    bool prepared = false;
-    std::optional<double> dt_s;
-    std::vector<GoalTerm> goal;  // where it is not prepared, of the middles of surfaces
-    Json rigid_passage;          // as Diagnosis has it; null where nothing was tried
-    std::optional<Tried> tried;
-    double frames_a_second = 0;     // of the film, a second of motion
-    std::optional<double> paint_s;  // of the still
-  };
-  std::optional<Start> start;
+  std::optional<StartFindings> start;
 };
 // What can be said of a scene before it is planned. Throws InputError where the still cannot be painted.
 SceneFindings check_scene(const SceneCheckOptions&);
