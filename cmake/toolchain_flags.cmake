@@ -2,6 +2,13 @@
 add_compile_options(-ffp-contract=off -Wall -Wextra -Wpedantic -Wshadow -Wnon-virtual-dtor -Werror)
 # Eigen's inlined loads trip GCC 12's false positives; GCC bugs 105562 and 106199 are of this family.
 add_compile_options(-Wno-maybe-uninitialized -Wno-array-bounds -Wno-stringop-overflow -Wno-stringop-overread)
+if(LIMBER_UNITY AND NOT LIMBER_FUZZ)
+  set(CMAKE_UNITY_BUILD ON)
+  set(CMAKE_UNITY_BUILD_BATCH_SIZE 8)
+  # A name of one file is not hidden by a local one of another in its batch; a file in a batch is no header, and its
+  # unnamed namespace its own; and inlined concatenations of strings trip GCC 12's false positives (bug 105651).
+  add_compile_options(-Wno-shadow -Wno-subobject-linkage -Wno-restrict)
+endif()
 if(LIMBER_FUZZ)
   add_compile_options(-fsanitize=fuzzer-no-link -Wno-error -Wno-unknown-warning-option)
 endif()

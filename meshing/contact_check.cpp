@@ -20,7 +20,6 @@ namespace {
 
 constexpr std::uint64_t seed = 1;
 constexpr int nodes_anywhere = 2000, nodes_at_samples = 4000, spots = 2000;
-constexpr double offset_share = 1e-4;  // as where shapes are made
 // What was found of good shapes is at most a half of these.
 constexpr double most_field_cells = 1.5, most_steepness = 2.5, most_gap = 4;
 constexpr double rounding = 1e-9;  // of the size
@@ -56,7 +55,7 @@ class Checker {
         size_(bounding_box(surface.positions).size().maxCoeff()),
         winding_(surface.positions, surface.triangles),
         closed_(is_closed(surface.triangles)),
-        seen_(detail::seen_surface(surface, winding_, closed_, size_ / 32, offset_share * size_)),
+        seen_(detail::seen_surface(surface, winding_, closed_, size_ / 32, detail::offset_share * size_)),
         distance_(soup_points(), soup_triangles()) {}
 
   ContactCheck check() {

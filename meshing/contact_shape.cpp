@@ -21,7 +21,6 @@ namespace {
 
 using Weights4 = Eigen::RowVector4d;
 
-constexpr double offset_share = 1e-4;  // of the size: how far beside the surface it is asked what is inside
 constexpr double least_cells_thick = 2;
 constexpr double well_resolved_cells =
     3;  // a thickness that is not worth more cells than settings.most_cells
@@ -278,7 +277,7 @@ ContactShape make_contact_shape(const SurfaceMesh& surface, const TetMesh& cage,
     return shape;
   };
   const WindingNumber winding(surface.positions, surface.triangles);
-  const double offset = offset_share * size;
+  const double offset = detail::offset_share * size;
   const bool closed = is_closed(surface.triangles);
   const detail::SeenSurface seen = detail::seen_surface(surface, winding, closed, size / 32, offset);
   r.open_share = seen.open_share;

@@ -14,7 +14,7 @@ namespace {
 // Who is off by this share of the goal's radius is pushed back with all of the largest force.
 constexpr double share_of_radius = 0.25;
 constexpr double pieces_a_radian = 5, longest_piece_s = 0.05;
-constexpr double reach_s = 5;  // after the guide's end
+constexpr double grace_s = 5;  // after the guide's end
 
 }  // namespace
 
@@ -72,7 +72,7 @@ Control Follower::next(const State& state) const {
 bool Follower::is_over(const State& state) const {
   if (piece_at(state) < ends_.size()) return false;
   const std::int64_t end = ends_.empty() ? system_.start().step : ends_.back();
-  return in_goal(state) || state.step >= end + steps_of(reach_s, system_.dt_s());
+  return in_goal(state) || state.step >= end + steps_of(grace_s, system_.dt_s());
 }
 
 // The settle looks whether the robot rests, and is as the goal asks; without one it is to be so now.

@@ -56,9 +56,9 @@ Plan solved_by(const System& system, const Settings& settings, const Course& pat
 }
 
 // Follows the reference piece by piece.
-class Follower {
+class ReferenceFollower {
  public:
-  Follower(const System& system, const Settings& settings, const Reference& reference)
+  ReferenceFollower(const System& system, const Settings& settings, const Reference& reference)
       : system_(system),
         settings_(settings),
         reference_(reference),
@@ -229,7 +229,7 @@ Plan refine(const System& system, const Settings& settings, const Reference& ref
     return solved_by(system, settings, replay);
   }
 
-  Follower follower(system, settings, reference);
+  ReferenceFollower follower(system, settings, reference);
   const Course followed = follower.follow(report);
   const Course arrived = follower.complete() ? arrive(system, settings, followed) : Course{};
   report.track_cpu_s = spent();

@@ -3,7 +3,6 @@
 #include <cstdio>
 // after cstdio, which it needs
 #include <jpeglib.h>
-#include <png.h>
 
 #include <csetjmp>
 #include <cstring>
@@ -34,55 +33,11 @@ void require_size(std::int64_t width, std::int64_t height, std::int64_t most_pix
 
 // ── PNG
 
-struct Source {
-  const std::string& file;
-  std::size_t at = 0;
-};
-void take(png_structp png, png_bytep bytes, png_size_t size) {
-  auto& source = *static_cast<Source*>(png_get_io_ptr(png));
-  if (size > source.file.size() - source.at) png_error(png, "is cut short");
-  std::memcpy(bytes, source.file.data() + source.at, size);
-  source.at += size;
-}
-[[noreturn]] void keep_message(png_structp png, png_const_charp message) {
-  std::strncpy(static_cast<char*>(png_get_error_ptr(png)), message, JMSG_LENGTH_MAX - 1);
-  png_longjmp(png, 1);
-}
-void no_warning(png_structp, png_const_charp) {}
-
-// libpng leaves an error by longjmp, so nothing with a destructor may live in here.
-bool decode_png(png_structp png, png_infop info, Source* source, Image8* image) {
-  if (setjmp(png_jmpbuf(png))) return false;
-  png_set_read_fn(png, source, take);
-  png_read_info(png, info);
-  png_set_expand(png);
-  png_set_scale_16(png);
-  png_set_strip_alpha(png);
-  png_set_gray_to_rgb(png);
-  const int passes = png_set_interlace_handling(png);
-  png_read_update_info(png, info);
-  const std::size_t stride = std::size_t(3) * std::size_t(image->width);
-  if (png_get_rowbytes(png, info) != stride) return false;
-  for (int pass = 0; pass < passes; ++pass)
-    for (int y = 0; y < image->height; ++y) png_read_row(png, &image->rgb[std::size_t(y) * stride], nullptr);
-  png_read_end(png, nullptr);
-  return true;
-}
-
 Image8 from_png(const std::string& bytes, const std::string& name) {
   const std::optional<PngInfo> whole = inspect_png_bytes(bytes);
   if (!whole) throw InputError(fmt::format("\"{}\" is a PNG that is cut short or damaged", name));
   require_size(whole->width, whole->height, most_pixels_a_byte_of_png, bytes, name);
-  Image8 image{whole->width, whole->height,
-               std::vector<std::uint8_t>(3 * std::size_t(whole->width) * std::size_t(whole->height))};
-  char message[JMSG_LENGTH_MAX] = "";
-  png_structp png = png_create_read_struct(PNG_LIBPNG_VER_STRING, message, keep_message, no_warning);
-  png_infop info = png ? png_create_info_struct(png) : nullptr;
-  Source source{bytes};
-  const bool done = info && decode_png(png, info, &source, &image);
-  png_destroy_read_struct(&png, &info, nullptr);
-  if (!done) throw InputError(fmt::format("\"{}\" is a PNG that cannot be read ({})", name, message));
-  return image;
+  return rgb_of_png(bytes, name);
 }
 
 // ── JPEG
@@ -101,7 +56,7 @@ struct Errors {
 void leave_at_warning(j_common_ptr jpeg, int level) {
   if (level < 0) leave(jpeg);
 }
-struct Progress {
+struct ScanCounter {
   jpeg_progress_mgr manager;
 };
 void count_scans(j_common_ptr jpeg) {
@@ -113,9 +68,10 @@ void count_scans(j_common_ptr jpeg) {
 
 enum class Step { header, pixels };
 
-// As decode_png. The picture has its size after the header.
-bool decode_jpeg(jpeg_decompress_struct* jpeg, Errors* errors, Progress* progress, const std::string* bytes,
-                 Step step, Image8* image) {
+// libjpeg leaves an error by longjmp, so nothing with a destructor may live in here. The picture has its size
+// after the header.
+bool decode_jpeg(jpeg_decompress_struct* jpeg, Errors* errors, ScanCounter* progress,
+                 const std::string* bytes, Step step, Image8* image) {
   if (setjmp(errors->back)) return false;
   if (step == Step::header) {
     jpeg_create_decompress(jpeg);
@@ -140,7 +96,7 @@ bool decode_jpeg(jpeg_decompress_struct* jpeg, Errors* errors, Progress* progres
 Image8 from_jpeg(const std::string& bytes, const std::string& name) {
   jpeg_decompress_struct jpeg{};
   Errors errors{};
-  Progress progress{};
+  ScanCounter progress{};
   jpeg.err = jpeg_std_error(&errors.manager);
   errors.manager.error_exit = leave;
   errors.manager.emit_message = leave_at_warning;

@@ -13,12 +13,12 @@ namespace limber::render {
 
 namespace {
 
-constexpr int axes = 32;             // each is looked along both ways
+constexpr int axis_count = 32;       // each is looked along both ways
 constexpr double off_surface = 1.5;  // cells; √2 is just enough for a plane never to hide its own points
 
 // Evenly over the half sphere: a spiral whose turns are a golden angle apart.
 Vec3 axis(int i) {
-  const double z = (i + 0.5) / axes, r = std::sqrt(1 - z * z);
+  const double z = (i + 0.5) / axis_count, r = std::sqrt(1 - z * z);
   const double turn = i * std::numbers::pi * (3 - std::sqrt(5));
   return {r * std::cos(turn), r * std::sin(turn), z};
 }
@@ -103,7 +103,7 @@ Eigen::VectorXd sky_occlusion(const Points& points, const Points& normals,
 
   Eigen::VectorXd hidden = Eigen::VectorXd::Zero(points.rows()), all = hidden;
   std::vector<Vec3f> placed;
-  for (int i = 0; i < axes; ++i) {
+  for (int i = 0; i < axis_count; ++i) {
     const Vec3 along = axis(i);
     DepthMap map(along, box, cells);
     for (const Occluder& occluder : occluders) {

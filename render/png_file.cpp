@@ -87,23 +87,55 @@ void take(png_structp png, png_bytep bytes, png_size_t size) {
 }
 void no_warning(png_structp, png_const_charp) {}
 
-bool decode(png_structp png, png_infop info, Source* source, Raster16* image) {
+// The levels that an image holds, and room for them; its first row.
+void ask_for_levels(png_structp png, const Raster16&) {
+  png_set_expand_16(png);
+  if (std::endian::native == std::endian::little) png_set_swap(png);
+}
+void ask_for_levels(png_structp png, const Image8&) {
+  png_set_expand(png);
+  png_set_scale_16(png);
+  png_set_strip_alpha(png);
+  png_set_gray_to_rgb(png);
+}
+png_bytep first_row(Raster16& image, int channels) {
+  image.channels = channels;
+  image.levels.assign(std::size_t(image.width) * std::size_t(image.height) * std::size_t(channels), 0);
+  return reinterpret_cast<png_bytep>(image.levels.data());
+}
+png_bytep first_row(Image8& image, int channels) {
+  image.rgb.assign(std::size_t(image.width) * std::size_t(image.height) * std::size_t(channels), 0);
+  return image.rgb.data();
+}
+
+// As encode.
+template <class Image>
+bool decode(png_structp png, png_infop info, Source* source, Image* image) {
   if (setjmp(png_jmpbuf(png))) return false;
   png_set_read_fn(png, source, take);
   png_read_info(png, info);
-  png_set_expand_16(png);
-  if (std::endian::native == std::endian::little) png_set_swap(png);
+  ask_for_levels(png, *image);
   const int passes = png_set_interlace_handling(png);
   png_read_update_info(png, info);
   image->width = int(png_get_image_width(png, info)), image->height = int(png_get_image_height(png, info));
-  image->channels = png_get_channels(png, info);
-  const std::size_t stride = std::size_t(image->width) * std::size_t(image->channels);
-  image->levels.assign(stride * std::size_t(image->height), 0);
+  const png_bytep rows = first_row(*image, png_get_channels(png, info));
+  const std::size_t stride = png_get_rowbytes(png, info);
   for (int pass = 0; pass < passes; ++pass)
-    for (int y = 0; y < image->height; ++y)
-      png_read_row(png, reinterpret_cast<png_bytep>(&image->levels[std::size_t(y) * stride]), nullptr);
+    for (int y = 0; y < image->height; ++y) png_read_row(png, rows + std::size_t(y) * stride, nullptr);
   png_read_end(png, nullptr);
   return true;
+}
+
+// "", or what libpng says is wrong.
+template <class Image>
+std::string decoded(const std::string& file, Image* image) {
+  char message[200] = "";
+  png_structp png = png_create_read_struct(PNG_LIBPNG_VER_STRING, message, keep_message, no_warning);
+  png_infop info = png ? png_create_info_struct(png) : nullptr;
+  Source source{file};
+  const bool done = info && decode(png, info, &source, image);
+  png_destroy_read_struct(&png, &info, nullptr);
+  return done ? "" : *message ? message : "no memory";
 }
 
 std::uint32_t big_endian(const char* p) {
@@ -205,15 +237,17 @@ Image8 read_png(const fs::path& path, Texts* texts) {
 
 Raster16 read_png_16(const fs::path& path, Texts* texts) {
   const auto [file, info] = read_whole(path);
-  char message[200] = "";
-  png_structp png = png_create_read_struct(PNG_LIBPNG_VER_STRING, message, keep_message, no_warning);
-  png_infop details = png ? png_create_info_struct(png) : nullptr;
-  Source source{file};
   Raster16 image;
-  const bool done = details && decode(png, details, &source, &image);
-  png_destroy_read_struct(&png, &details, nullptr);
-  if (!done) throw InputError(fmt::format("{}: {}; make it again", path.string(), message));
+  if (const std::string wrong = decoded(file, &image); !wrong.empty())
+    throw InputError(fmt::format("{}: {}; make it again", path.string(), wrong));
   if (texts) *texts = info.texts;
+  return image;
+}
+
+Image8 rgb_of_png(const std::string& file, const std::string& name) {
+  Image8 image;
+  if (const std::string wrong = decoded(file, &image); !wrong.empty())
+    throw InputError(fmt::format("\"{}\" is a PNG that cannot be read ({})", name, wrong));
   return image;
 }
 

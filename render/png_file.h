@@ -28,6 +28,10 @@ Image8 read_png(const fs::path&, Texts* texts = nullptr);
 // Any PNG with the channels it has (a palette becomes colours), 8-bit levels times 257. Throws as read_png.
 Raster16 read_png_16(const fs::path&, Texts* texts = nullptr);
 
+// The same of what a file holds, as eight-bit colors without transparency. Asks for as much memory as the
+// file says that it has pixels: inspect_png_bytes tells. Throws InputError with `name`.
+Image8 rgb_of_png(const std::string& file, const std::string& name);
+
 struct PngInfo {
   int width, height;
   Texts texts;

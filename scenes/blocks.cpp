@@ -14,7 +14,7 @@ namespace limber::scenes {
 
 namespace {
 
-constexpr int arc_steps = 3;  // from the face to the middle of a rounded edge
+constexpr int bevel_steps = 3;  // from the face to the middle of a rounded edge
 
 std::vector<double> distinct(std::vector<double> values) {
   std::sort(values.begin(), values.end());
@@ -106,7 +106,7 @@ bool ends_at(const Grid& grid, int axis, int line, bool towards_higher) {
 // spaced so that they become even steps of the arc.
 std::vector<double> surface_lines(const Grid& coarse, int axis, double bevel, double longest) {
   const auto along_arc = [&](int step) {
-    return bevel * (1 - std::tan(std::numbers::pi / 4 * step / arc_steps));
+    return bevel * (1 - std::tan(std::numbers::pi / 4 * step / bevel_steps));
   };
   std::vector<double> lines;
   for (int i = 0; i < coarse.cells(axis); ++i) {
@@ -114,10 +114,10 @@ std::vector<double> surface_lines(const Grid& coarse, int axis, double bevel, do
     const bool ends = bevel > 0 && ends_at(coarse, axis, i + 1, true);
     const double lower = coarse.line(axis, i), upper = coarse.line(axis, i + 1);
     const double from = starts ? lower + bevel : lower, to = ends ? upper - bevel : upper;
-    for (int step = arc_steps; starts && step > 0; --step) lines.push_back(lower + along_arc(step));
+    for (int step = bevel_steps; starts && step > 0; --step) lines.push_back(lower + along_arc(step));
     const int n = pieces(to - from, longest);
     for (int piece = 0; piece <= n; ++piece) lines.push_back(from + (to - from) * piece / n);
-    for (int step = 1; ends && step <= arc_steps; ++step) lines.push_back(upper - along_arc(step));
+    for (int step = 1; ends && step <= bevel_steps; ++step) lines.push_back(upper - along_arc(step));
   }
   return distinct(std::move(lines));
 }

@@ -4,14 +4,13 @@
 #include <cmath>
 #include <limits>
 
+#include "fem/detail/list_margins.h"
 #include "fem/world.h"
 
 namespace limber::fem::detail {
 namespace {
 
-// Share of a distance that movement may use up, and of the reach, by which less; the rest is for rounding.
-// And what is farther than this share of the reach is apart, however it is computed.
-constexpr float kept = 0.9f, rounding = 0.02f, certain = 0.004f;
+using namespace list_margins;
 
 // The sides of a box that a node is beyond are bits; a place that is not finite, of a rollout that blows up:
 constexpr unsigned char lost = 64;

@@ -120,10 +120,10 @@ Sparse over_axes(const Sparse& by_node, const Freedoms& rows, const Freedoms& co
 }
 
 // ∇λ of a tet's four barycentric coordinates, as rows; and its volume.
-struct Shape {
+struct TetShape {
   Eigen::Matrix<double, 4, 3> gradient;
   double volume;
-  Shape(const Points& x, const Tets& tets, int t) {
+  TetShape(const Points& x, const Tets& tets, int t) {
     Vec3 p[4];
     for (int i = 0; i < 4; ++i) p[i] = x.row(tets(t, i));
     const Vec3 b = p[1] - p[0], c = p[2] - p[0], d = p[3] - p[0];
@@ -145,7 +145,7 @@ class Quadratic {
         mesh_nodes_(int(mesh.positions.rows())) {
     for (int t = 0; t < mesh.tets.rows(); ++t) {
       const auto q = mesh.tets.row(t);
-      Element e{{q[0], q[1], q[2], q[3]}, Shape(mesh.positions, mesh.tets, t), of_tet[std::size_t(t)]};
+      Element e{{q[0], q[1], q[2], q[3]}, TetShape(mesh.positions, mesh.tets, t), of_tet[std::size_t(t)]};
       for (int k = 0; k < 6; ++k) e.node[4 + k] = middles_.of(q[tet_edges[k][0]], q[tet_edges[k][1]]);
       elements_.push_back(e);
     }
@@ -252,13 +252,13 @@ class Quadratic {
   using Nodal = Eigen::Matrix<double, 10, 3>;
   struct Element {
     int node[10];  // corners, then middles
-    Shape shape;
+    TetShape shape;
     Lame lame;
   };
   static double weight(int point, int corner) {
     return point == corner ? 0.58541019662496845 : 0.13819660112501051;  // (5 + 3√5)/20 and (5 − √5)/20
   }
-  static Nodal gradients(const Shape& shape, int point) {
+  static Nodal gradients(const TetShape& shape, int point) {
     Nodal g;
     for (int i = 0; i < 4; ++i) g.row(i) = (4 * weight(point, i) - 1) * shape.gradient.row(i);
     for (int k = 0; k < 6; ++k) {
@@ -289,7 +289,7 @@ Sparse stiffness_at_rest(const ElementTables<double>& elements, const TetMesh& m
   }
   const bool springs = elements.neo_hookeans.elements.empty();
   for (int t = 0; t < mesh.tets.rows(); ++t) {
-    const Shape shape(x, mesh.tets, t);
+    const TetShape shape(x, mesh.tets, t);
     for (int a = 0; a < 4; ++a)
       for (int b = 0; b < 4; ++b) {
         const Vec3 ga = shape.gradient.row(a), gb = shape.gradient.row(b);

@@ -4,14 +4,13 @@
 #include <cmath>
 #include <limits>
 
+#include "fem/detail/list_margins.h"
 #include "fem/world.h"
 
 namespace limber::fem::detail {
 namespace {
 
-// Share of a distance that movement may use up, and of the reach, by which less; the rest is for rounding.
-// And what is farther than this share of the reach is apart, however it is computed.
-constexpr float kept = 0.9f, rounding = 0.02f, certain = 0.004f;
+using namespace list_margins;
 // Candidates that a list holds without costing much, and how far lists reach, in skins.
 constexpr std::size_t few_candidates = 1000, many_candidates = 3000;
 constexpr float nearest_reach = 0.5f, farthest_reach = 6;

@@ -11,14 +11,14 @@ namespace {
 
 using TetCorners = std::array<Vec3, 4>;
 
-struct Plane {
+struct FacePlane {
   Vec3 normal;  // inwards
   double offset;
 };
 
-std::array<Plane, 4> planes_of(const TetCorners& p) {
+std::array<FacePlane, 4> planes_of(const TetCorners& p) {
   static constexpr int face[4][3] = {{1, 2, 3}, {0, 3, 2}, {0, 1, 3}, {0, 2, 1}};
-  std::array<Plane, 4> planes;
+  std::array<FacePlane, 4> planes;
   for (int i = 0; i < 4; ++i) {
     const Vec3& a = p[face[i][0]];
     const Vec3 n = -(p[face[i][1]] - a).cross(p[face[i][2]] - a);
@@ -28,8 +28,8 @@ std::array<Plane, 4> planes_of(const TetCorners& p) {
 }
 
 // The part of a segment within the tet; its two ends, or nothing.
-bool clip(const std::array<Plane, 4>& planes, Vec3& a, Vec3& b) {
-  for (const Plane& plane : planes) {
+bool clip(const std::array<FacePlane, 4>& planes, Vec3& a, Vec3& b) {
+  for (const FacePlane& plane : planes) {
     const double da = plane.normal.dot(a) - plane.offset, db = plane.normal.dot(b) - plane.offset;
     if (da < 0 && db < 0) return false;
     if (da < 0)
@@ -41,8 +41,8 @@ bool clip(const std::array<Plane, 4>& planes, Vec3& a, Vec3& b) {
 }
 
 // A polygon within the tet by clipping a triangle (Sutherland and Hodgman 1974).
-std::vector<Vec3> clip(const std::array<Plane, 4>& planes, std::vector<Vec3> polygon) {
-  for (const Plane& plane : planes) {
+std::vector<Vec3> clip(const std::array<FacePlane, 4>& planes, std::vector<Vec3> polygon) {
+  for (const FacePlane& plane : planes) {
     std::vector<Vec3> next;
     for (std::size_t i = 0; i < polygon.size(); ++i) {
       const Vec3 &p = polygon[i], &q = polygon[(i + 1) % polygon.size()];
@@ -57,7 +57,7 @@ std::vector<Vec3> clip(const std::array<Plane, 4>& planes, std::vector<Vec3> pol
 
 bool holds_strangers(const CageModel& model, const SurfaceMesh& surface, const TetCorners& corners,
                      const std::vector<int>& triangles) {
-  const std::array<Plane, 4> planes = planes_of(corners);
+  const std::array<FacePlane, 4> planes = planes_of(corners);
   const auto at = [&](int v) { return Vec3(surface.positions.row(v)); };
 
   UnionFind pieces(int(triangles.size()));

@@ -7,17 +7,19 @@
 namespace limber::meshing::detail {
 namespace {
 
-Cell half_units(const LatticeNode& n) { return 2 * n.cell + Cell::Constant(n.kind); }
+LatticeCell half_units(const LatticeNode& n) { return 2 * n.cell + LatticeCell::Constant(n.kind); }
 
 // Each edge between two A neighbours has a ring of four B nodes; the edge and two successive ones make a tet.
 std::array<std::array<LatticeNode, 4>, tets_a_cell> corners_of_cell() {
   std::array<std::array<LatticeNode, 4>, tets_a_cell> corners;
   for (int axis = 0; axis < 3; ++axis) {
-    const Cell e = Cell::Unit(axis), u = Cell::Unit((axis + 1) % 3), v = Cell::Unit((axis + 2) % 3);
-    const std::array<Cell, 4> ring{Cell(0, 0, 0), Cell(-u), Cell(-u - v), Cell(-v)};
+    const LatticeCell e = LatticeCell::Unit(axis), u = LatticeCell::Unit((axis + 1) % 3),
+                      v = LatticeCell::Unit((axis + 2) % 3);
+    const std::array<LatticeCell, 4> ring{LatticeCell(0, 0, 0), LatticeCell(-u), LatticeCell(-u - v),
+                                          LatticeCell(-v)};
     for (int k = 0; k < 4; ++k) {
       auto& c = corners[4 * axis + k];
-      c = {LatticeNode{Cell::Zero(), 0}, LatticeNode{e, 0}, LatticeNode{ring[k], 1},
+      c = {LatticeNode{LatticeCell::Zero(), 0}, LatticeNode{e, 0}, LatticeNode{ring[k], 1},
            LatticeNode{ring[(k + 1) % 4], 1}};
       std::array<Vec3, 4> p;
       std::transform(c.begin(), c.end(), p.begin(),
@@ -28,7 +30,7 @@ std::array<std::array<LatticeNode, 4>, tets_a_cell> corners_of_cell() {
   return corners;
 }
 
-bool has(const std::array<LatticeNode, 4>& corners, const Cell& shift, const LatticeNode& node) {
+bool has(const std::array<LatticeNode, 4>& corners, const LatticeCell& shift, const LatticeNode& node) {
   return std::any_of(corners.begin(), corners.end(), [&](const LatticeNode& n) {
     return LatticeNode{n.cell + shift, n.kind} == node;
   });
@@ -38,17 +40,17 @@ template <class Visit>
 void for_cells_around(Visit visit) {
   for (int z = -1; z <= 1; ++z)
     for (int y = -1; y <= 1; ++y)
-      for (int x = -1; x <= 1; ++x) visit(Cell(x, y, z));
+      for (int x = -1; x <= 1; ++x) visit(LatticeCell(x, y, z));
 }
 
 Pattern make_pattern() {
   Pattern p;
   p.corners = corners_of_cell();
   const auto find_across = [&](int which, int corner) {
-    LatticeTet found{Cell::Zero(), -1};
-    for_cells_around([&](const Cell& shift) {
+    LatticeTet found{LatticeCell::Zero(), -1};
+    for_cells_around([&](const LatticeCell& shift) {
       for (int other = 0; other < tets_a_cell; ++other) {
-        if (shift == Cell::Zero() && other == which) continue;
+        if (shift == LatticeCell::Zero() && other == which) continue;
         bool shares = true;
         for (int k = 0; k < 4; ++k)
           if (k != corner) shares = shares && has(p.corners[other], shift, p.corners[which][k]);
@@ -62,9 +64,9 @@ Pattern make_pattern() {
     for (int corner = 0; corner < 4; ++corner) p.neighbours[which][corner] = find_across(which, corner);
 
   for (int kind = 0; kind < 2; ++kind) {
-    const LatticeNode node{Cell::Zero(), kind};
+    const LatticeNode node{LatticeCell::Zero(), kind};
     int count = 0;
-    for_cells_around([&](const Cell& shift) {
+    for_cells_around([&](const LatticeCell& shift) {
       for (int which = 0; which < tets_a_cell; ++which)
         if (has(p.corners[which], shift, node)) p.star[kind].at(count++) = {shift, which};
     });
@@ -103,7 +105,7 @@ std::array<Vec3, 4> Lattice::tet_positions(int tet) const {
 
 int Lattice::neighbour(int tet, int corner) const {
   const LatticeTet& across = pattern().neighbours[tet % tets_a_cell][corner];
-  const Cell c = cell(tet / tets_a_cell) + across.cell;
+  const LatticeCell c = cell(tet / tets_a_cell) + across.cell;
   return holds(c) ? tet_index({c, across.which}) : -1;
 }
 

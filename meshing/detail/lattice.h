@@ -10,17 +10,17 @@
 
 namespace limber::meshing::detail {
 
-using Cell = Eigen::Vector3i;
+using LatticeCell = Eigen::Vector3i;
 
 // A node is (cell, kind): A sits in the cell's lower corner, B in its middle.
 struct LatticeNode {
-  Cell cell;
+  LatticeCell cell;
   int kind;  // 0: A, 1: B
   bool operator==(const LatticeNode&) const = default;
 };
 // A tet is (cell, which of twelve).
 struct LatticeTet {
-  Cell cell;
+  LatticeCell cell;
   int which;
 };
 
@@ -41,13 +41,15 @@ const Pattern& pattern();
 struct Lattice {
   Vec3 origin;                   // of cell 0
   double spacing;                // edge of a cell
-  Cell cells;                    // how many along each axis
+  LatticeCell cells;             // how many along each axis
   std::vector<Vec3> moved = {};  // by node_index, where each node went; empty when none did
 
   std::int64_t cell_count() const { return std::int64_t(cells.x()) * cells.y() * cells.z(); }
-  bool holds(const Cell& c) const { return (c.array() >= 0).all() && (c.array() < cells.array()).all(); }
-  int index(const Cell& c) const { return (c.z() * cells.y() + c.y()) * cells.x() + c.x(); }
-  Cell cell(int index) const {
+  bool holds(const LatticeCell& c) const {
+    return (c.array() >= 0).all() && (c.array() < cells.array()).all();
+  }
+  int index(const LatticeCell& c) const { return (c.z() * cells.y() + c.y()) * cells.x() + c.x(); }
+  LatticeCell cell(int index) const {
     return {index % cells.x(), index / cells.x() % cells.y(), index / cells.x() / cells.y()};
   }
   int tet_index(const LatticeTet& t) const { return index(t.cell) * tets_a_cell + t.which; }

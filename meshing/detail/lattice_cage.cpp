@@ -33,7 +33,7 @@ Lattice lattice_round(const Box& box, double spacing, const Vec3& phase) {
   lattice.origin = box.lower - spacing * (Vec3::Constant(margin) + phase);
   const Vec3 cells = (box.size() / spacing).array().ceil() + 2 * margin + 1;
   // As doubles first: a product of ints would overflow.
-  lattice.cells = cells.prod() <= double(max_cells) ? Cell(cells.cast<int>()) : Cell::Zero();
+  lattice.cells = cells.prod() <= double(max_cells) ? LatticeCell(cells.cast<int>()) : LatticeCell::Zero();
   return lattice;
 }
 
@@ -54,8 +54,8 @@ std::vector<int> cells_near(const CageModel& model, const Lattice& lattice) {
                   (piece.box.upper - lattice.origin) / lattice.spacing};
     const Vec3 n = (p[1] - p[0]).cross(p[2] - p[0]);
     const double reach = (half_width + 1e-6) * n.cwiseAbs().sum();  // of a cell's box along n
-    const Cell first = (box.lower.array() - 1.5).floor().cast<int>(),
-               last = (box.upper.array() + 1).floor().cast<int>();
+    const LatticeCell first = (box.lower.array() - 1.5).floor().cast<int>(),
+                      last = (box.upper.array() + 1).floor().cast<int>();
     for (int z = first.z(); z <= last.z(); ++z)
       for (int y = first.y(); y <= last.y(); ++y)
         for (int x = first.x(); x <= last.x(); ++x)
@@ -166,7 +166,7 @@ Star star_of(const Grid& grid, const LatticeNode& node) {
   Star star;
   for (int i = 0; i < tets_a_node; ++i) {
     const LatticeTet& t = pattern().star[node.kind][i];
-    const Cell cell = node.cell + t.cell;
+    const LatticeCell cell = node.cell + t.cell;
     star.tets[i] = grid.lattice.holds(cell) ? grid.lattice.tet_index({cell, t.which}) : -1;
     if (star.tets[i] >= 0 && kept(grid.state[star.tets[i]])) star.kept |= 1u << i;
   }

@@ -10,6 +10,9 @@
 
 namespace limber::meshing::detail {
 
+inline constexpr double offset_share =
+    1e-4;  // of the size: how far beside a surface it is asked what is inside
+
 struct SurfacePiece {
   std::array<Vec3, 3> corners;
   int triangle;  // of the model

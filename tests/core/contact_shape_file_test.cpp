@@ -20,7 +20,7 @@ TetMesh cage() {
   return mesh;
 }
 
-SurfaceMesh surface() { return {0.25 * cage().positions, boundary_triangles(cage().tets)}; }
+SurfaceMesh shrunk_surface() { return {0.25 * cage().positions, boundary_triangles(cage().tets)}; }
 
 ContactShape shape() {
   ContactShape s;
@@ -45,8 +45,8 @@ TEST(ContactShapeFile, ReadsBackWhatItWrote) {
     ContactShape written = shape();
     written.usable = usable;
     if (!usable) written.samples = {Points(0, 3), Eigen::VectorXi(0), Weights(0, 4), Eigen::VectorXd(0)};
-    write_contact_shape(folder / "contact.npz", written, surface(), cage());
-    const ContactShape read = read_contact_shape(folder / "contact.npz", surface(), cage());
+    write_contact_shape(folder / "contact.npz", written, shrunk_surface(), cage());
+    const ContactShape read = read_contact_shape(folder / "contact.npz", shrunk_surface(), cage());
     EXPECT_EQ(read.usable, usable);
     EXPECT_EQ(read.field.lower_m, written.field.lower_m);
     EXPECT_EQ(read.field.cell_m, written.field.cell_m);
@@ -78,11 +78,12 @@ TEST(ContactShapeFile, AFieldIsTrilinear) {
 
 TEST(ContactShapeFile, EveryTruncatedPrefixIsAnInputError) {
   const TemporaryFolder folder;
-  write_contact_shape(folder / "contact.npz", shape(), surface(), cage());
+  write_contact_shape(folder / "contact.npz", shape(), shrunk_surface(), cage());
   const std::string whole = read_file(folder / "contact.npz");
   for (std::size_t size = 0; size < whole.size(); ++size) {
     std::ofstream(folder / "cut", std::ios::binary) << whole.substr(0, size);
-    EXPECT_THROW(read_contact_shape(folder / "cut", surface(), cage()), InputError) << size << " bytes";
+    EXPECT_THROW(read_contact_shape(folder / "cut", shrunk_surface(), cage()), InputError)
+        << size << " bytes";
   }
 }
 
@@ -91,7 +92,7 @@ TEST(ContactShapeFile, WhatContradictsItselfIsAnInputErrorThatSaysWhatToDo) {
   const fs::path path = folder / "contact.npz";
   const auto refused = [&](const std::string& because) {
     try {
-      read_contact_shape(path, surface(), cage());
+      read_contact_shape(path, shrunk_surface(), cage());
       ADD_FAILURE() << "read in spite of: " << because;
     } catch (const InputError& error) {
       EXPECT_NE(std::string(error.what()).find(because), std::string::npos) << error.what();
@@ -102,7 +103,7 @@ TEST(ContactShapeFile, WhatContradictsItselfIsAnInputErrorThatSaysWhatToDo) {
   const auto with = [&](const std::string& because, const std::function<void(ContactShape&)>& change) {
     ContactShape changed = shape();
     change(changed);
-    write_contact_shape(path, changed, surface(), cage());
+    write_contact_shape(path, changed, shrunk_surface(), cage());
     refused(because);
   };
   with("names tet 2", [](auto& s) { s.samples.tet_from_sample[2] = 2; });
@@ -123,7 +124,7 @@ TEST(ContactShapeFile, WhatContradictsItselfIsAnInputErrorThatSaysWhatToDo) {
   });
   with("nodes along an axis", [](auto& s) { s.field.nodes = {1, 1, 24}; });
 
-  write_contact_shape(path, shape(), surface(), cage());
+  write_contact_shape(path, shape(), shrunk_surface(), cage());
   Npz file = read_npz(path);
   file.arrays["sample_areas_m2"] = NpyArray::of_matrix(Eigen::VectorXd(Eigen::VectorXd::Ones(2)));
   write_npz(path, file);
@@ -136,13 +137,13 @@ TEST(ContactShapeFile, WhatContradictsItselfIsAnInputErrorThatSaysWhatToDo) {
   write_npz(path, file);
   refused("meta.json");
 
-  SurfaceMesh other = surface();
+  SurfaceMesh other = shrunk_surface();
   other.positions(0, 0) += 1e-3;
   write_contact_shape(path, shape(), other, cage());
   refused("another surface");
   TetMesh other_cage = cage();
   other_cage.positions(0, 0) -= 1e-3;
-  write_contact_shape(path, shape(), surface(), other_cage);
+  write_contact_shape(path, shape(), shrunk_surface(), other_cage);
   refused("another cage");
 }
 

@@ -18,7 +18,7 @@
 namespace limber {
 namespace {
 
-TetMesh two_tets() {
+TetMesh glued_tets() {
   TetMesh mesh;
   mesh.positions.resize(5, 3);
   mesh.positions << 0, 0, 0, 1.0 / 3, 0, 0, 0, M_PI, 0, 0, 0, 1e-7, 0.1, 0.2, -1e5;
@@ -27,10 +27,10 @@ TetMesh two_tets() {
   return mesh;
 }
 
-SurfaceMesh surface() { return {two_tets().positions, boundary_triangles(two_tets().tets)}; }
+SurfaceMesh glued_surface() { return {glued_tets().positions, boundary_triangles(glued_tets().tets)}; }
 
 std::vector<ConvexShell> shells() {
-  const TetMesh mesh = two_tets();
+  const TetMesh mesh = glued_tets();
   std::vector<ConvexShell> result(2);
   for (int s = 0; s < 2; ++s) {
     TetMesh one{Points(4, 3), Tets(1, 4)};
@@ -54,14 +54,14 @@ Npz arrays() {
 
 TEST(Files, EachFormatReadsBackWhatItWrote) {
   const TemporaryFolder folder;
-  write_ply(folder / "a.ply", surface());
-  EXPECT_EQ(read_ply(folder / "a.ply").positions, surface().positions);
-  EXPECT_EQ(read_ply(folder / "a.ply").triangles, surface().triangles);
+  write_ply(folder / "a.ply", glued_surface());
+  EXPECT_EQ(read_ply(folder / "a.ply").positions, glued_surface().positions);
+  EXPECT_EQ(read_ply(folder / "a.ply").triangles, glued_surface().triangles);
 
-  write_msh(folder / "a.msh", two_tets(), {3, 9});
+  write_msh(folder / "a.msh", glued_tets(), {3, 9});
   std::vector<int> label;
-  EXPECT_EQ(read_msh(folder / "a.msh", &label).positions, two_tets().positions);
-  EXPECT_EQ(read_msh(folder / "a.msh").tets, two_tets().tets);
+  EXPECT_EQ(read_msh(folder / "a.msh", &label).positions, glued_tets().positions);
+  EXPECT_EQ(read_msh(folder / "a.msh").tets, glued_tets().tets);
   EXPECT_EQ(label, (std::vector<int>{3, 9}));
 
   write_obj(folder / "a.obj", shells());
@@ -95,8 +95,8 @@ TEST(Files, SameArraysGiveTheSameBytes) {
 // A file that lost its end is never taken for a smaller file.
 TEST(Files, EveryTruncatedPrefixIsAnInputError) {
   const TemporaryFolder folder;
-  write_ply(folder / "a.ply", surface());
-  write_msh(folder / "a.msh", two_tets());
+  write_ply(folder / "a.ply", glued_surface());
+  write_msh(folder / "a.msh", glued_tets());
   write_obj(folder / "a.obj", shells());
   write_npz(folder / "a.npz", arrays());
   write_json(folder / "a.json", Json{{"a", {1, 2, 3}}});
@@ -123,8 +123,8 @@ TEST(Files, EveryTruncatedPrefixIsAnInputError) {
 // Any single changed byte: an InputError or another valid value, never anything else.
 TEST(Files, ChangedBytesNeverEscapeAsAnythingButInputError) {
   const TemporaryFolder folder;
-  write_ply(folder / "a.ply", surface());
-  write_msh(folder / "a.msh", two_tets());
+  write_ply(folder / "a.ply", glued_surface());
+  write_msh(folder / "a.msh", glued_tets());
   write_obj(folder / "a.obj", shells());
   write_npz(folder / "a.npz", arrays());
   const std::vector<std::pair<std::string, std::function<void(const fs::path&)>>> readers{

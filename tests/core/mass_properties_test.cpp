@@ -5,17 +5,10 @@
 
 #include <Eigen/Geometry>
 
+#include "tests/core/five_tet_cube.h"
+
 namespace limber {
 namespace {
-
-TetMesh five_tet_cube() {
-  TetMesh mesh;
-  mesh.positions.resize(8, 3);
-  for (int v = 0; v < 8; ++v) mesh.positions.row(v) << (v & 1), (v >> 1 & 1), (v >> 2 & 1);
-  mesh.tets.resize(5, 4);
-  mesh.tets << 0, 1, 2, 4, 3, 2, 1, 7, 5, 4, 7, 1, 6, 7, 4, 2, 1, 2, 4, 7;
-  return mesh;
-}
 
 TEST(MassProperties, ASurfaceIsClosedWhereEveryEdgeIsRunAlongBothWays) {
   const TetMesh cube = five_tet_cube();

@@ -21,16 +21,16 @@ namespace {
 using testing::Contains;
 using testing::HasSubstr;
 
-fs::path written(const std::string& name, const std::string& content) {
+fs::path format_file(const std::string& name, const std::string& content) {
   const fs::path folder = fs::path(testing::TempDir()) / "limber_formats";
   make_folder(folder);
   write_file(folder / name, content);
   return folder / name;
 }
 ImportedModel imported(const std::string& name, const std::string& content) {
-  return import_model(written(name, content), {.count_self_intersections = false});
+  return import_model(format_file(name, content), {.count_self_intersections = false});
 }
-std::string complaint_about(const std::string& name, const std::string& content) {
+std::string format_complaint(const std::string& name, const std::string& content) {
   try {
     imported(name, content);
   } catch (const InputError& e) {
@@ -274,32 +274,34 @@ TEST(Formats, PlyTriangleStrips) {
 }
 
 TEST(Formats, ComplaintsNameTheLine) {
-  EXPECT_THAT(complaint_about("a.obj", "v 0 0 0\nv 1 0 x\n"), HasSubstr("a.obj:2: z: \"x\" is not a number"));
-  EXPECT_THAT(complaint_about("b.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 4\n"),
+  EXPECT_THAT(format_complaint("a.obj", "v 0 0 0\nv 1 0 x\n"),
+              HasSubstr("a.obj:2: z: \"x\" is not a number"));
+  EXPECT_THAT(format_complaint("b.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 4\n"),
               HasSubstr("there are 3 vertices"));
-  EXPECT_THAT(complaint_about("c.obj", "v 0 0 0\nf 1 2 0\n"), HasSubstr("c.obj:2: corner \"0\""));
-  EXPECT_THAT(complaint_about("d.off", "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 3\n"),
+  EXPECT_THAT(format_complaint("c.obj", "v 0 0 0\nf 1 2 0\n"), HasSubstr("c.obj:2: corner \"0\""));
+  EXPECT_THAT(format_complaint("d.off", "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 3\n"),
               HasSubstr("d.off:6: a face names vertex 3"));
-  EXPECT_THAT(complaint_about("e.off", "OFF\n3 2 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n"),
+  EXPECT_THAT(format_complaint("e.off", "OFF\n3 2 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n"),
               HasSubstr("2 faces were announced"));
-  EXPECT_THAT(complaint_about("f.off", "4OFF\n3 1 0\n"), HasSubstr("other than three coordinates"));
+  EXPECT_THAT(format_complaint("f.off", "4OFF\n3 1 0\n"), HasSubstr("other than three coordinates"));
   EXPECT_THAT(
-      complaint_about(
+      format_complaint(
           "g.stl", "solid\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nendloop\nendfacet\n"),
       HasSubstr("g.stl:7: the facet ends before its third vertex"));
   EXPECT_THAT(
-      complaint_about("h.ply", "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nend_header\n0\n"),
+      format_complaint("h.ply", "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nend_header\n0\n"),
       HasSubstr("no property \"y\""));
-  EXPECT_THAT(
-      complaint_about("i.ply",
-                      "ply\nformat ascii 1.0\nelement vertex 4000000000\nproperty float x\nproperty float y\n"
-                      "property float z\nend_header\n0 0 0\n"),
-      HasSubstr("vertex 1 of 4000000000"));
-  EXPECT_THAT(complaint_about("j.obj", "v 0 0 0\r\n\r\nv 1 0 x\r\n"), HasSubstr("j.obj:3:"));
+  EXPECT_THAT(format_complaint(
+                  "i.ply",
+                  "ply\nformat ascii 1.0\nelement vertex 4000000000\nproperty float x\nproperty float y\n"
+                  "property float z\nend_header\n0 0 0\n"),
+              HasSubstr("vertex 1 of 4000000000"));
+  EXPECT_THAT(format_complaint("j.obj", "v 0 0 0\r\n\r\nv 1 0 x\r\n"), HasSubstr("j.obj:3:"));
   const std::string stl = as_stl_binary(cube());
-  EXPECT_THAT(complaint_about("k.stl", stl.substr(0, stl.size() - 20)), HasSubstr("ends inside triangle 11"));
-  EXPECT_THAT(complaint_about("empty.obj", ""), HasSubstr("the file is empty"));
-  EXPECT_THAT(complaint_about("noise.xyzzy", std::string(1000, '\7')), HasSubstr("cannot be read"));
+  EXPECT_THAT(format_complaint("k.stl", stl.substr(0, stl.size() - 20)),
+              HasSubstr("ends inside triangle 11"));
+  EXPECT_THAT(format_complaint("empty.obj", ""), HasSubstr("the file is empty"));
+  EXPECT_THAT(format_complaint("noise.xyzzy", std::string(1000, '\7')), HasSubstr("cannot be read"));
   EXPECT_THROW(import_model("no/such/file.obj"), InputError);
   EXPECT_THROW(import_model(testing::TempDir()), InputError);
 }
@@ -389,7 +391,7 @@ TEST(Assimp, SinglePrecisionCountsBeforeTheTransform) {
 TEST(Assimp, NoPrefixOfAGltfCrashes) {
   const std::string whole = gltf();
   for (std::size_t size = 1; size < whole.size() - 2; size += 97)
-    EXPECT_NE(complaint_about("cut.gltf", whole.substr(0, size)), "no InputError");
+    EXPECT_NE(format_complaint("cut.gltf", whole.substr(0, size)), "no InputError");
 }
 
 TEST(OwnProcess, ACrashIsAnAnswer) {

@@ -11,6 +11,7 @@ namespace limber::plan {
 namespace {
 
 using testing::passes;
+using testing::Threads;
 using testing::Toy;
 using testing::toy_settings;
 
@@ -31,18 +32,13 @@ Settings fast_settings() {
   return s;
 }
 
-void for_each_toy(const std::function<void(Toy&)>& law) {
+void for_point_and_chain(const std::function<void(Toy&)>& law) {
   Toy point(1, true, false, 99), chain(5, true, true, 1.6f);
   for (Toy* toy : {&point, &chain}) {
     SCOPED_TRACE(toy->nodes);
     law(*toy);
   }
 }
-
-struct Threads {
-  explicit Threads(int n) { set_thread_count(n); }
-  ~Threads() { set_thread_count(0); }
-};
 
 // One expansion after the other; each is chosen by a chooser that was told of the nodes of all expansions but
 // the lag before it.
@@ -66,7 +62,7 @@ Tree lagged_tree(const System& system, const Settings& s, std::int64_t iteration
 }
 
 TEST(Laws, ALaggingTreeIsTheSequentialOneOfItsRule) {
-  for_each_toy([](Toy& toy) {
+  for_point_and_chain([](Toy& toy) {
     for (const int lag : {1, 5, 31}) {
       Settings s = fast_settings();
       s.laws.lag = lag;
@@ -161,7 +157,7 @@ TEST(Laws, RefusingGivesTheSameBytesForAnyThreadsAndLanesAndInParts) {
 }
 
 TEST(Laws, SameBytesForAnyThreadsAndLanes) {
-  for_each_toy([](Toy& toy) {
+  for_point_and_chain([](Toy& toy) {
     const Settings s = fast_settings();
     std::optional<Plan> first;
     for (const int threads : {1, 2})
@@ -181,7 +177,7 @@ TEST(Laws, SameBytesForAnyThreadsAndLanes) {
 }
 
 TEST(Laws, CutAndResumedAnywhereEqualsUninterrupted) {
-  for_each_toy([](Toy& toy) {
+  for_point_and_chain([](Toy& toy) {
     const Settings s = fast_settings();
     const Plan whole = plan(toy, s);
     for (std::int64_t cut = 0; cut < whole.statistics.iterations;

@@ -14,6 +14,7 @@ namespace limber::plan {
 namespace {
 
 using testing::sequential_tree;
+using testing::Threads;
 using testing::Toy;
 using testing::toy_settings;
 
@@ -35,11 +36,6 @@ void for_each_toy(const std::function<void(Toy&)>& law) {
     law(toy);
   }
 }
-
-struct Threads {
-  explicit Threads(int n) { set_thread_count(n); }
-  ~Threads() { set_thread_count(0); }
-};
 
 TEST(Search, GrowsTheTreeOfTheSequentialAlgorithm) {
   for_each_toy([](Toy& toy) {

@@ -8,9 +8,16 @@
 #include <string>
 #include <vector>
 
+#include "core/threads.h"
 #include "plan/search.h"
 
 namespace limber::plan::testing {
+
+// So many threads, for as long as it lives.
+struct Threads {
+  explicit Threads(int n) { set_thread_count(n); }
+  ~Threads() { set_thread_count(0); }
+};
 
 struct Toy final : System {
   int nodes = 1;

@@ -10,7 +10,7 @@
 namespace limber::render {
 namespace {
 
-Image8 noise(int width, int height) {
+Image8 grain(int width, int height) {
   Rng rng(3, 0);
   Image8 image{width, height, {}};
   for (int i = 0; i < 3 * width * height; ++i) image.rgb.push_back(std::uint8_t(rng.uniform(0, 256)));
@@ -38,7 +38,7 @@ Eigen::Vector4i box_of_changes(const Image8& a, const Image8& b) {
 // Means keep the mean; three of them over w pixels, one after the other, leave 11/(20 w) of the variance of
 // noise along each axis.
 TEST(Card, ThePictureIsDimmedAndBlurred) {
-  const Image8 picture = noise(450, 300), dim = card(picture, {""});
+  const Image8 picture = grain(450, 300), dim = card(picture, {""});
   EXPECT_NEAR(mean_of(dim), 0.4 * mean_of(picture), 1);
   const auto spread = [&](const Image8& image) {
     const double mean = mean_of(image);
@@ -80,7 +80,7 @@ TEST(Card, WordsAreDarkOnPaleAndPaleOnDark) {
 }
 
 TEST(Card, MixedIsTheOneTheOtherAndTheMeanOfBoth) {
-  const Image8 a = noise(40, 30), b = filled(40, 30, Vec3(1, 0, 0.5));
+  const Image8 a = grain(40, 30), b = filled(40, 30, Vec3(1, 0, 0.5));
   EXPECT_EQ(mixed(a, b, 0), a);
   EXPECT_EQ(mixed(a, b, 1), b);
   const Image8 half = mixed(a, b, 0.5);
@@ -88,7 +88,7 @@ TEST(Card, MixedIsTheOneTheOtherAndTheMeanOfBoth) {
 }
 
 TEST(Card, APastedPictureIsThereWithinItsRimAndNothingElseChanges) {
-  const Image8 ground = filled(60, 40, Vec3(0, 0, 0)), small = noise(20, 10);
+  const Image8 ground = filled(60, 40, Vec3(0, 0, 0)), small = grain(20, 10);
   for (const auto& [left, top] : {std::pair(7, 9), std::pair(-5, -3), std::pair(50, 35)}) {
     Image8 image = ground;
     paste(image, small, left, top, 2, Vec3(1, 1, 1));

@@ -22,7 +22,7 @@ namespace limber::detail {
 namespace {
 
 constexpr double units_a_metre = 1000;
-constexpr const char* tables[] = {"isa_element_parts.txt", "partof_element_parts.txt"};
+constexpr const char* table_names[] = {"isa_element_parts.txt", "partof_element_parts.txt"};
 constexpr std::uintmax_t most_table_bytes = 64 << 20;
 
 // Letters, digits, - and _ as they are, all else as _: what files and bodies can be called by.
@@ -229,7 +229,7 @@ const Concept& concept_of(const std::map<std::string, Concept>& concepts, const 
 
 std::vector<Part> parts_of_atlas(const PartSource& source, std::vector<std::string>& notes) {
   std::map<std::string, Concept> concepts;
-  for (const char* table : tables) read_elements(source.from / table, concepts);
+  for (const char* table : table_names) read_elements(source.from / table, concepts);
   if (concepts.empty()) throw InputError(fmt::format("{}: its tables are empty", source.from.string()));
   if (source.only.empty())
     throw InputError(fmt::format(
@@ -271,7 +271,7 @@ std::vector<Part> parts_of_atlas(const PartSource& source, std::vector<std::stri
 
 bool is_atlas(const fs::path& folder) {
   std::error_code none;
-  return std::any_of(std::begin(tables), std::end(tables),
+  return std::any_of(std::begin(table_names), std::end(table_names),
                      [&](const char* table) { return fs::is_regular_file(folder / table, none); });
 }
 

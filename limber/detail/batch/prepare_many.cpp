@@ -32,13 +32,13 @@ constexpr double clock_over_cpu = 5;  // a busy machine gives a process less tha
 constexpr int between_looks_us = 2000;
 constexpr double patience_s = 0.5;  // with those that are told to stop
 
-enum class Found { made, in_store, up_to_date, failed, failed_before };
+enum class Outcome { made, in_store, up_to_date, failed, failed_before };
 
 struct Work {
   BatchModel result;
   std::string body_key, file_hash;
   std::uintmax_t bytes = 0;
-  Found found = Found::made;
+  Outcome found = Outcome::made;
   bool pending = false;
 };
 
@@ -101,7 +101,7 @@ class Batch {
       std::error_code none;
       work.bytes = fs::file_size(file, none);
     } catch (const InputError& error) {
-      fail(work, "refused", error.what(), Found::failed);
+      fail(work, "refused", error.what(), Outcome::failed);
       return;
     }
     Json more{{"body", work.body_key}};
@@ -115,15 +115,15 @@ class Batch {
     const Json* said = journal_->find(work.result.model.name);
     if (said && said->at("key") != work.result.key) said = nullptr;
     if (said && would_fail_again(*said)) {
-      fail(work, said->at("reason"), said->at("message"), Found::failed_before);
+      fail(work, said->at("reason"), said->at("message"), Outcome::failed_before);
       return;
     }
     const fs::path folder = folder_of(out_, work.result);
     if (is_there(folder, input, file, said)) {
       store_->keep(work.body_key, folder);
-      work.found = Found::up_to_date;
+      work.found = Outcome::up_to_date;
     } else if (!asks_for_more() && fetch(work, input, folder)) {
-      work.found = Found::in_store;
+      work.found = Outcome::in_store;
     } else {
       work.pending = true;
     }
@@ -159,7 +159,7 @@ class Batch {
     return store_->fetch(work.body_key, input, work.result.model.file.string(), folder).has_value();
   }
 
-  void fail(Work& work, const std::string& reason, const std::string& message, Found found) {
+  void fail(Work& work, const std::string& reason, const std::string& message, Outcome found) {
     work.result.reason = reason, work.result.message = message;
     work.found = found, work.pending = false;
   }
@@ -204,7 +204,7 @@ class Batch {
         running.erase(running.begin() + std::ptrdiff_t(r));
         settle(work, *end);
         done += weight_of(work), ++ended;
-        failed += work.found == Found::failed;
+        failed += work.found == Outcome::failed;
         events::tell({{"event", "model"},
                       {"name", work.result.model.name},
                       {"reason", work.result.reason},
@@ -276,7 +276,7 @@ class Batch {
               {"also_written", Json::array()}};
     work.pending = false;
     judge(work, end, said);
-    if (work.found == Found::failed) {
+    if (work.found == Outcome::failed) {
       line["reason"] = work.result.reason, line["message"] = work.result.message;
       log::warn("{}: {}: {}", work.result.model.name, work.result.reason, work.result.message);
     } else {
@@ -289,7 +289,7 @@ class Batch {
     const bool told = said.is_object() && said.contains("error") && said.at("error").is_string();
     const std::string error = told ? said.at("error").get<std::string>() : last_line(end.err);
     const auto failed = [&](const char* reason, const std::string& message) {
-      fail(work, reason, message, Found::failed);
+      fail(work, reason, message, Outcome::failed);
     };
     if (end.reason == EndedProcess::out_of_time)
       return failed("time",
@@ -356,7 +356,7 @@ class Batch {
   PreparedMany finish() {
     write_quarantine();
     std::vector<BatchModel> results;
-    std::map<Found, int> count;
+    std::map<Outcome, int> count;
     PreparedMany prepared;
     for (const Work& work : work_) {
       results.push_back(work.result);
@@ -368,9 +368,9 @@ class Batch {
     write_tables(out_, results, *journal_);
     write_pages(out_, results);
     prepared.models = int(work_.size());
-    prepared.made = count[Found::made], prepared.in_store = count[Found::in_store];
-    prepared.up_to_date = count[Found::up_to_date];
-    prepared.failed = count[Found::failed], prepared.failed_before = count[Found::failed_before];
+    prepared.made = count[Outcome::made], prepared.in_store = count[Outcome::in_store];
+    prepared.up_to_date = count[Outcome::up_to_date];
+    prepared.failed = count[Outcome::failed], prepared.failed_before = count[Outcome::failed_before];
     prepared.manifest = out_ / "manifest.jsonl", prepared.table = out_ / "manifest.csv";
     prepared.page = out_ / "index.html";
     return prepared;

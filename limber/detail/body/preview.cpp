@@ -83,7 +83,7 @@ Points lines_between(const std::set<std::pair<int, int>>& edges, const Points& p
   return ends;
 }
 
-std::string name_of(const PreparedBody& body) {
+std::string file_name_of(const PreparedBody& body) {
   return fs::path(body.report.at("model").get<std::string>()).filename().string();
 }
 
@@ -127,7 +127,7 @@ render::Image8 picture_of_shells(const PreparedBody& body, const std::vector<Con
   const Json& figures = body.report.at("shells");
   return render::with_caption(
       draw_shells(shells, bounding_box(body.surface.positions).center(), large),
-      {fmt::format("{}: {} convex shells, drawn apart", name_of(body), shells.size()),
+      {fmt::format("{}: {} convex shells, drawn apart", file_name_of(body), shells.size()),
        fmt::format(
            "overshoot mean {:.3f} %, largest {:.3f} % of the diagonal; {} of {} triangles not covered",
            100 * figures.at("mean_overshoot").get<double>(), 100 * figures.at("max_overshoot").get<double>(),
@@ -164,8 +164,8 @@ render::Image8 draw_cage(const SurfaceMesh& surface, const TetMesh& cage, const 
 
 render::Image8 picture_of_cage(const PreparedBody& body) {
   return render::with_caption(draw_cage(body.surface, body.cage, large),
-                              {fmt::format("{}: the cage over the surface of {} triangles", name_of(body),
-                                           body.surface.triangles.rows()),
+                              {fmt::format("{}: the cage over the surface of {} triangles",
+                                           file_name_of(body), body.surface.triangles.rows()),
                                tets_caption(body), fit_caption(body)});
 }
 
@@ -215,7 +215,7 @@ render::Image8 picture_of_cut(const PreparedBody& body) {
                      {.color_srgb = {0.12, 0.12, 0.15}, .width_px = 1.3, .opacity = 0.8});
   return render::with_caption(
       renderer.draw_shown(camera),
-      {fmt::format("{}: tets behind a cut, coloured by their smallest dihedral", name_of(body)),
+      {fmt::format("{}: tets behind a cut, coloured by their smallest dihedral", file_name_of(body)),
        tets_caption(body), fit_caption(body)},
       legend());
 }
@@ -239,7 +239,7 @@ render::Image8 picture_of_dihedrals(const PreparedBody& body) {
   const Json& cage = body.report.at("cage");
   return render::with_caption(
       render::histogram(angles, look),
-      {fmt::format("{}: dihedral angles of {} tets", name_of(body), body.cage.tets.rows()),
+      {fmt::format("{}: dihedral angles of {} tets", file_name_of(body), body.cage.tets.rows()),
        fmt::format("smallest {:.1f}, largest {:.1f}; median of the tets' smallest {:.1f} degrees",
                    cage.at("min_dihedral_deg").get<double>(), cage.at("max_dihedral_deg").get<double>(),
                    cage.at("median_min_dihedral_deg").get<double>())});

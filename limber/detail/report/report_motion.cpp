@@ -12,7 +12,7 @@ namespace limber::detail {
 
 namespace {
 
-Json json_of(const Vec3& v) { return {v.x(), v.y(), v.z()}; }
+Json coordinates(const Vec3& v) { return {v.x(), v.y(), v.z()}; }
 
 class Packer {
  public:
@@ -65,9 +65,9 @@ PackedMotion pack_motion(const fem::World& world, const std::vector<PreparedBody
       return std::vector<decltype(zero)>(matrix.data(), matrix.data() + matrix.size());
     };
     Json entry{{"name", body.name},
-               {"color", json_of(render::linear_from_srgb(colors_srgb[b]))},
-               {"low", json_of(box.lower)},
-               {"step", json_of(Packer::step_of(box))},
+               {"color", coordinates(render::linear_from_srgb(colors_srgb[b]))},
+               {"low", coordinates(box.lower)},
+               {"step", coordinates(Packer::step_of(box))},
                {"positions", packer.add(positions)},
                {"wide", wide},
                {"triangles", wide ? packer.add(as(triangles, std::uint32_t()))
@@ -87,8 +87,8 @@ PackedMotion pack_motion(const fem::World& world, const std::vector<PreparedBody
       entry["tet_from_vertex"] = packer.add(as(prepared.binding.tet_from_vertex, std::uint32_t()));
       entry["phong"] = prepared.deformation == scenes::Deformation::phong;
       entry["frames"] = packer.add(levels);
-      entry["frames_low"] = json_of(reach.lower);
-      entry["frames_step"] = json_of(Packer::step_of(reach));
+      entry["frames_low"] = coordinates(reach.lower);
+      entry["frames_step"] = coordinates(Packer::step_of(reach));
     }
     packed.bodies.push_back(std::move(entry));
   }

@@ -318,7 +318,7 @@ Json check_making(const std::string& name, const PreparedBody& body, const Prepa
 }
 
 // Those that prepare would take; nothing where the report's are none.
-std::optional<PrepareSettings> settings_of(const PreparedBody& body) {
+std::optional<PrepareSettings> settings_told_of(const PreparedBody& body) {
   try {
     const PrepareSettings s = settings_of_input(body.report.at("input"));
     const auto share = [](double x) { return x >= 0 && x <= 1; };
@@ -336,7 +336,7 @@ std::optional<PrepareSettings> settings_of(const PreparedBody& body) {
 
 void check_body(const std::string& name, const PreparedBody& body, const fs::path& folder,
                 const std::optional<TetMesh>& made_cage, bool remake, Promises& table) {
-  const std::optional<PrepareSettings> told = settings_of(body);
+  const std::optional<PrepareSettings> told = settings_told_of(body);
   const PrepareSettings settings = told.value_or(PrepareSettings{});
   const std::vector<ConvexShell> shells = read_obj_shells(folder / "shells.obj");
   for (const ConvexShell& shell : shells) validate(shell, (folder / "shells.obj").string());

@@ -25,7 +25,7 @@ namespace {
 // What limber promises on its own scenes, as a share of the robot's size.
 constexpr double largest_penetration = 0.04;
 // A force in float32 may be so much longer than its length in double.
-constexpr double rounding = 1 + 1e-6;
+constexpr double rounding_factor = 1 + 1e-6;
 
 // The first key at which two JSON documents differ, "" where they are the same.
 std::string first_difference(const Json& a, const Json& b) {
@@ -274,8 +274,8 @@ void check_forces(const plan::Plan& plan, const plan::Settings& settings, const 
     largest = std::max(largest, double(largest_force(control)));
   if (path.settle_steps > 0) settling = double(largest_force(path.controls.back()));
   table.row("no force is above the maximum",
-            largest <= settings.max_force_n * rounding &&
-                settling <= settings.max_force_n * settings.settle.max_force_share * rounding,
+            largest <= settings.max_force_n * rounding_factor &&
+                settling <= settings.max_force_n * settings.settle.max_force_share * rounding_factor,
             fmt::format("{:.1f} of {:.1f} N", largest, settings.max_force_n));
 }
 
@@ -536,7 +536,7 @@ void check_following(const fs::path& folder, const PlanFolder& planned, const fe
   for (const Control& control : plan.trajectory.controls)
     largest = std::max(largest, double(largest_force(control)));
   const double most = planned.scene.planner.max_force_n;
-  table.row("no force is above the maximum", largest <= most * rounding,
+  table.row("no force is above the maximum", largest <= most * rounding_factor,
             fmt::format("{:.1f} of {:.1f} N", largest, most));
   std::optional<FollowedPlan> followed;
   std::string why;

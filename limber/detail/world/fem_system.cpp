@@ -38,7 +38,7 @@ void add_script(const fem::World& world, Hasher& hasher) {
   }
 }
 
-std::uint64_t hash_of(const fem::World& world) {
+std::uint64_t hash_of_world(const fem::World& world) {
   Hasher hasher;
   hasher.text("edition").value(edition);
   hasher.value(world.robot).matrix(world.bounds_m.lower).matrix(world.bounds_m.upper).value(int(world.walls));
@@ -210,7 +210,7 @@ class FemSystem::Propagator final : public plan::Propagator {
 };
 
 FemSystem::FemSystem(const fem::World& world, const GoalRules& goal, std::optional<State> start)
-    : FemSystem(world, goal, std::move(start), hash_of(world)) {}
+    : FemSystem(world, goal, std::move(start), hash_of_world(world)) {}
 
 FemSystem::FemSystem(const fem::World& world, const GoalRules& goal, std::optional<State> start,
                      std::uint64_t hash_of_world)
