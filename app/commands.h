@@ -133,6 +133,9 @@ struct StillOptions {
   std::optional<fs::path> out;        // a PNG; default: the scene's name
 };
 Outcome render_still(const StillOptions&);
+// Makes it anew whenever the scene, a model, or an image of one is edited, and prints its name; what is wrong
+// with an edit is told, and waited for. Ends by Interrupted alone, or when the picture cannot be written.
+Outcome watch_still(StillOptions);
 
 struct SceneCheckOptions {
   SceneOptions scene;

@@ -1,0 +1,30 @@
+// Files that somebody edits, looked at a few times a second. Editors write a file in place or put another in
+// its place, by which inotify, which knows files and not names, would lose it.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "core/file.h"
+
+namespace limber::app {
+
+struct Stamp {
+  std::int64_t bytes = -1, written_ns = 0;  // −1: there is no such file
+  bool operator==(const Stamp&) const = default;
+};
+std::vector<Stamp> stamps_of(const std::vector<fs::path>&);
+
+class Edits {
+ public:
+  // `read`: taken before the files were read.
+  explicit Edits(std::vector<Stamp> read) : read_(read), last_(std::move(read)) {}
+  // Of one look: whether the files should be read again. Once after every change, when two looks on end found
+  // the same, so that nobody is writing, and all files there.
+  bool are_done(const std::vector<Stamp>& now);
+
+ private:
+  std::vector<Stamp> read_, last_;
+};
+
+}  // namespace limber::app
