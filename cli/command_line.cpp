@@ -559,6 +559,12 @@ int run_command_line(int argc, const char* const* argv) {
   detail::StillOptions still_options;
   CLI::Option* const still_flag = render_command.add_flag(
       "--still", still, "paint the start of a scene, a file or a name, before any plan: one PNG");
+  bool watch = false;
+  CLI::Option* const watch_flag =
+      render_command
+          .add_flag("--watch", watch,
+                    "of --still: paint it anew whenever the scene, or a model of it, is edited, until Ctrl-C")
+          ->needs(still_flag);
   render_command
       .add_option("-o,--out", still_options.out, "of --still: the picture; default: the scene's name.png")
       ->type_name("FILE.png")
@@ -574,6 +580,7 @@ int run_command_line(int argc, const char* const* argv) {
                           "keep frames that already show what they should");
   add_global(render_command, global), add_threads(render_command, global),
       add_progress(render_command, global);
+  watch_flag->excludes(render_command.get_option("--json"));
   for (const char* of_a_film : {"--frames", "--chunk", "--passes", "--bits", "--as", "--video", "--resume"})
     still_flag->excludes(of_a_film);
   render_command.callback([&] {
@@ -582,7 +589,7 @@ int run_command_line(int argc, const char* const* argv) {
       still_options.scene.scene = render_options.folder.string();
       still_options.scene.sets = render_options.sets;
       still_options.camera = render_options.camera, still_options.size = render_options.size;
-      return cli::render_still(still_options);
+      return watch ? cli::watch_still(still_options) : cli::render_still(still_options);
     };
   });
 

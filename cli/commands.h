@@ -52,6 +52,9 @@ Outcome new_scene(const detail::NewSceneOptions&);
 // Exit code 2, with all that is wrong, where it cannot even be simulated.
 Outcome check_scene(const detail::SceneCheckOptions&);
 Outcome render_still(const detail::StillOptions&);
+// Makes it anew whenever the scene, a model, or an image of one is edited, and prints its name; what is wrong
+// with an edit is told, and waited for. Ends by Interrupted alone, or when the picture cannot be written.
+Outcome watch_still(detail::StillOptions);
 Outcome info(const fs::path& path);
 Outcome list_scenes();
 

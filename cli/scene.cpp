@@ -1,7 +1,14 @@
 #include <fmt/format.h>
 
+#include <chrono>
+#include <cstdio>
+#include <thread>
+
 #include "cli/commands.h"
 #include "cli/scene_text.h"
+#include "core/log.h"
+#include "core/progress.h"
+#include "limber/detail/film/watch.h"
 
 namespace limber::cli {
 
@@ -128,6 +135,28 @@ Outcome check_scene(const detail::SceneCheckOptions& options) {
                                                  found.problems.size() == 1 ? "" : "s");
   return {good ? exit_done : exit_bad_input, json,
           fmt::format("{}: {}\n{}", found.file.string(), verdict, text)};
+}
+
+namespace {
+constexpr std::chrono::milliseconds between_looks{200};
+}
+
+Outcome watch_still(detail::StillOptions options) {
+  for (;;) {
+    const std::vector<fs::path> files = detail::files_shown(options.scene);
+    options.scene.scene = files.front().string();
+    detail::Edits edits(detail::stamps_of(files));
+    try {
+      fmt::print("{}", render_still(options).text);
+      std::fflush(stdout);
+    } catch (const InputError& error) {
+      log::warn("{}", error.what());
+    }
+    do {
+      throw_if_stopped();
+      std::this_thread::sleep_for(between_looks);
+    } while (!edits.are_done(detail::stamps_of(files)));
+  }
 }
 
 Outcome render_still(const detail::StillOptions& options) {

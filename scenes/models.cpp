@@ -74,7 +74,17 @@ const Vec3* box_size(const Model& model) {
   return nullptr;
 }
 
+constexpr const char* ball = "beach_ball";
+
+// Of a body that limber makes, or may make; empty for others.
+std::string name_of_made(const Model& model) {
+  if (const auto* file = std::get_if<FileModel>(&model)) return file->made;
+  if (const auto* made = std::get_if<MadeModel>(&model)) return made->made;
+  return {};
+}
+
 SurfaceMesh make_named(const std::string& made) {
+  if (made == ball) return make_beach_ball();
   if (made == "bunny") return make_bunny();
   if (made == "dragon") return make_dragon();
   if (made == "heart") return make_heart();
@@ -109,6 +119,10 @@ std::optional<SurfaceMesh> made_surface(const BodySpec& body) {
   return surface;
 }
 
+Appearance made_appearance(const BodySpec& body, const SurfaceMesh& made) {
+  return name_of_made(body.model) == ball ? beach_ball_appearance(made) : Appearance();
+}
+
 std::optional<TetMesh> made_cage(const BodySpec& body) {
   if (body.cage.tets > 0) return std::nullopt;
   if (const auto* blocks = std::get_if<BlocksModel>(&body.model))
@@ -133,6 +147,8 @@ std::optional<Box> start_box(const BodySpec& body) {
     bounds = turned_bounds(pose_turn(body.pose), corners(centered(*size_m)));
   } else if (const auto* sphere = std::get_if<SphereModel>(&body.model)) {
     bounds = centered(Vec3::Constant(sphere->diameter_m));
+  } else if (const auto* made = std::get_if<MadeModel>(&body.model); made && made->made == ball) {
+    bounds = centered(Vec3::Constant(made->height_m));
   } else if (const auto* blocks = std::get_if<BlocksModel>(&body.model)) {
     Box solids;
     for (const Box& solid : blocks->solids) solids.include(solid);

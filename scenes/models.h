@@ -6,6 +6,7 @@
 #include <optional>
 #include <vector>
 
+#include "core/appearance.h"
 #include "core/mesh.h"
 #include "scenes/scene.h"
 
@@ -16,10 +17,13 @@ namespace limber::scenes {
 // lies inside that cage.
 std::optional<SurfaceMesh> made_surface(const BodySpec&);
 
+// What that surface shows beyond its shape; empty where that is nothing.
+Appearance made_appearance(const BodySpec&, const SurfaceMesh& made);
+
 // The cage of a body with cage.cells, in the model's own frame; nothing for other bodies.
 std::optional<TetMesh> made_cage(const BodySpec&);
 
-// The bounding box at the start, where it follows from the scene alone: boxes, plates and spheres.
+// The bounding box at the start, where it follows from the scene alone: boxes, plates, blocks and spheres.
 std::optional<Box> start_box(const BodySpec&);
 
 // Where a model goes at the start: p_world = world_from_model * p_model. `bounds` is the bounding box of the

@@ -30,7 +30,7 @@ struct FileModel {
   Vec3 front = Vec3::UnitX();
 };
 struct MadeModel {   // its origin is the middle of its bounding box
-  std::string made;  // "bunny", "dragon", "heart", "lung_left", "lung_right", "liver", "spine" or "ribcage"
+  std::string made;  // "beach_ball", "bunny", "dragon", "heart", "lung_left", … as the schema has them
   double height_m = 1;
 };
 struct BoxModel {  // its origin is its middle

@@ -3,6 +3,7 @@
 // edges may be shorter). Method and figures: docs/scene.md.
 #pragma once
 
+#include "core/appearance.h"
 #include "core/mesh.h"
 #include "scenes/scene.h"
 
@@ -28,6 +29,10 @@ std::string fault_of(const BlocksModel&);
 
 // A geodesic sphere: an icosahedron whose faces are cut in four until no edge is longer than triangle_m.
 SurfaceMesh make_sphere(const SphereModel&);
+
+// A sphere of 1 m, and what is painted on it: panels of colors between two caps, welded along grooves.
+SurfaceMesh make_beach_ball();
+Appearance beach_ball_appearance(const SurfaceMesh& ball);  // whose vertices are those of the sphere
 
 // Something like a sitting rabbit that looks along +x, out of ellipsoids that flow into one another; 1 m
 // high, about 1 m long and 0.7 m wide, about 35,000 triangles.

@@ -213,7 +213,7 @@ constexpr Key all_keys[] = {
      0,
      may_lack,
      "a model that limber makes; beside `file`: used where the file cannot be had",
-     "bunny, dragon, heart, lung_left, lung_right, liver, spine, ribcage",
+     "beach_ball, bunny, dragon, heart, lung_left, lung_right, liver, spine, ribcage",
      ""},
     {"bodies[].model.scale", Type::number, positive, 0, may_lack,
      "m a file unit; with file; 1 when not given", "", ""},

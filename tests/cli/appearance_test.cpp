@@ -184,6 +184,20 @@ TEST_F(Painted_slow, FramesShowItWhereTheSceneGivesNoColorAndAreTheSameForThread
   EXPECT_GT(green, 20);
 }
 
+TEST_F(Painted_slow, StillsShowItBeforeAnyPlan) {
+  const auto still = [&](const std::string& texture) {
+    const std::string file = out("still.png");
+    const Result result = limber_program(
+        {"render", scene(falling), "--still", "-o", file, "--set", "bodies.crate.texture=" + texture});
+    EXPECT_EQ(result.code, exit_done) << result.err;
+    return render::read_png(file);
+  };
+  const render::Image8 plain = still("false");
+  EXPECT_NE(still("true"), plain);
+  write("crate.png", "no image");
+  EXPECT_EQ(still("true"), plain) << "what cannot be shown is left out";
+}
+
 TEST_F(Painted_slow, ExportsBringItBack) {
   simulate();
   ASSERT_EQ(limber_program({"export", out(), "--format", "gltf,usd", "--frames", "0-3"}).code, exit_done);
@@ -221,6 +235,43 @@ TEST_F(Painted_slow, ExportsBringItBack) {
   simulate("plain", text);
   ASSERT_EQ(limber_program({"export", out("plain"), "--format", "usd", "--frames", "0"}).code, exit_done);
   EXPECT_FALSE(fs::exists(fs::path(out("plain")) / "export" / "textures"));
+}
+
+// A model of limber's own has no file: its looks are made with it.
+TEST_F(Painted_slow, AMadeBallKeepsItsLooksFromTheSceneToExports) {
+  std::string text = falling;
+  const std::string crate = R"(model = { file = "crate.obj", scale = 0.5 })",
+                    bench = R"(model = { file = "bench.ply" })",
+                    ball = R"(model = { made = "beach_ball", height_m = 0.5 })";
+  text.replace(text.find(crate), crate.size(), ball);
+  text.replace(text.find(bench), bench.size(),
+               "model = { box = { size_m = [1, 1, 0.2], triangle_m = 0.5 } }");
+  simulate("out", text);
+  const PreparedBody prepared = read_body(in("bodies/crate"));
+  ASSERT_EQ(prepared.appearance.images.size(), 2u);
+  const Result verified = limber_program({"verify", out(), "--scene", scene(text), "--json"});
+  EXPECT_EQ(verified.code, exit_done);
+  EXPECT_THAT(verified.out, HasSubstr("crate: colors and images are the model's"));
+  const auto first_frame = [&](const std::string& name, const std::string& set) {
+    EXPECT_EQ(render({"--frames", "0", "--as", name, "--set", set}).code, exit_done);
+    return render::read_png(in("frames-" + name) / "0000.png");
+  };
+  EXPECT_NE(first_frame("own", "bodies.crate.texture=true"),
+            first_frame("plain", "bodies.crate.texture=false"));
+
+  ASSERT_EQ(limber_program({"export", out(), "--format", "gltf,usd", "--frames", "0-3"}).code, exit_done);
+  const meshing::ImportedModel back =
+      meshing::import_model(in("export/motion.glb"), {.count_self_intersections = false});
+  ASSERT_EQ(back.appearance.images.size(), 2u);
+  for (std::size_t i = 0; i < 2; ++i) {
+    EXPECT_EQ(back.appearance.images[i].bytes, prepared.appearance.images[i].bytes);
+    EXPECT_EQ(read_file(in(fmt::format("export/textures/crate-image-{}.png", i))),
+              prepared.appearance.images[i].bytes);
+  }
+  const int status =
+      std::system((std::string(limber_source_dir) + "/tools/check_exports '" + out() + "'").c_str());
+  ASSERT_TRUE(WIFEXITED(status));
+  EXPECT_TRUE(WEXITSTATUS(status) == 0 || WEXITSTATUS(status) == 77) << WEXITSTATUS(status);
 }
 
 TEST_F(Painted_slow, OtherProgramsReadersAgree) {

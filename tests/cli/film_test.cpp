@@ -7,6 +7,7 @@
 #include <sstream>
 
 #include "limber/detail/plan/plan_folder.h"
+#include "render/camera.h"
 #include "render/png_file.h"
 #include "tests/cli/program.h"
 
@@ -138,6 +139,30 @@ TEST_F(Filmed_slow, PassesAgreeWithOneAnother) {
   const double low = key.at("scalar").at("range").at(0), high = key.at("scalar").at("range").at(1);
   EXPECT_EQ(low, -high);
   EXPECT_GT(high, 0);
+
+  // By its camera and depth, each pixel of a body is a place within the bounds, and some lie on the ground.
+  const Json& shown = key.at("cameras").at(3);
+  render::Camera camera;
+  for (int i = 0; i < 3; ++i)
+    camera.eye[i] = shown.at("eye_m")[i], camera.target[i] = shown.at("target_m")[i];
+  camera.fov_deg = shown.at("fov_deg");
+  const double nearest = key.at("depth_m")[0], farthest = key.at("depth_m")[1],
+               tangent = std::tan(camera.fov_deg * EIGEN_PI / 360);
+  const render::Mat4 world_from_camera = render::camera_from_world(camera).inverse();
+  Box there;
+  for (int y = 0; y < depth.height; ++y)
+    for (int x = 0; x < depth.width; ++x) {
+      const std::uint16_t level = depth.levels[std::size_t(y * depth.width + x)];
+      if (level == 65535) continue;
+      const double z = nearest + level / 65535.0 * (farthest - nearest),
+                   pixel = 2 * tangent * z / depth.height;
+      const Vec3 seen_at((x + 0.5 - 0.5 * depth.width) * pixel, (0.5 * depth.height - y - 0.5) * pixel, -z);
+      there.include((world_from_camera * seen_at.homogeneous()).head<3>());
+    }
+  EXPECT_NEAR(there.lower.z(), 0, 0.1);
+  EXPECT_GT(there.lower.minCoeff(), -0.1);
+  EXPECT_LT((there.upper - Vec3(4, 2, 2)).maxCoeff(), 0.1);
+  EXPECT_NEAR(key.at("light").at("ground_m"), 0, 1e-12);
 }
 
 TEST_F(Filmed_slow, TheSubjectFillsItsShareOfThePicture) {

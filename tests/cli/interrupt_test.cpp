@@ -63,8 +63,8 @@ void expect_resumes_at_three_points(const std::string& scene, const fs::path& fo
 
 // Starts the program, sends it the signal as soon as `is_time`, and returns its exit code.
 int exit_code_after_signal(const std::vector<std::string>& arguments, int signal_number,
-                           const std::function<bool()>& is_time) {
-  const std::string program = std::string(limber_binary_dir) + "/cli/limber";
+                           const std::function<bool()>& is_time,
+                           const std::string& program = std::string(limber_binary_dir) + "/cli/limber") {
   std::vector<char*> argv{const_cast<char*>(program.c_str())};
   for (const std::string& a : arguments) argv.push_back(const_cast<char*>(a.c_str()));
   argv.push_back(nullptr);
@@ -131,6 +131,40 @@ TEST_F(Interrupt, SignalsToAProcessKeepAPlanThatGoesOnToTheSameBytes) {
     EXPECT_TRUE(is_measured(cut));
     fs::remove_all(cut);
   }
+}
+
+// Each edit in another way; what is wrong with one is told, and the next is waited for.
+TEST_F(Interrupt, AWatchedStillFollowsItsSceneUntilTheSignal) {
+  const fs::path picture = folder / "still.png", errors = folder / "errors.txt", file = scene();
+  const auto hash = [&] { return render::frame_hash(picture); };
+  std::optional<std::string> before;
+  std::vector<std::function<void()>> edits{
+      [&] { write_file(file, replaced("#c0392b", "#00ff00")); },
+      [&] { write_file(file, "no scene"); },
+      [&] {
+        write_file(folder / "new.toml", replaced("#c0392b", "#0000ff"));
+        fs::rename(folder / "new.toml", file);
+      },
+  };
+  std::size_t made = 0;
+  const std::string program = std::string(limber_binary_dir) + "/cli/limber";
+  const int code = exit_code_after_signal(
+      {"-c", "exec \"$0\" \"$@\" 2> '" + errors.string() + "'", program, "render", file.string(), "--still",
+       "--watch", "-o", picture.string(), "--size", "64x48"},
+      SIGINT,
+      [&] {
+        const bool broken = made == 2;  // by the edit before
+        if (broken ? read_file(errors).find("scene.toml:1") == std::string::npos
+                   : !hash() || hash() == before)
+          return false;
+        before = hash();
+        if (made == edits.size()) return true;
+        edits[made++]();
+        return false;
+      },
+      "/bin/sh");
+  EXPECT_EQ(code, 128 + SIGINT);
+  EXPECT_EQ(made, edits.size());
 }
 
 // Killed at twenty points: whatever has a frame's name then is a whole picture, and a resumed run ends with

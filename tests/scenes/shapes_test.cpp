@@ -52,6 +52,7 @@ std::vector<Shape> shapes() {
       {"sphere", make_sphere({1.6, 0.1}), 2, pi / 6 * 1.6 * 1.6 * 1.6, 1e-2},
       {"one-piece sphere", make_sphere({1, 9}), 2, 0.31702,
        1e-4},  // 5(3+√5)/12 a³ of the icosahedron, a = 1/(2 sin 72°)
+      {"beach ball", make_beach_ball(), 2, pi / 6, 5e-3},
       {"bunny", make_bunny(), 2, 0, 0},
       {"dragon", make_dragon(), 2, 0, 0},
       {"heart", make_heart(), 2, 0, 0},

@@ -246,7 +246,8 @@ bool is_grey(const render::Image8& image) {
   return true;
 }
 
-// Leaves out those that cannot be decoded, are too large together, or are no normals though they should be.
+}  // namespace
+
 void look_into_images(Appearance& appearance, std::vector<std::string>& warnings) {
   std::int64_t pixels = 0;
   std::vector<bool> gone(appearance.images.size(), false);
@@ -272,8 +273,6 @@ void look_into_images(Appearance& appearance, std::vector<std::string>& warnings
   appearance.drop_images(gone);
   appearance.drop_unused();
 }
-
-}  // namespace
 
 void make_model_of_body(meshing::ImportedModel& model, const PrepareSettings& settings) {
   look_into_images(model.appearance, model.warnings);

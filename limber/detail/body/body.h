@@ -57,6 +57,9 @@ PrepareSettings settings_of_input(const Json& input);
 
 // A model as its body has it: its long edges cut so that it bends as the cage does, but for a body in cells;
 // images that cannot be shown left out, with a warning.
+// Leaves out images that cannot be decoded, are too large together, or are no normals though they should be.
+void look_into_images(Appearance&, std::vector<std::string>& warnings);
+
 void make_model_of_body(meshing::ImportedModel&, const PrepareSettings&);
 
 // A body's shells, cage and contact, made from its surface and those before; `made_cage` is that of a body in

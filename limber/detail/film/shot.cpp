@@ -541,7 +541,21 @@ Json Shot::key_of_passes() const {
   Json key{{"depth_m", {near_m_, far_m_}}, {"objects", objects}};
   if (scene_.film.color_by != scenes::ColorBy::body)
     key["scalar"] = {{"of", caption_of(scene_.film.color_by)}, {"range", {low_, high_}}};
-  for (int f = 0; f < frames(); ++f) key["contacts"].push_back(contacts_in_picture(f));
+  const auto list = [](const Vec3& v) { return Json{v.x(), v.y(), v.z()}; };
+  for (int f = 0; f < frames(); ++f) {
+    key["contacts"].push_back(contacts_in_picture(f));
+    const render::Camera camera = camera_of(f);
+    key["cameras"].push_back(
+        {{"eye_m", list(camera.eye)}, {"target_m", list(camera.target)}, {"fov_deg", camera.fov_deg}});
+  }
+  key["light"] = {{"toward_key", list(look_.toward_key.normalized())},
+                  {"key", list(look_.key_light)},
+                  {"key_size_deg", look_.key_size_deg},
+                  {"sky", list(look_.sky_light)},
+                  {"zenith_srgb", list(look_.background_top_srgb)},
+                  {"horizon_srgb", list(look_.background_bottom_srgb)},
+                  {"ground_srgb", list(look_.ground_srgb)},
+                  {"ground_m", look_.ground_height_m ? Json(*look_.ground_height_m) : Json()}};
   return key;
 }
 

@@ -46,7 +46,7 @@ ContactShape shape_of_nothing(const TetMesh& cage) {
 
 PreparedBody stand_in(const LoadedModel& loaded, scenes::Deformation deformation) {
   PreparedBody body;
-  body.surface = loaded.model.surface;
+  body.surface = loaded.model.surface, body.appearance = loaded.model.appearance;
   body.cage = loaded.made_cage ? *loaded.made_cage : box_round(body.surface.positions);
   body.shell_from_tet.assign(std::size_t(body.cage.tets.rows()), 0);
   body.binding = ffd::bind(body.surface, body.cage);

@@ -47,6 +47,14 @@ Json identity_of(const scenes::BodySpec& body, const std::string& model_hash) {
           {"anchor", body.pose.anchor}};
 }
 
+std::string hash_of_made(const SurfaceMesh& made, const Appearance& appearance) {
+  if (appearance.empty()) return hex(hash_of(made));
+  Hasher hasher;
+  hasher.value(hash_of(made)).matrix(appearance.uv);
+  for (const ImageFile& image : appearance.images) hasher.text(image.bytes);
+  return hex(hasher.digest());
+}
+
 BodySource source_of(const scenes::Scene& scene, const scenes::BodySpec& body,
                      std::vector<fs::path> folders) {
   folders.push_back(scene.folder);
@@ -76,10 +84,13 @@ BodySource source_of(const scenes::Scene& scene, const scenes::BodySpec& body,
     return source;
   }
   const SurfaceMesh made = scenes::made_surface(body).value();
+  const Appearance appearance = scenes::made_appearance(body, made);
   source.model = fmt::format("made model of body {}", body.name);
-  source.identity = identity_of(body, hex(hash_of(made)));
-  source.load = [&body, made] {
+  source.identity = identity_of(body, hash_of_made(made, appearance));
+  source.load = [&body, made, appearance] {
     meshing::ImportedModel model = meshing::clean(made, {}, "made model");
+    LIMBER_CHECK(appearance.empty() || model.surface.triangles == made.triangles, body.name);
+    model.appearance = appearance;
     scenes::transform(scenes::world_from_model(body, made.positions, true), model.surface.positions);
     return model;
   };
@@ -226,7 +237,9 @@ LoadedModel load_model(const scenes::Scene& scene, const scenes::BodySpec& body,
                        const std::vector<fs::path>& data) {
   const BodySource source = source_of(scene, body, data);
   if (!source.warning.empty()) log::warn("{}", source.warning);
-  return {source.model, source.load(), source.made_cage()};
+  meshing::ImportedModel model = source.load();
+  look_into_images(model.appearance, model.warnings);
+  return {source.model, std::move(model), source.made_cage()};
 }
 
 SurfaceMesh load_scenery(const scenes::Scene& scene, const scenes::BodySpec& body,
@@ -325,7 +338,7 @@ Origin origin_of(const scenes::Scene& scene, const scenes::BodySpec& body, const
     const auto* file = std::get_if<scenes::FileModel>(&body.model);
     if (file && !scenes::find_model(file->file, with(data, scene.folder))) {
       const std::optional<SurfaceMesh> made = scenes::made_surface(body);
-      if (!made || source != hex(hash_of(*made))) return origin;
+      if (!made || source != hash_of_made(*made, scenes::made_appearance(body, *made))) return origin;
     }
     const BodySource found = source_of(scene, body, data);
     // A file may have changed, or another of its name lie here.
