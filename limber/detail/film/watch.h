@@ -15,8 +15,8 @@ struct Stamp {
 };
 std::vector<Stamp> stamps_of(const std::vector<fs::path>&);
 
-// Those that a still of the scene shows: the scene first, its models and what these name; of a scene that cannot be
-// read the scene alone.
+// Those that a still of the scene shows: the scene first, its models and what these name; of a scene that
+// cannot be read the scene alone.
 std::vector<fs::path> files_shown(const SceneOptions&);
 
 class Edits {
