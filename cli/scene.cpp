@@ -147,7 +147,7 @@ Outcome watch_still(detail::StillOptions options) {
     options.scene.scene = files.front().string();
     detail::Edits edits(detail::stamps_of(files));
     try {
-      fmt::print("{}", render_still(options).text);
+      fmt::print("{}", cli::render_still(options).text);
       std::fflush(stdout);
     } catch (const InputError& error) {
       log::warn("{}", error.what());

@@ -13,7 +13,7 @@ namespace {
 constexpr const char* format = "limber appearance 1";
 constexpr const char* remedy = "renew it with `limber prepare`";
 
-void require(bool good, const fs::path& path, const std::string& why) {
+void require_looks(bool good, const fs::path& path, const std::string& why) {
   if (!good) throw InputError(fmt::format("{}: {}; {}", path.string(), why, remedy));
 }
 
@@ -29,8 +29,8 @@ Rows rows_of(const Npz& file, const char* name, Eigen::Index triangles) {
   if (!file.arrays.contains(name)) return {};
   const NpyArray& array = file.array(name);
   constexpr int columns = Rows::ColsAtCompileTime;
-  require(array.shape == std::vector<std::int64_t>{3 * triangles, columns}, file.source,
-          fmt::format("{} has another shape than {} × {}", name, 3 * triangles, columns));
+  require_looks(array.shape == std::vector<std::int64_t>{3 * triangles, columns}, file.source,
+                fmt::format("{} has another shape than {} × {}", name, 3 * triangles, columns));
   using Floats = Eigen::Matrix<float, Eigen::Dynamic, columns, Eigen::RowMajor>;
   return Eigen::Map<const Floats>(array.as<float>(name).data(), 3 * triangles, columns)
       .template cast<double>();
@@ -92,8 +92,8 @@ Appearance read_appearance(const fs::path& folder, const SurfaceMesh& surface) {
   a.uv = rows_of<Uvs>(file, "uv", triangles);
   a.colors = rows_of<Points>(file, "colors", triangles);
   const NpyArray& materials = file.array("material_from_triangle");
-  require(materials.shape == std::vector<std::int64_t>{triangles}, path,
-          "material_from_triangle has another length than the surface has triangles");
+  require_looks(materials.shape == std::vector<std::int64_t>{triangles}, path,
+                "material_from_triangle has another length than the surface has triangles");
   const auto of_triangle = materials.as<std::int32_t>("material_from_triangle");
   a.material_from_triangle.assign(of_triangle.begin(), of_triangle.end());
   try {
@@ -103,25 +103,26 @@ Appearance read_appearance(const fs::path& folder, const SurfaceMesh& surface) {
                   {"materials", {{{"name", ""}, {"color", {0.5}}, {"image", -1}, {"normal_image", -1}}}},
                   {"images", {{{"name", ""}, {"file", ""}}}}},
                  Keys::all, path.string() + ": meta.json", remedy);
-    require(meta.at("format") == format && meta.size() == 4, path, "it is not of this version's format");
-    require(meta.at("surface_hash") == hex(hash_of(surface)), path, "it was made for another surface");
+    require_looks(meta.at("format") == format && meta.size() == 4, path,
+                  "it is not of this version's format");
+    require_looks(meta.at("surface_hash") == hex(hash_of(surface)), path, "it was made for another surface");
     for (const Json& m : meta.at("materials")) {
-      require(m.size() == 4 && m.at("color").size() == 3, path, "a material that limber did not write");
+      require_looks(m.size() == 4 && m.at("color").size() == 3, path, "a material that limber did not write");
       a.materials.push_back({m.at("name").get<std::string>(),
                              Vec3(m.at("color")[0], m.at("color")[1], m.at("color")[2]),
                              m.at("image").get<int>(), m.at("normal_image").get<int>()});
     }
-    require(meta.at("images").size() <= most_images, path, "more images than limber writes");
+    require_looks(meta.at("images").size() <= most_images, path, "more images than limber writes");
     for (const Json& image : meta.at("images")) {
       const auto name = image.at("file").get<std::string>();
       const std::size_t i = a.images.size();
-      require(image.size() == 2 && (name == image_file(i, ".png") || name == image_file(i, ".jpg")), path,
-              fmt::format("image {} is in a file that limber did not write", i));
+      require_looks(image.size() == 2 && (name == image_file(i, ".png") || name == image_file(i, ".jpg")),
+                    path, fmt::format("image {} is in a file that limber did not write", i));
       a.images.push_back({image.at("name").get<std::string>(), read_file(folder / name, most_image_bytes)});
-      require(name == name_of_image_file(a, i), folder / name, "is no image of that kind");
+      require_looks(name == name_of_image_file(a, i), folder / name, "is no image of that kind");
     }
   } catch (const Json::exception& trouble) {
-    require(false, path, std::string("meta.json: ") + trouble.what());
+    require_looks(false, path, std::string("meta.json: ") + trouble.what());
   }
   validate(a, triangles, path.string());
   return a;

@@ -23,7 +23,7 @@ bool meet(const Box& a, const Box& b) {
 double squared_gap(const Box& a, const Box& b) {
   return (a.lower - b.upper).cwiseMax(b.lower - a.upper).cwiseMax(0.0).squaredNorm();
 }
-double squared_distance(const Box& box, const Vec3& p) {
+double squared_distance_outside(const Box& box, const Vec3& p) {
   return (box.lower - p).cwiseMax(p - box.upper).cwiseMax(0.0).squaredNorm();
 }
 // From one point of a to one of b at most.
@@ -395,7 +395,7 @@ class OwnSurface {
       int node;
       double squared;
     };
-    std::vector<Pending> stack{{0, squared_distance(now_.box(), p)}};
+    std::vector<Pending> stack{{0, squared_distance_outside(now_.box(), p)}};
     double best = 1e300;
     while (!stack.empty()) {
       const Pending top = stack.back();
@@ -405,8 +405,8 @@ class OwnSurface {
         continue;
       const auto& place = now_.shape().tree.nodes[std::size_t(top.node)];
       if (!place.leaf()) {
-        Pending one{place.left, squared_distance(now_.nodes()[std::size_t(place.left)].box, p)},
-            other{place.right, squared_distance(now_.nodes()[std::size_t(place.right)].box, p)};
+        Pending one{place.left, squared_distance_outside(now_.nodes()[std::size_t(place.left)].box, p)},
+            other{place.right, squared_distance_outside(now_.nodes()[std::size_t(place.right)].box, p)};
         if (one.squared < other.squared) std::swap(one, other);
         stack.push_back(one), stack.push_back(other);
         continue;

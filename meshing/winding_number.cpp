@@ -10,8 +10,8 @@ namespace limber::meshing {
 
 namespace {
 // A group is far when the point is this many radii away; what error that leaves: docs/decomposition.md.
-constexpr double far_radii = 2.5;
-constexpr int leaf_size = 8;
+constexpr double dipole_radii = 2.5;
+constexpr int dipole_leaf_size = 8;
 constexpr double four_pi = 4.0 * std::numbers::pi;
 }  // namespace
 
@@ -25,7 +25,8 @@ double solid_angle_share(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3
 }
 
 WindingNumber::WindingNumber(const Points& positions, const Triangles& triangles)
-    : bvh_(detail::build_triangle_bvh(positions, triangles, leaf_size)), expansions_(bvh_.nodes.size()) {
+    : bvh_(detail::build_triangle_bvh(positions, triangles, dipole_leaf_size)),
+      expansions_(bvh_.nodes.size()) {
   corners_.reserve(bvh_.order.size());
   for (int t : bvh_.order) {
     corners_.push_back(
@@ -70,7 +71,7 @@ double WindingNumber::at(const Vec3& point) const {
     const Expansion& e = expansions_[n];
     const Vec3 r = e.center - point;
     const double r2 = r.squaredNorm();
-    if (r2 > far_radii * far_radii * e.radius_squared) {
+    if (r2 > dipole_radii * dipole_radii * e.radius_squared) {
       // The kernel r / |r|³ and its two derivatives, contracted with the moments.
       double cubic = 0;
       for (int k = 0; k < 3; ++k) cubic += r[k] * r.dot(e.second_moment[std::size_t(k)] * r);

@@ -30,15 +30,16 @@ void write(Image8& image, const std::string& text, double left, double baseline,
 }
 
 // A caption's two lines: heights of their capitals, and where they stand.
-struct Lines {
+struct PlacedLines {
   double large_px = 0, small_px = 0, left = 0, baseline = 0, small_baseline = 0, width = 0;
 };
-Lines lines_of(int width, int height, const std::string& line, const std::string& small_line, Corner corner) {
+PlacedLines lines_of(int width, int height, const std::string& line, const std::string& small_line,
+                     Corner corner) {
   const double margin = width / 40.0, room = width - 2 * margin;
   const auto letter = [&](const std::string& text, double wanted, Weight weight) {
     return text.empty() ? 0 : wanted * std::min(1.0, room / std::max(1.0, text_width(text, wanted, weight)));
   };
-  Lines at;
+  PlacedLines at;
   at.large_px = letter(line, height / 42.0, Weight::semibold);
   at.small_px = letter(small_line, height / 60.0, Weight::regular);
   at.width = std::max(text_width(line, std::max(1.0, at.large_px), Weight::semibold),
@@ -108,7 +109,7 @@ std::string letters_missing(const std::string& text) {
 
 Eigen::Vector4d place_of_caption(int width, int height, const std::string& line,
                                  const std::string& small_line, Corner corner) {
-  const Lines at = lines_of(width, height, line, small_line, corner);
+  const PlacedLines at = lines_of(width, height, line, small_line, corner);
   const double top = line.empty() ? at.small_baseline - at.small_px : at.baseline - at.large_px,
                bottom = small_line.empty() ? at.baseline + 0.4 * at.large_px
                                            : at.small_baseline + 0.4 * at.small_px;
@@ -117,7 +118,7 @@ Eigen::Vector4d place_of_caption(int width, int height, const std::string& line,
 
 void draw_caption(Image8& image, const std::string& line, const std::string& small_line,
                   const CaptionLook& look) {
-  const Lines at = lines_of(image.width, image.height, line, small_line, look.corner);
+  const PlacedLines at = lines_of(image.width, image.height, line, small_line, look.corner);
   const bool right = look.corner == Corner::bottom_right || look.corner == Corner::top_right;
   const auto put = [&](const std::string& text, double baseline, double height_px, Weight weight) {
     if (text.empty()) return;

@@ -25,7 +25,7 @@ constexpr int modes = 4, rigid_modes = 6;
 // are cut.
 constexpr double still_missing = 0.6;
 constexpr double hold_free = 1e-9;  // share of the diagonal that is added, so that free bodies do not drift
-constexpr int tet_edges[6][2] = {{0, 1}, {0, 2}, {0, 3}, {1, 2}, {1, 3}, {2, 3}};
+constexpr int edge_ends[6][2] = {{0, 1}, {0, 2}, {0, 3}, {1, 2}, {1, 3}, {2, 3}};
 
 // The middles of a mesh's edges, as nodes behind its own.
 struct Middles {
@@ -36,7 +36,7 @@ Middles middles_of(const TetMesh& mesh) {
   Middles middles;
   int next = int(mesh.positions.rows());
   for (int t = 0; t < mesh.tets.rows(); ++t)
-    for (const auto& [i, j] : tet_edges)
+    for (const auto& [i, j] : edge_ends)
       next += middles.node.try_emplace(std::minmax(mesh.tets(t, i), mesh.tets(t, j)), next).second;
   return middles;
 }
@@ -146,7 +146,7 @@ class Quadratic {
     for (int t = 0; t < mesh.tets.rows(); ++t) {
       const auto q = mesh.tets.row(t);
       Element e{{q[0], q[1], q[2], q[3]}, TetShape(mesh.positions, mesh.tets, t), of_tet[std::size_t(t)]};
-      for (int k = 0; k < 6; ++k) e.node[4 + k] = middles_.of(q[tet_edges[k][0]], q[tet_edges[k][1]]);
+      for (int k = 0; k < 6; ++k) e.node[4 + k] = middles_.of(q[edge_ends[k][0]], q[edge_ends[k][1]]);
       elements_.push_back(e);
     }
   }
@@ -163,7 +163,7 @@ class Quadratic {
       const auto place = [&](int node) {  // barycentric
         const int a = int(std::find(e.node, e.node + 10, node) - e.node);
         if (a < 4) return Eigen::Vector4d(Eigen::Vector4d::Unit(a));
-        const auto [i, j] = tet_edges[a - 4];
+        const auto [i, j] = edge_ends[a - 4];
         return Eigen::Vector4d(0.5 * (Eigen::Vector4d::Unit(i) + Eigen::Vector4d::Unit(j)));
       };
       for (int k = 0; k < 6; ++k) {
@@ -171,11 +171,11 @@ class Quadratic {
         if (done[std::size_t(middle)]) continue;
         done[std::size_t(middle)] = true;
         const Eigen::Vector4d at =
-            0.5 * (place(of_fine.node[tet_edges[k][0]]) + place(of_fine.node[tet_edges[k][1]]));
+            0.5 * (place(of_fine.node[edge_ends[k][0]]) + place(of_fine.node[edge_ends[k][1]]));
         for (int i = 0; i < 4; ++i)
           if (at[i] != 0 && at[i] != 0.5) entries.emplace_back(middle, e.node[i], at[i] * (2 * at[i] - 1));
         for (int m = 0; m < 6; ++m)
-          if (const double w = 4 * at[tet_edges[m][0]] * at[tet_edges[m][1]]; w != 0)
+          if (const double w = 4 * at[edge_ends[m][0]] * at[edge_ends[m][1]]; w != 0)
             entries.emplace_back(middle, e.node[4 + m], w);
       }
     }
@@ -194,7 +194,7 @@ class Quadratic {
           sum.row(e.node[i]) += weight(point, i) * (2 * weight(point, i) - 1) * here;
         for (int k = 0; k < 6; ++k)
           sum.row(e.node[4 + k]) +=
-              4 * weight(point, tet_edges[k][0]) * weight(point, tet_edges[k][1]) * here;
+              4 * weight(point, edge_ends[k][0]) * weight(point, edge_ends[k][1]) * here;
       }
     return freedoms_.from_nodes(sum);
   }
@@ -262,7 +262,7 @@ class Quadratic {
     Nodal g;
     for (int i = 0; i < 4; ++i) g.row(i) = (4 * weight(point, i) - 1) * shape.gradient.row(i);
     for (int k = 0; k < 6; ++k) {
-      const auto [i, j] = tet_edges[k];
+      const auto [i, j] = edge_ends[k];
       g.row(4 + k) =
           4 * (weight(point, i) * shape.gradient.row(j) + weight(point, j) * shape.gradient.row(i));
     }

@@ -9,7 +9,7 @@
 namespace limber::fem::detail {
 namespace {
 
-using Vector = std::vector<double>;
+using Values = std::vector<double>;
 
 // Differences are taken over this share of the shortest edge: their error is its square.
 constexpr double nudge = 1e-5;
@@ -17,7 +17,7 @@ constexpr int iterations = 300;
 constexpr double margin = 1.02;  // the iteration comes from below
 
 template <class E>
-double shortest_edge(const ElementTable<E>& table, const Vector& x) {
+double shortest_edge(const ElementTable<E>& table, const Values& x) {
   double shortest2 = std::numeric_limits<double>::infinity();
   for (const E& e : table.elements)
     for (int i = 0; i < E::nodes; ++i)
@@ -31,11 +31,11 @@ double shortest_edge(const ElementTable<E>& table, const Vector& x) {
 
 }  // namespace
 
-std::vector<double> forces_of(const ElementTables<double>& elements, const Vector& positions,
-                              const Vector& velocities) {
+std::vector<double> forces_of(const ElementTables<double>& elements, const Values& positions,
+                              const Values& velocities) {
   const Layout state = state_layout(1), force = force_layout(1);
   const int nodes = int(positions.size()) / 3;
-  Vector records(std::size_t(nodes * state.node), 0.0), f(std::size_t(nodes * force.node), 0.0), forces;
+  Values records(std::size_t(nodes * state.node), 0.0), f(std::size_t(nodes * force.node), 0.0), forces;
   for (int n = 0; n < nodes; ++n)
     for (int c = 0; c < 3; ++c) {
       records[state.at(n, c)] = positions[3 * n + c];
@@ -47,16 +47,16 @@ std::vector<double> forces_of(const ElementTables<double>& elements, const Vecto
   return forces;
 }
 
-FastestMode fastest_mode(const ElementTables<double>& elements, const Vector& rest,
-                         const Vector& inverse_mass) {
+FastestMode fastest_mode(const ElementTables<double>& elements, const Values& rest,
+                         const Values& inverse_mass) {
   double shortest = std::numeric_limits<double>::infinity();
   for_each_table([&](const auto& table) { shortest = std::min(shortest, shortest_edge(table, rest)); },
                  elements);
   // Symmetric form M^-½ K M^-½, so that the Rayleigh quotient converges with the square of the vector's
   // error.
   const std::size_t numbers = rest.size();
-  Vector root(numbers), u(numbers), moved(numbers), back(numbers), velocity(numbers);
-  const Vector still(numbers, 0.0);
+  Values root(numbers), u(numbers), moved(numbers), back(numbers), velocity(numbers);
+  const Values still(numbers, 0.0);
   for (std::size_t k = 0; k < numbers; ++k) root[k] = std::sqrt(inverse_mass[k / 3]);
   Rng rng(1, 0);
   for (std::size_t k = 0; k < numbers; ++k) u[k] = rng.uniform(-1, 1) * (root[k] > 0);
@@ -72,8 +72,8 @@ FastestMode fastest_mode(const ElementTables<double>& elements, const Vector& re
       moved[k] = rest[k] + step * velocity[k];
       back[k] = rest[k] - step * velocity[k];
     }
-    const Vector ahead = forces_of(elements, moved, still), behind = forces_of(elements, back, still);
-    const Vector drag = iteration + 1 < iterations ? still : forces_of(elements, rest, velocity);
+    const Values ahead = forces_of(elements, moved, still), behind = forces_of(elements, back, still);
+    const Values drag = iteration + 1 < iterations ? still : forces_of(elements, rest, velocity);
     frequency2 = rate = 0;
     for (std::size_t k = 0; k < numbers; ++k) {
       const double ku = root[k] * (behind[k] - ahead[k]) / (2 * step);

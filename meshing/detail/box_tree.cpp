@@ -5,7 +5,7 @@
 
 namespace limber::meshing::detail {
 namespace {
-constexpr int leaf_size = 4;
+constexpr int box_leaf_size = 4;
 }
 
 BoxTree::BoxTree(const std::vector<Box>& boxes) : things_(boxes.size()) {
@@ -23,7 +23,7 @@ void BoxTree::split(int node, const std::vector<Box>& boxes) {
     centers.include(boxes[things_[i]].center());
   }
   nodes_[node].box = all;
-  if (last - first <= leaf_size) return;
+  if (last - first <= box_leaf_size) return;
   int axis;
   centers.size().maxCoeff(&axis);
   const int middle = (first + last) / 2;

@@ -14,7 +14,7 @@
 namespace limber::meshing::detail {
 namespace {
 
-using Edge = std::array<int, 2>;  // vertices, ascending
+using EdgeEnds = std::array<int, 2>;  // vertices, ascending
 
 struct Gap {
   Vec3 middle;
@@ -63,7 +63,7 @@ class Splitter {
   void split_edges_of(const std::vector<bool>& glued) {
     constexpr double shortest = 0.4;  // edge that is split, in cells
     constexpr double near_end = 0.4;  // as a share of the edge
-    std::set<Edge> edges;
+    std::set<EdgeEnds> edges;
     for (std::size_t t = 0; t < glued.size(); ++t)
       for (int i = 0; glued[t] && i < 4; ++i)
         for (int j = 0; j < i; ++j) {
@@ -284,7 +284,7 @@ TetMesh open_gaps(const CageModel& model, const TetMesh& mesh) {
         manifold_faults(boundary_triangles(opened.mesh.tets), int(opened.mesh.positions.rows()));
     if (faults.edges.empty() && faults.vertices.empty()) return opened.mesh;
     std::vector<bool> faulty(std::size_t(mesh.positions.rows()));
-    for (const Edge& edge : faults.edges)
+    for (const EdgeEnds& edge : faults.edges)
       for (int v : edge) faulty[opened.vertex_before[v]] = true;
     for (int v : faults.vertices) faulty[opened.vertex_before[v]] = true;
     for (Joint& joint : joints)

@@ -12,7 +12,7 @@ namespace limber::meshing::detail {
 
 namespace {
 
-double squared_distance(const Box& box, const Vec3& p) {
+double squared_distance_to_box(const Box& box, const Vec3& p) {
   return (box.lower - p).cwiseMax(p - box.upper).cwiseMax(0.0).squaredNorm();
 }
 
@@ -61,9 +61,9 @@ double SurfaceDistance::at(const Vec3& point) const {
         best = std::min(best, squared_distance(corners_[std::size_t(i)], point));
       continue;
     }
-    std::pair<double, int> left = {squared_distance(bvh_.nodes[std::size_t(node.left)].box, point),
+    std::pair<double, int> left = {squared_distance_to_box(bvh_.nodes[std::size_t(node.left)].box, point),
                                    node.left};
-    std::pair<double, int> right = {squared_distance(bvh_.nodes[std::size_t(node.right)].box, point),
+    std::pair<double, int> right = {squared_distance_to_box(bvh_.nodes[std::size_t(node.right)].box, point),
                                     node.right};
     if (left.first < right.first) std::swap(left, right);
     stack[depth++] = left;

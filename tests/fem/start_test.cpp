@@ -40,7 +40,7 @@ double x_of(const World& world, const State& state, int body) {
 }
 
 // What a spec is refused with.
-std::string complaint(const WorldSpec& spec) {
+std::string refusal(const WorldSpec& spec) {
   try {
     build_world(spec);
   } catch (const InputError& error) {
@@ -153,7 +153,7 @@ TEST(Start, AStartThatIsGivenIsNotSoughtAgain) {
   EXPECT_EQ(given.parting.pairs.at(0).gap_m, world.parting.pairs.at(0).gap_m);
   EXPECT_EQ(given.parting.steps, 0);
   spec.start_positions.pop_back();
-  EXPECT_NE(complaint(spec).find("start_positions hold"), std::string::npos) << complaint(spec);
+  EXPECT_NE(refusal(spec).find("start_positions hold"), std::string::npos) << refusal(spec);
 }
 
 TEST(Start, BodiesThatDoNotOverlapStayWhereTheyAre) {
@@ -171,16 +171,16 @@ TEST(Start, BodiesThatDoNotOverlapStayWhereTheyAre) {
 
 TEST(Start, WhatCannotBePartedIsRefused) {
   WorldSpec spec = row_of_balls(2, 0.3);
-  EXPECT_NE(complaint(spec).find("bodies a and b overlap at the start, 0.3"), std::string::npos);
-  EXPECT_NE(complaint(spec).find("more than a quarter of"), std::string::npos) << complaint(spec);
+  EXPECT_NE(refusal(spec).find("bodies a and b overlap at the start, 0.3"), std::string::npos);
+  EXPECT_NE(refusal(spec).find("more than a quarter of"), std::string::npos) << refusal(spec);
   spec = row_of_balls(2, 0.1);
   spec.part_overlaps = false;
-  EXPECT_NE(complaint(spec).find("move them apart"), std::string::npos) << complaint(spec);
+  EXPECT_NE(refusal(spec).find("move them apart"), std::string::npos) << refusal(spec);
   // Both are held wherever they are in one another.
   spec.part_overlaps = true;
   for (BodySpec& body : spec.bodies)
     for (int n = 0; n + 1 < body.cage.positions.rows(); ++n) body.fixed_nodes.push_back(n);
-  EXPECT_NE(complaint(spec).find("cannot be parted: after"), std::string::npos) << complaint(spec);
+  EXPECT_NE(refusal(spec).find("cannot be parted: after"), std::string::npos) << refusal(spec);
 }
 
 TEST(Start, AWishToStopEndsIt) {

@@ -22,7 +22,7 @@ namespace {
 constexpr std::size_t longest_name = 150;
 constexpr std::uintmax_t most_list_bytes = 1 << 30;
 
-std::string lower(std::string text) {
+std::string lower_ascii(std::string text) {
   for (char& c : text)
     if (c >= 'A' && c <= 'Z') c = char(c - 'A' + 'a');
   return text;
@@ -54,9 +54,9 @@ std::string cut(std::string name) {
 // hash, so that none depends on the order.
 void tell_apart(std::vector<ListedModel>& models) {
   std::map<std::string, int> of_name;
-  for (ListedModel& model : models) ++of_name[lower(cut(model.name))];
+  for (ListedModel& model : models) ++of_name[lower_ascii(cut(model.name))];
   for (ListedModel& model : models) {
-    const bool alone = of_name[lower(cut(model.name))] == 1 && model.name.size() <= longest_name;
+    const bool alone = of_name[lower_ascii(cut(model.name))] == 1 && model.name.size() <= longest_name;
     model.name = cut(model.name);
     if (!alone) model.name += fmt::format("~{:.12}", content_hash(model.file.lexically_normal().string()));
   }
@@ -87,7 +87,7 @@ std::vector<ListedModel> models_in(const fs::path& folder, const std::vector<fs:
     if (it->is_directory(none)) {
       if (hidden || is_left_out(path)) it.disable_recursion_pending();
     } else if (!hidden && it->is_regular_file(none) &&
-               std::binary_search(endings.begin(), endings.end(), lower(path.extension().string()))) {
+               std::binary_search(endings.begin(), endings.end(), lower_ascii(path.extension().string()))) {
       models.push_back({path, name_for(path.lexically_relative(folder))});
     }
   }

@@ -184,9 +184,9 @@ class Gltf {
   std::size_t view_begin_ = 0;
 };
 
-class Writer {
+class GltfWriter {
  public:
-  explicit Writer(const PlannedMotion& motion) : motion_(motion) {
+  explicit GltfWriter(const PlannedMotion& motion) : motion_(motion) {
     std::vector<float> times;
     for (const int f : motion.wanted)
       times.push_back(float(motion.time_s(f) - motion.time_s(motion.wanted.front())));
@@ -467,7 +467,7 @@ class Writer {
 }  // namespace
 
 WrittenFiles write_gltf(const PlannedMotion& motion, const fs::path& folder) {
-  Writer writer(motion);
+  GltfWriter writer(motion);
   for (int b = 0; b < int(motion.bodies.size()); ++b) writer.add(b);
   const std::string content = writer.binary();
   write_file(folder / "motion.glb", content);

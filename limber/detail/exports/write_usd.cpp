@@ -55,9 +55,9 @@ void add_extent(Text& text, const Points& points, int decimals) {
   add_points(text, corners, decimals);
 }
 
-class Writer {
+class UsdWriter {
  public:
-  Writer(const PlannedMotion& motion, const fs::path& path)
+  UsdWriter(const PlannedMotion& motion, const fs::path& path)
       : motion_(motion), decimals_(decimals_of(motion)), names_(prim_names(motion.scene)), file_(path) {}
 
   std::uintmax_t write() {
@@ -298,7 +298,7 @@ class Writer {
 
 WrittenFiles write_usd(const PlannedMotion& motion, const fs::path& folder) {
   const fs::path path = folder / "motion.usda";
-  Writer writer(motion, path);
+  UsdWriter writer(motion, path);
   WrittenFiles written{path, 1, 0};
   writer.write_images(folder / "textures", written);
   written.bytes += writer.write();

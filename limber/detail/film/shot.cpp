@@ -425,7 +425,7 @@ std::string Shot::clock_at(int frame) const {
   // Where the speed changes, its figure goes in steps: one that is read while it runs says nothing.
   const bool steady = film.pace == scenes::Pace::steady;
   const auto told = [&](double times) {
-    return steady ? times : times < 2 ? 0.5 * std::round(2 * times) : std::round(times);
+    return steady ? std::round(10 * times) / 10 : times < 2 ? 0.5 * std::round(2 * times) : std::round(times);
   };
   if (speed < 1 && told(1 / speed) > 1) words += fmt::format(" · {:.3g}× slow motion", told(1 / speed));
   if (speed > 1 && told(speed) > 1) words += fmt::format(" · {:.3g}× time lapse", told(speed));

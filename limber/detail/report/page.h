@@ -11,6 +11,8 @@ namespace limber::detail {
 
 std::string escaped(const std::string& text);
 
+std::string base64(std::string_view bytes);
+
 // An SVG document within a page: the declaration that begins it goes.
 std::string inlined(const std::string& svg);
 

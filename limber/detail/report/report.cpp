@@ -34,20 +34,6 @@ namespace {
 // A film beyond this makes a page that no longer opens at once.
 constexpr std::uintmax_t largest_film_bytes = 8'000'000;
 
-std::string base64(std::string_view bytes) {
-  constexpr const char* letters = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-  std::string text;
-  text.reserve((bytes.size() + 2) / 3 * 4);
-  for (std::size_t i = 0; i < bytes.size(); i += 3) {
-    std::uint32_t three = 0;
-    for (std::size_t k = 0; k < 3; ++k)
-      three = three << 8 | (i + k < bytes.size() ? std::uint8_t(bytes[i + k]) : 0u);
-    for (std::size_t k = 0; k < 4; ++k)
-      text += i + k <= bytes.size() ? letters[three >> (18 - 6 * k) & 63] : '=';
-  }
-  return text;
-}
-
 Json json_of(const Vec3& v) { return {v.x(), v.y(), v.z()}; }
 Json json_of(const Box& box) { return {json_of(box.lower), json_of(box.upper)}; }
 

@@ -37,7 +37,7 @@ class Packer {
   std::string bytes;
 };
 
-std::vector<std::uint32_t> edges_of(const Triangles& triangles) {
+std::vector<std::uint32_t> ends_of_edges(const Triangles& triangles) {
   std::set<std::pair<int, int>> edges;
   for (Eigen::Index t = 0; t < triangles.rows(); ++t)
     for (int k = 0; k < 3; ++k) edges.insert(std::minmax({triangles(t, k), triangles(t, (k + 1) % 3)}));
@@ -83,7 +83,7 @@ PackedMotion pack_motion(const fem::World& world, const std::vector<PreparedBody
       for (const Points& place : places) Packer::quantise(place, reach, levels);
       entry["cage"] = packer.add(as(prepared.cage.positions, float()));
       entry["tets"] = packer.add(as(prepared.cage.tets, std::uint32_t()));
-      entry["edges"] = packer.add(edges_of(body.surface));
+      entry["edges"] = packer.add(ends_of_edges(body.surface));
       entry["tet_from_vertex"] = packer.add(as(prepared.binding.tet_from_vertex, std::uint32_t()));
       entry["phong"] = prepared.deformation == scenes::Deformation::phong;
       entry["frames"] = packer.add(levels);
