@@ -13,7 +13,7 @@
 namespace limber::scenes {
 namespace {
 
-constexpr double half_turn = std::numbers::half_turn;
+constexpr double half_turn = std::numbers::pi;
 
 TEST(BeachBall, IsTheSphereAndHasLongitudeAndLatitudeForCoordinates) {
   const SurfaceMesh ball = make_beach_ball(), sphere = make_sphere({1, 0.05});
@@ -28,7 +28,8 @@ TEST(BeachBall, IsTheSphereAndHasLongitudeAndLatitudeForCoordinates) {
   for (Eigen::Index t = 0; t < ball.triangles.rows(); ++t) {
     for (int c = 0; c < 3; ++c) {
       const Vec3 p = 2 * ball.positions.row(ball.triangles(t, c)).transpose();
-      const double longitude = 2 * half_turn * a.uv(3 * t + c, 0), latitude = half_turn * (a.uv(3 * t + c, 1) - 0.5);
+      const double longitude = 2 * half_turn * a.uv(3 * t + c, 0),
+                   latitude = half_turn * (a.uv(3 * t + c, 1) - 0.5);
       const Vec3 there = std::cos(latitude) * (std::cos(longitude) * east + std::sin(longitude) * north) +
                          std::sin(latitude) * pole;
       ASSERT_LT((p - there).norm(), 1e-7) << t << ' ' << c;  // the arc sine's, beside the poles
