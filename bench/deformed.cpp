@@ -84,7 +84,7 @@ void draw(const std::string& model, int tets, const fs::path& out, bool y_up) {
   chest.lower += margin, chest.upper -= margin;
   const auto picture = [&](const Points& positions, const Points& normals, const Points& lines,
                            const std::optional<Box>& close, const char* name) {
-    render::Look look;
+    render::RenderSettings look;
     look.width = 760, look.height = 860, look.supersampling = 3;
     look.stage = bounding_box(positions);
     look.ground_height_m = look.stage.lower.z();

@@ -53,7 +53,7 @@ std::size_t meetings(const LabelMap& map) {
     if (std::count(map.material.begin(), map.material.end(), row) > 0) rows.push_back(row);
   SurfaceMesh all;
   all.positions.resize(0, 3), all.triangles.resize(0, 3);
-  for (const LabelSurface& one : surfaces_of(map, rows, {.least_island = 0})) {
+  for (const LabelSurface& one : surfaces_of(map, rows, {.min_island = 0})) {
     const Eigen::Index points = all.positions.rows(), triangles = all.triangles.rows();
     all.positions.conservativeResize(points + one.surface.positions.rows(), 3);
     all.positions.bottomRows(one.surface.positions.rows()) = one.surface.positions;

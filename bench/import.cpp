@@ -184,7 +184,7 @@ std::vector<std::string> counts(const Json& defects) {
 }
 
 // Without the place, which is long.
-std::string told(const Json& sentence) {
+std::string records(const Json& sentence) {
   const std::string text = sentence.get<std::string>();
   return text.substr(0, text.find(", the first: "));
 }
@@ -198,7 +198,7 @@ void table(const std::string& program, const std::vector<std::string>& files) {
       found = fmt::format("{}", fmt::join(counts(result.said.at("found")), ", "));
       std::vector<std::string> sentences;
       for (const char* list : {"mended", "warnings"})
-        for (const Json& sentence : result.said.at(list)) sentences.push_back(told(sentence));
+        for (const Json& sentence : result.said.at(list)) sentences.push_back(records(sentence));
       done = fmt::format("{}", fmt::join(sentences, "; "));
     } else {
       done = "refused: " + result.said.value("error", "");

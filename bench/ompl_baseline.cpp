@@ -183,9 +183,9 @@ class ControlSpace final : public oc::ControlSpace {
 };
 
 // What limber draws for an expansion towards `point`, with OMPL's random numbers.
-plan::Draw draw_towards(const Problem& problem, ompl::RNG& rng, const Vec3& point) {
+plan::Sample draw_towards(const Problem& problem, ompl::RNG& rng, const Vec3& point) {
   const plan::Settings& s = problem.settings;
-  plan::Draw d;
+  plan::Sample d;
   d.point = point;
   d.towards_goal = (point - s.goal.center_of_mass_m).norm() < 1e-9;
   const double interpolation = d.towards_goal ? s.weights.interpolation : 0;

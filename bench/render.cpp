@@ -194,7 +194,7 @@ Eigen::Matrix3d lean(int frame) {
 // the camera is nearer.
 class Stage {
  public:
-  Stage(const SurfaceMesh& body, const SurfaceMesh& coarse, const Look& look, bool veil = false)
+  Stage(const SurfaceMesh& body, const SurfaceMesh& coarse, const RenderSettings& look, bool veil = false)
       : body_(body),
         coarse_(coarse),
         box_(box_mesh({0.62, -0.3, 0}, {1.12, 0.3, 0.7})),
@@ -262,8 +262,8 @@ class Stage {
   Points moved_, moved_normals_;
 };
 
-Look look_of(int width, int height, bool multisampling) {
-  Look look;
+RenderSettings look_of(int width, int height, bool multisampling) {
+  RenderSettings look;
   look.width = width, look.height = height, look.multisampling = multisampling;
   look.ground_height_m = 0;
   look.stage.include(Vec3(-1, -1, 0)), look.stage.include(Vec3(1.4, 1, 1.4));

@@ -17,7 +17,7 @@ namespace {
 
 using namespace limber;
 
-class InOrder final : public plan::Supply {
+class InOrder final : public plan::RolloutSource {
  public:
   InOrder(std::vector<plan::Rollout>& all, std::atomic<std::size_t>& next, int at_once)
       : all_(all), next_(next), at_once_(at_once) {}

@@ -478,7 +478,7 @@ int run_command_line(int argc, const char* const* argv) {
       ->check(CLI::Range(0, 1000))
       ->capture_default_str();
   prepare_command
-      .add_option("--least-island", prepare_options.least_island,
+      .add_option("--least-island", prepare_options.min_island,
                   "voxels; pieces of a label that have fewer are left out, 0 … 1e9")
       ->check(within(0.0, 1e9))
       ->capture_default_str();

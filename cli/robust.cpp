@@ -18,7 +18,7 @@ Json json_of(const detail::Fate& f) {
           {"end_center_m", {f.end_center_m.x(), f.end_center_m.y(), f.end_center_m.z()}},
           {"largest_volume_change_percent", 100 * f.volume_change},
           {"deepest_penetration_m", f.penetration_m},
-          {"least_stretch", f.least_stretch},
+          {"least_stretch", f.min_stretch},
           {"largest_stretch", f.largest_stretch},
           {"deepest_overlap_m", f.overlap_m},
           {"deepest_self_overlap_m", f.self_overlap_m},
@@ -37,7 +37,7 @@ Json json_of(const detail::Tally& tally) {
           {"end_farthest_m", tally.farthest_m},
           {"largest_volume_change_percent", 100 * worst.volume_change},
           {"deepest_penetration_m", worst.penetration_m},
-          {"least_stretch", worst.least_stretch},
+          {"least_stretch", worst.min_stretch},
           {"largest_stretch", worst.largest_stretch},
           {"deepest_overlap_m", worst.overlap_m},
           {"deepest_self_overlap_m", worst.self_overlap_m},
@@ -58,7 +58,7 @@ std::string text_of(const detail::Tally& tally, const detail::RobustOptions& opt
         "  {:5}  {:23}  {:8.3f} m     {:.4f} m/s  {:5.2f} s  {:5.2f} %  {:.2f} … {:.2f}  {:.4f} m  {:.4f} m  "
         "   "
         "{:5.4g} N  {}\n",
-        f.world, f.end, f.distance_m, f.speed_m_s, f.duration_s, 100 * f.volume_change, f.least_stretch,
+        f.world, f.end, f.distance_m, f.speed_m_s, f.duration_s, 100 * f.volume_change, f.min_stretch,
         f.largest_stretch, std::max(f.overlap_m, f.self_overlap_m), f.penetration_m, f.asked_n,
         f.broken.empty() ? "kept" : fmt::format("{} broken", f.broken.size()));
   const detail::Fate& worst = tally.worst;
@@ -74,7 +74,7 @@ std::string text_of(const detail::Tally& tally, const detail::RobustOptions& opt
       "  promises     all kept in {} of {}\n",
       tally.reached, tally.fates.size(), robust.settles ? "come to rest" : "end",
       100 * options.material_share, 100 * options.force_share, options.force_deg, options.seed,
-      tally.spread_m, tally.farthest_m, 100 * worst.volume_change, worst.least_stretch, worst.largest_stretch,
+      tally.spread_m, tally.farthest_m, 100 * worst.volume_change, worst.min_stretch, worst.largest_stretch,
       worst.overlap_m, worst.self_overlap_m, worst.penetration_m, worst.asked_n, robust.max_force_n,
       worst.force_n, tally.keep_all, tally.fates.size());
   for (const auto& [promise, times] : tally.broken)

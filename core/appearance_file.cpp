@@ -47,7 +47,7 @@ std::string name_of_image_file(const Appearance& a, std::size_t image) {
 }
 
 bool is_name_of_image_file(const std::string& name) {
-  for (std::size_t i = 0; i < most_images; ++i)
+  for (std::size_t i = 0; i < max_images; ++i)
     for (const char* extension : {".png", ".jpg"})
       if (name == image_file(i, extension)) return true;
   return false;
@@ -112,13 +112,13 @@ Appearance read_appearance(const fs::path& folder, const SurfaceMesh& surface) {
                              Vec3(m.at("color")[0], m.at("color")[1], m.at("color")[2]),
                              m.at("image").get<int>(), m.at("normal_image").get<int>()});
     }
-    require_looks(meta.at("images").size() <= most_images, path, "more images than limber writes");
+    require_looks(meta.at("images").size() <= max_images, path, "more images than limber writes");
     for (const Json& image : meta.at("images")) {
       const auto name = image.at("file").get<std::string>();
       const std::size_t i = a.images.size();
       require_looks(image.size() == 2 && (name == image_file(i, ".png") || name == image_file(i, ".jpg")),
                     path, fmt::format("image {} is in a file that limber did not write", i));
-      a.images.push_back({image.at("name").get<std::string>(), read_file(folder / name, most_image_bytes)});
+      a.images.push_back({image.at("name").get<std::string>(), read_file(folder / name, max_image_bytes)});
       require_looks(name == name_of_image_file(a, i), folder / name, "is no image of that kind");
     }
   } catch (const Json::exception& trouble) {

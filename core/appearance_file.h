@@ -10,8 +10,8 @@
 namespace limber {
 
 inline constexpr const char* appearance_file = "appearance.npz";
-inline constexpr std::uintmax_t most_image_bytes = 64 << 20;
-inline constexpr std::size_t most_images = 64;
+inline constexpr std::uintmax_t max_image_bytes = 64 << 20;
+inline constexpr std::size_t max_images = 64;
 
 // "image-0.png": of image i.
 std::string name_of_image_file(const Appearance&, std::size_t image);

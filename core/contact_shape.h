@@ -37,7 +37,7 @@ struct ContactShape {
   SurfaceSamples samples;
   // (T × 4): where a point of tet t can be inside the surface, its barycentric coordinate i is at least this;
   // > 1 in all four where none of the tet is inside.
-  Weights least_weight;
+  Weights min_weight;
   // Where false (a surface without an inside, or walls too thin for the field) there are no samples, nothing
   // is inside, and contact must go by the cage.
   bool usable = true;

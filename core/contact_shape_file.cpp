@@ -11,7 +11,7 @@ namespace limber {
 
 namespace {
 
-constexpr std::int64_t most_nodes_on_an_axis = 1 << 14, most_nodes = 1 << 26, most_samples = 1 << 20;
+constexpr std::int64_t max_nodes_on_an_axis = 1 << 14, max_nodes = 1 << 26, max_samples = 1 << 20;
 constexpr double longest_m = 1e9;  // beyond any coordinate or distance
 
 void require(bool good, const fs::path& path, const std::string& why) {
@@ -54,11 +54,11 @@ DistanceField field_of(const Npz& file, const Json& meta) {
   require(values.shape.size() == 3, file.source, "field has not three axes");
   for (int axis = 0; axis < 3; ++axis) {
     const std::int64_t nodes = values.shape[std::size_t(2 - axis)];
-    require(nodes >= 2 && nodes <= most_nodes_on_an_axis, file.source,
+    require(nodes >= 2 && nodes <= max_nodes_on_an_axis, file.source,
             fmt::format("field has {} nodes along an axis", nodes));
     field.nodes[std::size_t(axis)] = int(nodes);
   }
-  require(values.size() <= most_nodes, file.source, fmt::format("field has {} nodes", values.size()));
+  require(values.size() <= max_nodes, file.source, fmt::format("field has {} nodes", values.size()));
   const auto all = values.as<std::int16_t>("field");
   field.values.assign(all.begin(), all.end());
   return field;
@@ -67,7 +67,7 @@ DistanceField field_of(const Npz& file, const Json& meta) {
 SurfaceSamples samples_of(const Npz& file, Eigen::Index tets) {
   SurfaceSamples samples;
   const NpyArray& tet_from_sample = file.array("sample_tets");
-  require(tet_from_sample.shape.size() == 1 && tet_from_sample.shape[0] <= most_samples, file.source,
+  require(tet_from_sample.shape.size() == 1 && tet_from_sample.shape[0] <= max_samples, file.source,
           "sample_tets is no list of samples");
   const std::int64_t count = tet_from_sample.shape[0];
   samples.tet_from_sample =
@@ -102,7 +102,7 @@ void write_contact_shape(const fs::path& path, const ContactShape& shape, const 
   file.arrays["sample_tets"] = NpyArray::of_matrix(shape.samples.tet_from_sample);
   file.arrays["sample_weights"] = NpyArray::of_matrix(shape.samples.weights);
   file.arrays["sample_areas_m2"] = NpyArray::of_matrix(shape.samples.area_m2);
-  file.arrays["least_weight"] = NpyArray::of_matrix(shape.least_weight);
+  file.arrays["least_weight"] = NpyArray::of_matrix(shape.min_weight);
   Json meta;
   meta["format"] = "limber contact 1";
   meta["surface_hash"] = hex(hash_of(surface));
@@ -134,10 +134,10 @@ ContactShape read_contact_shape(const fs::path& path, const SurfaceMesh& surface
   }
   shape.samples = samples_of(file, cage.tets.rows());
   require(!shape.usable || shape.samples.tet_from_sample.size() > 0, path, "it has no samples");
-  shape.least_weight = matrix_of<Weights>(file, "least_weight", cage.tets.rows(), 4);
-  for (Eigen::Index i = 0; i < shape.least_weight.size(); ++i)
-    require(within(shape.least_weight.data()[i], 0, 2), path,
-            fmt::format("least_weight of tet {} is {}", i / 4, shape.least_weight.data()[i]));
+  shape.min_weight = matrix_of<Weights>(file, "least_weight", cage.tets.rows(), 4);
+  for (Eigen::Index i = 0; i < shape.min_weight.size(); ++i)
+    require(within(shape.min_weight.data()[i], 0, 2), path,
+            fmt::format("least_weight of tet {} is {}", i / 4, shape.min_weight.data()[i]));
   return shape;
 }
 

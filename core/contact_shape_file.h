@@ -1,5 +1,5 @@
 // contact.npz: field int16 (nodes z × y × x), sample_positions_m float64 (S × 3), sample_tets int32 (S),
-// sample_weights float64 (S × 4), sample_areas_m2 float64 (S), least_weight float64 (T × 4), and meta.json
+// sample_weights float64 (S × 4), sample_areas_m2 float64 (S), min_weight float64 (T × 4), and meta.json
 // with the rest of the field, `usable`, and the hashes of both meshes.
 #pragma once
 

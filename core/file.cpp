@@ -64,11 +64,11 @@ void remove_abandoned_beside(const fs::path& path) {
 
 }  // namespace
 
-std::string read_file(const fs::path& path, std::uintmax_t most_bytes) {
+std::string read_file(const fs::path& path, std::uintmax_t max_bytes) {
   const auto refuse_size = [&](const std::string& size) {
     throw InputError(
         fmt::format("{}: holds {} bytes, and at most {} are read of such a file; is it the right one?",
-                    path.string(), size, most_bytes));
+                    path.string(), size, max_bytes));
   };
   // Opening a pipe without O_NONBLOCK would wait for somebody to write to it.
   const Descriptor fd(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY));
@@ -80,7 +80,7 @@ std::string read_file(const fs::path& path, std::uintmax_t most_bytes) {
   if (!S_ISREG(status.st_mode))
     throw InputError(fmt::format(
         "{}: is a pipe or a device, not a file; save what it gives to a file and name that", path.string()));
-  if (std::uintmax_t(status.st_size) > most_bytes) refuse_size(std::to_string(status.st_size));
+  if (std::uintmax_t(status.st_size) > max_bytes) refuse_size(std::to_string(status.st_size));
   std::string content;
   content.reserve(std::size_t(status.st_size) + 1);
   std::size_t size = 0;
@@ -91,7 +91,7 @@ std::string read_file(const fs::path& path, std::uintmax_t most_bytes) {
     if (got < 0) throw InputError(fmt::format("{}: reading failed: {}", path.string(), std::strerror(errno)));
     size += std::size_t(got);
     if (got == 0) break;
-    if (size > most_bytes) refuse_size("more and more");  // it grows, or does not tell its size
+    if (size > max_bytes) refuse_size("more and more");  // it grows, or does not tell its size
   }
   content.resize(size);
   return content;

@@ -12,11 +12,11 @@ namespace limber {
 namespace fs = std::filesystem;
 
 // Readers hold what they read in memory: what is larger than this is nothing that any of them is meant for.
-inline constexpr std::uintmax_t most_bytes_read = std::uintmax_t(8) << 30;
+inline constexpr std::uintmax_t max_bytes_read = std::uintmax_t(8) << 30;
 
-// Throws InputError when there is no such file, when it cannot be read, is larger than `most_bytes`, or is
+// Throws InputError when there is no such file, when it cannot be read, is larger than `max_bytes`, or is
 // a pipe or a device: they could keep the reader waiting or never end.
-std::string read_file(const fs::path&, std::uintmax_t most_bytes = most_bytes_read);
+std::string read_file(const fs::path&, std::uintmax_t max_bytes = max_bytes_read);
 
 // Throws DiskError (nothing is left behind) when the disk is full, the folder is missing or not writable.
 void write_file(const fs::path&, std::string_view content);

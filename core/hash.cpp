@@ -28,7 +28,7 @@ std::uint64_t hash_of(const SurfaceMesh& mesh) {
   return Hasher().matrix(mesh.positions).matrix(mesh.triangles).digest();
 }
 std::uint64_t hash_of(const ContactShape& shape) {
-  const auto& [field, samples, least_weight, usable] = shape;
+  const auto& [field, samples, min_weight, usable] = shape;
   return Hasher()
       .matrix(field.lower_m)
       .value(field.cell_m)
@@ -39,7 +39,7 @@ std::uint64_t hash_of(const ContactShape& shape) {
       .matrix(samples.tet_from_sample)
       .matrix(samples.weights)
       .matrix(samples.area_m2)
-      .matrix(least_weight)
+      .matrix(min_weight)
       .value(int(usable))
       .digest();
 }

@@ -22,11 +22,11 @@ void require_shallow(const std::string& text, const std::string& what) {
     } else if (c == '"') {
       in_string = !in_string;
     } else if (!in_string && (c == '[' || c == '{')) {
-      if (++depth > most_json_depth)
+      if (++depth > max_json_depth)
         throw InputError(
             fmt::format("{}:{}: has lists within lists more than {} deep, which nothing of limber's has; is "
                         "it the right file?",
-                        what, line, most_json_depth));
+                        what, line, max_json_depth));
     } else if (!in_string && (c == ']' || c == '}')) {
       --depth;
     }
@@ -66,7 +66,7 @@ Json parse_json(const std::string& text, const std::string& what) {
   }
 }
 
-Json read_json(const fs::path& path) { return parse_json(read_file(path, most_json_bytes), path.string()); }
+Json read_json(const fs::path& path) { return parse_json(read_file(path, max_json_bytes), path.string()); }
 std::string text_of(const Json& json, int indent) {
   return json.dump(indent, ' ', false, Json::error_handler_t::replace);
 }

@@ -11,8 +11,8 @@ using Json = nlohmann::ordered_json;
 
 // Both throw InputError with the line: what is not JSON, lists within lists deeper than this (what walks
 // through them calls itself), and, of a file, more bytes than this.
-inline constexpr int most_json_depth = 100;
-inline constexpr std::uintmax_t most_json_bytes = 64 << 20;
+inline constexpr int max_json_depth = 100;
+inline constexpr std::uintmax_t max_json_bytes = 64 << 20;
 Json parse_json(const std::string& text, const std::string& what);
 Json read_json(const fs::path&);
 void write_json(const fs::path&, const Json&);

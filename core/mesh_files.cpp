@@ -69,9 +69,9 @@ class Words {
   }
 
   // Refuses counts that the rest of the file cannot hold, before memory is asked for.
-  Eigen::Index count(std::size_t least_bytes_each) {
+  Eigen::Index count(std::size_t min_bytes_each) {
     const auto n = number<std::int64_t>();
-    if (n < 0 || std::uint64_t(n) > (text_.size() - offset()) / least_bytes_each + 1)
+    if (n < 0 || std::uint64_t(n) > (text_.size() - offset()) / min_bytes_each + 1)
       fail(fmt::format("a count of {} is more than the file can hold; it may be cut short", n));
     return Eigen::Index(n);
   }

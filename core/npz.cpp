@@ -238,11 +238,11 @@ class Archive {
 
   // What they unpack to is bounded before any is unpacked.
   std::vector<Entry> entries() const {
-    constexpr zip_int64_t most_entries = 1000;
-    constexpr std::uint64_t always_allowed = 64 << 20, most_growth = 64;  // plans that sleep much: tenfold
+    constexpr zip_int64_t max_entries = 1000;
+    constexpr std::uint64_t always_allowed = 64 << 20, max_growth = 64;  // plans that sleep much: tenfold
     const zip_int64_t count = zip_get_num_entries(archive_, 0);
-    if (count > most_entries) refuse(fmt::format("has {} entries; at most {} are read", count, most_entries));
-    const std::uint64_t allowed = always_allowed + most_growth * bytes_.size();
+    if (count > max_entries) refuse(fmt::format("has {} entries; at most {} are read", count, max_entries));
+    const std::uint64_t allowed = always_allowed + max_growth * bytes_.size();
     std::uint64_t sum = 0;
     std::vector<Entry> entries;
     for (zip_int64_t i = 0; i < count; ++i) {
@@ -279,9 +279,9 @@ class Archive {
   }
 
   std::string text(const Entry& entry) const {
-    if (entry.size > most_json_bytes)
+    if (entry.size > max_json_bytes)
       refuse(fmt::format("entry {} is a text of {} bytes; at most {} are read", entry.name, entry.size,
-                         most_json_bytes));
+                         max_json_bytes));
     const auto file = opened(entry);
     std::string content(entry.size, '\0');
     fill(file.get(), entry, content.data(), content.size());

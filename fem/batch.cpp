@@ -102,8 +102,8 @@ void Batch::load(int lane, const State& state, const Control& control) {
   if (control.steps == 0) impl_->finish(lane);
 }
 
-int Batch::advance(int most_steps) {
-  int steps = most_steps, busy = 0;
+int Batch::advance(int max_steps) {
+  int steps = max_steps, busy = 0;
   for (const auto& lane : impl_->lanes)
     if (lane.steps_left > 0) steps = std::min(steps, lane.steps_left), ++busy;
   if (busy == 0 || steps <= 0) return 0;

@@ -34,9 +34,9 @@ class Batch {
 
   // The lane will take control.steps steps from here. What it held is gone.
   void load(int lane, const State&, const Control&);
-  // Steps all loaded lanes together until the first of them is done, at most `most_steps`; returns the steps
+  // Steps all loaded lanes together until the first of them is done, at most `max_steps`; returns the steps
   // taken, 0 when no lane has any left.
-  int advance(int most_steps = 1 << 30);
+  int advance(int max_steps = 1 << 30);
   int steps_left(int lane) const;
   // Of one body as it is now, in a lane that was loaded: centre of mass and its velocity, height of the
   // lowest node.

@@ -9,7 +9,7 @@ namespace limber::fem {
 namespace {
 
 // Looking at this clock is a call of the kernel, some 200 ns: as much as a tenth of a small world's step.
-double least_lap_s() {
+double min_lap_s() {
   double least = 1, before = thread_cpu_s();
   for (int i = 0; i < 50; ++i) {
     const double now = thread_cpu_s();
@@ -28,7 +28,7 @@ double thread_cpu_s() {
 }
 
 double Stopwatch::lap_s() {
-  static const double asking_s = least_lap_s();
+  static const double asking_s = min_lap_s();
   const double now = thread_cpu_s(), lap = now - before_ - asking_s;
   before_ = now;
   return std::max(lap, 0.0);

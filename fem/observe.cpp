@@ -260,7 +260,7 @@ std::vector<ContactForce> contact_forces(const World& world, const State& state,
   detail::Stepper<float> stepper(world, 1, detail::best_isa());
   stepper.load(0, state.step, state.positions.data(), state.velocities.data(), control, true);
   std::vector<ContactForce> forces;
-  for (const auto& e : stepper.exerted(0)) {
+  for (const auto& e : stepper.contact_records(0)) {
     ContactForce force{e.body, e.against, Vec3::Zero(), Vec3::Zero(), double(e.depth)};
     for (int c = 0; c < 3; ++c) force.force_n[c] = double(e.force[c]), force.place_m[c] = double(e.place[c]);
     forces.push_back(force);

@@ -420,7 +420,7 @@ void append_tets(const Body& body, Topology& topology) {
 
 // Surface edges that stick out, by at least 3° at rest: of what is flat or hollow no edge is met first.
 std::set<std::pair<int, int>> ridges_of(const Body& body) {
-  const double least_cosine = std::cos(3 * std::numbers::pi / 180);
+  const double min_cosine = std::cos(3 * std::numbers::pi / 180);
   std::map<std::pair<int, int>, std::vector<int>> faces;
   for (int f = 0; f < body.surface.rows(); ++f)
     for (int i = 0; i < 3; ++i)
@@ -432,7 +432,7 @@ std::set<std::pair<int, int>> ridges_of(const Body& body) {
   const auto center = [&](int f) { return Vec3((corner(f, 0) + corner(f, 1) + corner(f, 2)) / 3); };
   std::set<std::pair<int, int>> ridges;
   for (const auto& [edge, beside] : faces)
-    if (beside.size() != 2 || (normal(beside[0]).dot(normal(beside[1])) <= least_cosine &&
+    if (beside.size() != 2 || (normal(beside[0]).dot(normal(beside[1])) <= min_cosine &&
                                normal(beside[0]).dot(center(beside[1]) - corner(beside[0], 0)) < 0))
       ridges.insert(edge);
   return ridges;

@@ -16,7 +16,7 @@ using detail::Weights4;
 
 // Extrapolated weights never go below this: then a vertex far from the cage moves at most a few times as far
 // as it.
-constexpr double least_weight = -1;
+constexpr double min_weight = -1;
 
 class SurfaceGraph {
  public:
@@ -118,8 +118,7 @@ class Binder {
     const Weights4 way = locator_.weights(n.tet, position(v)) - n.weights;
     double share = 1;
     for (int k = 0; k < 4; ++k)
-      if (n.weights[k] + way[k] < least_weight)
-        share = std::min(share, (least_weight - n.weights[k]) / way[k]);
+      if (n.weights[k] + way[k] < min_weight) share = std::min(share, (min_weight - n.weights[k]) / way[k]);
     set(v, n.tet, n.weights + share * way);
   }
 

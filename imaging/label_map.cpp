@@ -60,9 +60,9 @@ void require_size(const std::array<std::int64_t, 3>& size, const std::string& fi
   for (const std::int64_t n : size)
     if (n < 1 || n > 65535)
       throw InputError(fmt::format("{}: has sizes {}; each must be from 1 to 65535", file, size));
-  if (size[0] * size[1] * size[2] > most_voxels)
+  if (size[0] * size[1] * size[2] > max_voxels)
     throw InputError(fmt::format("{}: has {} voxels, more than {}; resample it", file,
-                                 size[0] * size[1] * size[2], most_voxels));
+                                 size[0] * size[1] * size[2], max_voxels));
 }
 
 bool is_gzip(std::string_view bytes) { return bytes.size() > 2 && bytes[0] == '\x1f' && bytes[1] == '\x8b'; }
@@ -221,7 +221,7 @@ bool is_label_map(const fs::path& path) {
 LabelMap read_label_map(const fs::path& path) {
   const std::string file = path.string();
   std::string bytes = read_file(path);
-  if (detail::is_gzip(bytes)) bytes = detail::inflate(bytes, most_bytes_read, file);
+  if (detail::is_gzip(bytes)) bytes = detail::inflate(bytes, max_bytes_read, file);
   LabelMap map;
   if (is_nifti(bytes))
     map = detail::read_nifti(std::move(bytes), file);

@@ -25,9 +25,8 @@ constexpr double smoothing = 0.5, widening = -0.526;
 // No point moves farther from its corner than this, in voxels along each axis, so that a sheet of one voxel
 // keeps a tenth of its thickness, and a boundary that was right within half a voxel stays so.
 constexpr double farthest = 0.45;
-constexpr double least_behind =
-    0.2;                            // of a step's length: what it goes behind each triangle round its vertex
-constexpr double least_tet = 0.02;  // six times its volume, voxels; of a voxel that nobody moved a half
+constexpr double min_behind = 0.2;  // of a step's length: what it goes behind each triangle round its vertex
+constexpr double min_tet = 0.02;    // six times its volume, voxels; of a voxel that nobody moved a half
 
 // Of a face, in turn: its shorter diagonal is from corner 0 or from corner 1. By places in voxels, and both
 // sides of it see the same.
@@ -243,7 +242,7 @@ void Nets::drop_islands() {
       visit(j > 0, v - nx), visit(j + 1 < ny, v + nx);
       visit(k > 0, v - nx * ny), visit(k + 1 < nz, v + nx * ny);
     }
-    if (double(piece.size()) < options_.least_island) {
+    if (double(piece.size()) < options_.min_island) {
       for (const std::int64_t v : piece) material_[std::size_t(v)] = 0;
       ++islands_[label], dropped_[label] += std::int64_t(piece.size());
     } else {
@@ -368,7 +367,7 @@ bool Nets::is_whole(const Eigen::Vector3i& voxel) const {
       const std::size_t from = diagonal(face, number);
       for (const std::size_t half : {from, from + 2}) {
         const auto at = [&](std::size_t n) -> Vec3 { return face[(half + n) % 4] - middle; };
-        if ((side ? 1 : -1) * at(0).cross(at(1)).dot(at(2)) < least_tet) return false;
+        if ((side ? 1 : -1) * at(0).cross(at(1)).dot(at(2)) < min_tet) return false;
       }
     }
   return true;
@@ -568,13 +567,13 @@ SurfaceMesh Nets::OneLabel::stepped_back() const {
     step[v] = -half_m * normals.row(Eigen::Index(v)).transpose();
   measure();
   for (std::size_t v = 0; v < vertices_.size(); ++v)
-    if (behind[v] < least_behind) step[v] = half_m * (axes * inwards_[v]).normalized();
+    if (behind[v] < min_behind) step[v] = half_m * (axes * inwards_[v]).normalized();
   measure();
   const Eigen::Matrix3d voxels_from_m = axes.inverse();
   for (std::size_t v = 0; v < vertices_.size(); ++v) {
     if (!touches_[v]) continue;
     // Where it is pinched it must not meet itself: there the others alone step back.
-    const double part = pinched_[v] ? -0.25 : behind[v] < least_behind ? 0.25 : 1;
+    const double part = pinched_[v] ? -0.25 : behind[v] < min_behind ? 0.25 : 1;
     const Vec3 in_voxels = part * (voxels_from_m * step[v]);
     mesh.positions.row(Eigen::Index(v)) =
         nets_.metres(vertices_[v] + in_voxels.cwiseMax(-half).cwiseMin(half)).transpose();
@@ -596,7 +595,7 @@ void check(const LabelMap& map, const std::vector<int>& rows, const SurfaceNetOp
     throw InputError(fmt::format("a gap of {} voxels is not from 0 to 0.6", options.gap));
   if (options.rounds < 0 || options.rounds > 1000)
     throw InputError(fmt::format("{} rounds of smoothing are not from 0 to 1000", options.rounds));
-  if (!(options.least_island >= 0)) throw InputError("the least island has a negative size");
+  if (!(options.min_island >= 0)) throw InputError("the least island has a negative size");
   for (const int row : rows)
     if (row < 1 || row >= int(map.labels.size()))
       throw InputError(fmt::format("there is no label in row {}; there are {}", row, map.labels.size() - 1));

@@ -9,14 +9,14 @@ namespace limber::imaging {
 struct SurfaceNetOptions {
   double gap = 0.2;  // between surfaces of labels that share a boundary; of the shortest voxel edge, 0 … 0.6
   int rounds = 10;   // of smoothing, 0 … 1000; 0: the voxels' own faces
-  double least_island = 8;  // voxels; smaller pieces of a label are left out
+  double min_island = 8;  // voxels; smaller pieces of a label are left out
 };
 
 struct LabelSurface {
   SurfaceMesh surface;  // closed, each edge of two triangles, each vertex one fan; metres; empty: no piece is
                         // left
   std::int64_t voxels = 0;          // of the label, without what was left out
-  int islands_dropped = 0;          // pieces smaller than least_island
+  int islands_dropped = 0;          // pieces smaller than min_island
   std::int64_t voxels_dropped = 0;  // in those
 };
 

@@ -178,7 +178,7 @@ States Problem::start(int copies) const {
 namespace {
 
 // Rollouts in the order of their numbers, to whichever thread asks.
-class InOrder final : public plan::Supply {
+class InOrder final : public plan::RolloutSource {
  public:
   InOrder(std::vector<plan::Rollout>& rollouts, std::atomic<std::size_t>& next, int at_once)
       : rollouts_(rollouts), next_(next), at_once_(at_once) {}

@@ -151,13 +151,13 @@ struct Fitted {
 // Parts the lattice's tets at gaps, draws them in and coarsens them to the budget (docs/cage.md, steps 7 to
 // 9). The dihedrals come down to their bounds by steps, for each step needs room to work with.
 Fitted fit(const ScaledModel& model, const Selection& selection, const CageOptions& options) {
-  constexpr double most_growth = 1.4;  // by splitting; more would leave too few tets for the rest
+  constexpr double max_growth = 1.4;  // by splitting; more would leave too few tets for the rest
   // Heights of a tet, as shares of one of the lattice: the simulation's time step goes with the lowest tet.
   // 0.3 costs 1 to 4 % of volume, 0.1 gains under 1 %. Narrow gaps need lower ones.
   constexpr double lowest = 0.25, lowest_in_gap = 0.15;
   Fitted fitted{detail::build_mesh(selection).mesh, 0, 0, selection.lattice.spacing};
   const double lattice_height = fitted.spacing * std::sqrt(0.5);
-  const int most_tets = int(most_growth * double(fitted.mesh.tets.rows()));
+  const int max_tets = int(max_growth * double(fitted.mesh.tets.rows()));
   const double first_margin_deg = std::clamp(warp_min_deg - options.min_dihedral_deg, 0.0, 3.0);
   const auto limits = [&](double share_of_margin) {
     const double margin_deg = share_of_margin * first_margin_deg;
@@ -166,7 +166,7 @@ Fitted fit(const ScaledModel& model, const Selection& selection, const CageOptio
   };
   const auto part = [&](TetLimits bounds) {
     bounds.min_height_m = lowest_in_gap * lattice_height;
-    detail::split_at_gaps(model.cage_model, model.surface, {fitted.spacing, bounds, most_tets}, fitted.mesh);
+    detail::split_at_gaps(model.cage_model, model.surface, {fitted.spacing, bounds, max_tets}, fitted.mesh);
     fitted.mesh = detail::open_gaps(model.cage_model, fitted.mesh);
   };
   const auto coarsen = [&](const TetLimits& bounds) {

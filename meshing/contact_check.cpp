@@ -21,7 +21,7 @@ namespace {
 constexpr std::uint64_t seed = 1;
 constexpr int nodes_anywhere = 2000, nodes_at_samples = 4000, spots = 2000;
 // What was found of good shapes is at most a half of these.
-constexpr double most_field_cells = 1.5, most_steepness = 2.5, most_gap = 4;
+constexpr double max_field_cells = 1.5, max_steepness = 2.5, max_gap = 4;
 constexpr double rounding = 1e-9;  // of the size
 
 std::size_t index_of(const DistanceField& field, const std::array<int, 3>& at) {
@@ -62,9 +62,9 @@ class Checker {
     check_field();
     check_samples();
     c_.wrong_least_weights = 0;
-    const Weights least = least_weights(shape_.field, cage_);
+    const Weights least = min_weights(shape_.field, cage_);
     for (Eigen::Index t = 0; t < least.rows(); ++t)
-      c_.wrong_least_weights += !((least.row(t) - shape_.least_weight.row(t)).cwiseAbs().maxCoeff() <= 1e-9);
+      c_.wrong_least_weights += !((least.row(t) - shape_.min_weight.row(t)).cwiseAbs().maxCoeff() <= 1e-9);
     say();
     return c_;
   }
@@ -174,11 +174,11 @@ class Checker {
   }
 
   void say() {
-    if (c_.field_cells > most_field_cells)
+    if (c_.field_cells > max_field_cells)
       c_.field_fault = fmt::format("a distance is off by {:.2f} cells", c_.field_cells);
     else if (c_.wrong_sides > 0)
       c_.field_fault = fmt::format("{} of {} nodes are on the wrong side", c_.wrong_sides, c_.nodes);
-    else if (c_.steepest > most_steepness)
+    else if (c_.steepest > max_steepness)
       c_.field_fault = fmt::format("it changes by {:.2f} m a metre", c_.steepest);
     else if (c_.wrong_least_weights > 0)
       c_.field_fault = fmt::format("least_weight of {} tets is another's", c_.wrong_least_weights);
@@ -188,7 +188,7 @@ class Checker {
       c_.sample_fault = fmt::format("one is bound {:.2g} m beside itself", c_.misplaced_m);
     else if (std::abs(c_.area_share - 1) > 1e-6)
       c_.sample_fault = fmt::format("they stand for {:.6f} of the surface", c_.area_share);
-    else if (c_.widest_gap > most_gap)
+    else if (c_.widest_gap > max_gap)
       c_.sample_fault = fmt::format("a place is {:.1f} spacings away from them", c_.widest_gap);
   }
 

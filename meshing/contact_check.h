@@ -20,7 +20,7 @@ struct ContactCheck {
   double area_share = 0;                      // that the samples stand for, of the surface that is seen
   double widest_gap =
       0;  // of points of the surface to the nearest sample, over the side of a square of its area
-  int wrong_least_weights = 0;  // tets whose least_weight does not follow from the field
+  int wrong_least_weights = 0;  // tets whose min_weight does not follow from the field
 
   std::string field_fault, sample_fault;  // "" where all of that is as it must be
 };

@@ -21,10 +21,9 @@ namespace {
 
 using Weights4 = Eigen::RowVector4d;
 
-constexpr double least_cells_thick = 2;
-constexpr double well_resolved_cells =
-    3;  // a thickness that is not worth more cells than settings.most_cells
-constexpr int most_cells_for_thin_walls = 1000;
+constexpr double min_cells_thick = 2;
+constexpr double well_resolved_cells = 3;  // a thickness that is not worth more cells than settings.max_cells
+constexpr int max_cells_for_thin_walls = 1000;
 constexpr double open_share_worth_a_word = 0.1, open_share_too_large = 0.5;
 
 // Barycentric coordinates in each tet of a mesh.
@@ -68,7 +67,7 @@ class TetFinder {
       : coordinates_(coordinates), tree_(boxes(cage, coordinates)) {}
 
   std::pair<int, Weights4> find(const Vec3& p) const {
-    constexpr double tolerance = 1e-9, least_weight = -1;
+    constexpr double tolerance = 1e-9, min_weight = -1;
     int tet = -1;
     tree_.any(
         [&](const Box& box) {
@@ -86,10 +85,10 @@ class TetFinder {
       return least;
     });
     const Weights4 there = coordinates_.at(tet, p);
-    if (there.minCoeff() >= least_weight) return {tet, there};
+    if (there.minCoeff() >= min_weight) return {tet, there};
     // From the middle of the tet outwards, as far as the clamp allows.
     const Weights4 middle = Weights4::Constant(0.25), way = there - middle;
-    return {tet, middle + (0.25 - least_weight) / (0.25 - there.minCoeff()) * way};
+    return {tet, middle + (0.25 - min_weight) / (0.25 - there.minCoeff()) * way};
   }
 
  private:
@@ -235,13 +234,13 @@ ContactShape nothing(const Box& box, Eigen::Index tets) {
   shape.field.values.assign(std::size_t(shape.field.nodes[0]) * shape.field.nodes[1] * shape.field.nodes[2],
                             32'000);
   shape.samples = {Points(0, 3), Eigen::VectorXi(0), Weights(0, 4), Eigen::VectorXd(0)};
-  shape.least_weight = Weights::Constant(tets, 4, 2);
+  shape.min_weight = Weights::Constant(tets, 4, 2);
   return shape;
 }
 
 }  // namespace
 
-Weights least_weights(const DistanceField& field, const TetMesh& cage) {
+Weights min_weights(const DistanceField& field, const TetMesh& cage) {
   const TetCoordinates coordinates(cage);
   Weights least(cage.tets.rows(), 4);
   parallel_for(int(cage.tets.rows()),
@@ -258,10 +257,10 @@ FieldErrors field_errors(const ContactShape& shape) {
 
 ContactShape make_contact_shape(const SurfaceMesh& surface, const TetMesh& cage,
                                 const ContactShapeSettings& settings, ContactShapeReport* report) {
-  LIMBER_CHECK(settings.cells >= 8 && settings.cells <= settings.most_cells && settings.most_cells <= 1000,
-               settings.cells, settings.most_cells);
-  LIMBER_CHECK(settings.most_nodes >= 1000 && settings.most_samples >= settings.fewest_most_samples,
-               settings.most_nodes, settings.most_samples);
+  LIMBER_CHECK(settings.cells >= 8 && settings.cells <= settings.max_cells && settings.max_cells <= 1000,
+               settings.cells, settings.max_cells);
+  LIMBER_CHECK(settings.max_nodes >= 1000 && settings.max_samples >= settings.fewest_most_samples,
+               settings.max_nodes, settings.max_samples);
   ContactShapeReport unread;
   ContactShapeReport& r = report ? *report : unread;
   r = {};
@@ -291,7 +290,7 @@ ContactShape make_contact_shape(const SurfaceMesh& surface, const TetMesh& cage,
   int cells = settings.cells;
   double thickness = 0;  // of a plate of this volume and area
   while (true) {
-    shape.field = detail::grid_over(box, size / cells, settings.most_nodes);
+    shape.field = detail::grid_over(box, size / cells, settings.max_nodes);
     const double volume = detail::fill(seen, winding, closed, shape.field);
     thickness = 2 * volume / seen.area_m2;
     if (samples.empty()) {
@@ -299,13 +298,13 @@ ContactShape make_contact_shape(const SurfaceMesh& surface, const TetMesh& cage,
       if (!(volume > 0)) return give_up(no_inside);
       const double squares = seen.area_m2 / (r.characteristic_m * r.characteristic_m);
       const int most = int(std::clamp(settings.samples_a_square * squares,
-                                      double(settings.fewest_most_samples), double(settings.most_samples)));
+                                      double(settings.fewest_most_samples), double(settings.max_samples)));
       samples =
           detail::sample_surface(surface, seen, winding,
                                  {.missed_m = settings.missed_depth * r.characteristic_m,
-                                  .least_m = settings.least_spacing * std::max(r.characteristic_m, size / 3),
-                                  .most_m = settings.most_spacing * size,
-                                  .most_flat_m = settings.most_flat_spacing * size,
+                                  .min_m = settings.min_spacing * std::max(r.characteristic_m, size / 3),
+                                  .most_m = settings.max_spacing * size,
+                                  .max_flat_m = settings.max_flat_spacing * size,
                                   .offset_m = offset},
                                  most);
       if (samples.empty()) return give_up(no_inside);
@@ -314,7 +313,7 @@ ContactShape make_contact_shape(const SurfaceMesh& surface, const TetMesh& cage,
     r.error_p99_m = at_samples.p99_m, r.error_max_m = at_samples.max_m;
     const double wanted = settings.field_error * r.characteristic_m;
     const bool thin = thickness < well_resolved_cells * shape.field.cell_m;
-    const int most = thin ? most_cells_for_thin_walls : settings.most_cells;
+    const int most = thin ? max_cells_for_thin_walls : settings.max_cells;
     const bool wider_than_asked = shape.field.cell_m > 1.001 * size / cells;
     if ((r.error_p99_m <= wanted && !thin) || wider_than_asked || cells >= most) break;
     // The error goes with about the 1.4th power of the cell.
@@ -322,16 +321,16 @@ ContactShape make_contact_shape(const SurfaceMesh& surface, const TetMesh& cage,
     const double by_thickness = 1.02 * well_resolved_cells * size / thickness;
     cells = std::min(
         most,
-        int(std::max({1.1 * cells, thin ? by_thickness : 0, std::min(by_error, 1.0 * settings.most_cells)})));
+        int(std::max({1.1 * cells, thin ? by_thickness : 0, std::min(by_error, 1.0 * settings.max_cells)})));
   }
   r.cells = int(std::lround(size / shape.field.cell_m));
   r.nodes = std::int64_t(shape.field.values.size());
   r.memory_mb = double(shape.field.values.size() * sizeof(std::int16_t)) / 1e6;
-  if (thickness < least_cells_thick * shape.field.cell_m)
+  if (thickness < min_cells_thick * shape.field.cell_m)
     return give_up(fmt::format(
         "walls are {:.2g} m thick in the mean, less than {} cells of the finest field, which are {:.2g} m: "
         "contact goes by the cage, which is fatter; thicken the model",
-        thickness, least_cells_thick, shape.field.cell_m));
+        thickness, min_cells_thick, shape.field.cell_m));
   if (seen.open_share > open_share_too_large)
     return give_up(fmt::format(
         "for {:.0f} % of the surface it is a guess what is inside: contact goes by the cage, which "
@@ -345,7 +344,7 @@ ContactShape make_contact_shape(const SurfaceMesh& surface, const TetMesh& cage,
 
   const TetCoordinates coordinates(cage);
   shape.samples = bound(samples, cage, coordinates);
-  shape.least_weight = least_weights(shape.field, cage);
+  shape.min_weight = min_weights(shape.field, cage);
   const FieldErrors at_samples = field_errors(shape);
   r.error_p99_m = at_samples.p99_m, r.error_max_m = at_samples.max_m;
   r.cpu_s = cpu_seconds() - start;

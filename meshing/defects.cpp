@@ -16,8 +16,8 @@ using detail::EdgeUse;
 
 namespace {
 
-constexpr std::size_t most_places = 5;
-constexpr double least_volume = 1e-9;  // of area^1.5: below, a flake, and the sign of its volume is rounding
+constexpr std::size_t max_places = 5;
+constexpr double min_volume = 1e-9;  // of area^1.5: below, a flake, and the sign of its volume is rounding
 
 std::string at(const Vec3& p) { return fmt::format("at ({:.6g} {:.6g} {:.6g})", p.x(), p.y(), p.z()); }
 
@@ -30,7 +30,7 @@ Vec3 center(const SurfaceMesh& mesh, int t) {
 template <class Place>
 void note(Defect& defect, Place place) {
   ++defect.count;
-  if (defect.places.size() < most_places) defect.places.push_back(place());
+  if (defect.places.size() < max_places) defect.places.push_back(place());
 }
 
 class Finder {
@@ -145,7 +145,7 @@ class Finder {
     for (int t = 0; t < mesh_.triangles.rows(); ++t) {
       if (component[t] != t || collapsed(mesh_.triangles, t)) continue;
       ++found_.components;
-      if (closed[t] && volume[t] < -least_volume * area[t] * std::sqrt(area[t]))
+      if (closed[t] && volume[t] < -min_volume * area[t] * std::sqrt(area[t]))
         note_triangle(found_.inward_components, t);
     }
   }

@@ -127,7 +127,7 @@ PolygonSoup read_soup(const fs::path& path) {
 // ────────────────────────────────────────────────────────────────
 
 constexpr double largest_coordinate = 1e30, smallest_diagonal_m = 1e-30;
-constexpr double most_rounding = 1e-5;  // of the diagonal, without a word
+constexpr double max_rounding = 1e-5;  // of the diagonal, without a word
 
 void require_valid(const ImportOptions& options) {
   if (!(std::isfinite(options.scale) && options.scale > 0))
@@ -327,7 +327,7 @@ ImportedModel finish(const PolygonSoup& soup, const ImportOptions& options, cons
   if (diagonal_m < smallest_diagonal_m)
     throw InputError(
         fmt::format("{}: the model is only {:.3g} m large; give a larger scale", file, diagonal_m));
-  if (const double rounding_m = options.scale * soup.rounding; rounding_m > most_rounding * diagonal_m)
+  if (const double rounding_m = options.scale * soup.rounding; rounding_m > max_rounding * diagonal_m)
     model.warnings.push_back(fmt::format(
         "the file holds single precision, and lies so far from the origin that this rounds vertices by "
         "{:.1g} of the model's size: move it to the origin and export it again",

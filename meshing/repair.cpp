@@ -246,8 +246,8 @@ namespace {
 // over the area is 0 for a closed surface or an open tube, 0.5 for half a sphere, 1 for a flat sheet), and,
 // closed by a cone to the middle of its rim, it holds a volume (volume / area^1.5 is 0.094 for a sphere, 0.02
 // for a tube fifty diameters long).
-constexpr double most_open = 0.25, least_fill = 0.01;
-constexpr double least_closed_volume =
+constexpr double max_open = 0.25, min_fill = 0.01;
+constexpr double min_closed_volume =
     1e-9;  // likewise, of a closed one: below, a flake, and the sign is rounding
 
 // Pieces of triangles joined over edges of exactly two triangles.
@@ -408,9 +408,9 @@ std::vector<Solid> solids_of(const SurfaceMesh& mesh, const Pieces& pieces) {
 }
 
 bool shows_its_outside(const Solid& s) {
-  if (s.closed) return std::abs(s.volume) > least_closed_volume * s.area * std::sqrt(s.area);
-  return s.area_vector.norm() < most_open * s.area &&
-         std::abs(s.volume) > least_fill * s.area * std::sqrt(s.area);
+  if (s.closed) return std::abs(s.volume) > min_closed_volume * s.area * std::sqrt(s.area);
+  return s.area_vector.norm() < max_open * s.area &&
+         std::abs(s.volume) > min_fill * s.area * std::sqrt(s.area);
 }
 
 // What the first `count` solids say of a point: their winding number there, and the last of them that has it

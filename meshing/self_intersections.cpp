@@ -67,7 +67,7 @@ std::vector<int> along_a_curve(const SurfaceMesh& surface, const Box& all) {
 class Search {
  public:
   Search(const SurfaceMesh& surface, std::size_t limit)
-      : surface_(surface), limit_(limit), most_candidates_(100'000'000 + 200 * surface.triangles.rows()) {
+      : surface_(surface), limit_(limit), max_candidates_(100'000'000 + 200 * surface.triangles.rows()) {
     Box all;
     for (const int v : std::span(surface.triangles.data(), std::size_t(surface.triangles.size())))
       all.include(Vec3(surface.positions.row(v)));
@@ -131,7 +131,7 @@ class Search {
   }
 
   void try_pair(int s, int t) {
-    if (++candidates_ > most_candidates_) found_.complete = false;
+    if (++candidates_ > max_candidates_) found_.complete = false;
     if (!found_.complete) return;
     throw_if_stopped();
     const auto corners = [&](int f) {
@@ -147,7 +147,7 @@ class Search {
   const SurfaceMesh& surface_;
   const std::size_t limit_;
   // About ten a triangle is usual; long slivers side by side can ask for all pairs, and for hours.
-  const std::int64_t most_candidates_;
+  const std::int64_t max_candidates_;
   std::int64_t candidates_ = 0;
   std::vector<int> order_;
   std::vector<SmallBox> boxes_;  // in that order

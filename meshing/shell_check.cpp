@@ -13,8 +13,8 @@ namespace limber::meshing {
 
 namespace {
 
-constexpr double rounding = 1e-9;        // of the diagonal; of middles, which are computed
-constexpr double least_altitude = 1e-9;  // of a face, over its shell's diagonal: lower ones are slivers
+constexpr double rounding = 1e-9;      // of the diagonal; of middles, which are computed
+constexpr double min_altitude = 1e-9;  // of a face, over its shell's diagonal: lower ones are slivers
 
 Vec3 corner_of(const ConvexShell& shell, Eigen::Index face, int k) {
   return shell.vertices.row(shell.triangles(face, k));
@@ -43,14 +43,14 @@ class Region {
  public:
   Region(const ConvexShell& shell, double tolerance)
       : shell_(shell), box_(bounding_box(shell.vertices)), tolerance_(tolerance) {
-    const double least_height = least_altitude * box_.diagonal();
+    const double min_height = min_altitude * box_.diagonal();
     for (Eigen::Index f = 0; f < shell.triangles.rows(); ++f) {
       const Vec3 a = corner_of(shell, f, 0), b = corner_of(shell, f, 1), c = corner_of(shell, f, 2);
       const Vec3 n = (b - a).cross(c - a);
       const double length = n.norm();
       normals_.push_back(length > 0 ? Vec3(n / length) : Vec3(Vec3::Zero()));
       offsets_.push_back(normals_.back().dot(a));
-      slivers_.push_back(length <= least_height * std::max({(b - a).norm(), (c - b).norm(), (a - c).norm()}));
+      slivers_.push_back(length <= min_height * std::max({(b - a).norm(), (c - b).norm(), (a - c).norm()}));
     }
   }
   // `exact`: not by a hair outside.

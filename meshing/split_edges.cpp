@@ -85,7 +85,7 @@ double longest_edge(const SurfaceMesh& surface, int tets, const SplitSettings& s
 
 SurfaceMesh split_long_edges(const SurfaceMesh& surface, double longest_m, const SplitSettings& settings,
                              CornerMap* corners) {
-  while (vertices_needed(surface, longest_m) > settings.most_new_vertices) longest_m *= 2;
+  while (vertices_needed(surface, longest_m) > settings.max_new_vertices) longest_m *= 2;
   std::vector<Vec3> points;
   for (Eigen::Index i = 0; i < surface.positions.rows(); ++i) points.emplace_back(surface.positions.row(i));
   std::vector<std::array<int, 3>> triangles, cut_ones;

@@ -208,7 +208,7 @@ void include_points_of(const PlacedSurface& a, const PlacedSurface& b, const std
 }
 
 // What is less is of rounding.
-double least_depth(const PlacedSurface& surface) { return 1e-9 * surface.shape().size_m(); }
+double min_depth(const PlacedSurface& surface) { return 1e-9 * surface.shape().size_m(); }
 
 }  // namespace
 
@@ -238,7 +238,7 @@ SurfaceOverlap overlap(const PlacedSurface& a, const PlacedSurface& b) {
           }
         }
       });
-  const double least = std::max(least_depth(a), least_depth(b));
+  const double least = std::max(min_depth(a), min_depth(b));
   SurfaceOverlap deepest{least, Vec3::Zero()};
   if (!of_a.empty() || !seeds_a.empty()) include_points_of(a, b, of_a, seeds_a, deepest);
   if (!of_b.empty() || !seeds_b.empty()) include_points_of(b, a, of_b, seeds_b, deepest);
@@ -471,7 +471,7 @@ SurfaceOverlap self_overlap(const PlacedSurface& now, const PlacedSurface& at_re
   std::vector<int> seeds;
   const std::vector<Crossing> crossings = own.crossings(seeds);
   if (crossings.empty()) return {};
-  const double least = least_depth(now);
+  const double least = min_depth(now);
   SurfaceOverlap deepest{least, Vec3::Zero()};
   deepen(
       now, crossings, seeds, [&](const SurfacePoint& p) { return own.inside(p); },

@@ -34,7 +34,7 @@ class Bounded final : public System {
   std::uint64_t hash() const override { return system_.hash(); }
   bool acceptable(const State& s) const override {
     const double now = double(s.step - first_step_) * system_.dt_s();
-    return now + least_to_go_s(s) < bound_s_ && system_.acceptable(s);
+    return now + min_to_go_s(s) < bound_s_ && system_.acceptable(s);
   }
   std::size_t first_refused(std::span<const State> frames) const override {
     return system_.first_refused(frames);
@@ -59,7 +59,7 @@ class Bounded final : public System {
         first_step_(system.start().step) {}
 
   // Of a mass that flies at the last goal under the largest force and need not stop: v t + a t²/2 = d.
-  double least_to_go_s(const State& s) const {
+  double min_to_go_s(const State& s) const {
     const Vec3 way = settings_.goal.center_of_mass_m + last_.goal_shift(s) - system_.robot_center(s);
     const double d = way.norm() - settings_.goal.radius_m,
                  a = settings_.max_force_n / system_.robot_mass_kg();
@@ -102,7 +102,7 @@ AnytimeReport improve(const System& system, Plan& plan, const AnytimeSettings& a
   const double cpu_before = cpu_seconds();
   std::vector<Control> controls = plan.trajectory.controls;
   if (plan.trajectory.settle_steps > 0) controls.pop_back();
-  Course best = path_of(system, plan.settings, controls);
+  ControlRollout best = path_of(system, plan.settings, controls);
   std::vector<int> before_legs = controls_before_legs(plan);
 
   AnytimeReport report;
@@ -128,8 +128,8 @@ AnytimeReport improve(const System& system, Plan& plan, const AnytimeSettings& a
       shorten(system, found, {.rounds = anytime.shortcut_rounds, .cost = anytime.cost});
     controls = found.trajectory.controls;
     if (found.trajectory.settle_steps > 0) controls.pop_back();
-    Course path = path_of(system, plan.settings, controls);
-    if (path.result != Course::rests_in_goal ||
+    ControlRollout path = path_of(system, plan.settings, controls);
+    if (path.result != ControlRollout::rests_in_goal ||
         cost_in(path.costs, anytime.cost) >= cost_in(best.costs, anytime.cost))
       continue;
     best = std::move(path);

@@ -25,10 +25,10 @@ Manipulation choose(const ManipulationWeights& w, bool towards_goal, double u) {
 int steps_of(double duration_s, double dt_s) { return std::max(1, int(std::lround(duration_s / dt_s))); }
 
 // The order of the draws is part of the result: a new one goes to the end.
-Draw draw(const Settings& s, const System& system, std::int64_t iteration) {
+Sample draw_sample(const Settings& s, const System& system, std::int64_t iteration) {
   Rng rng(s.seed, std::uint64_t(iteration));
   const Box bounds = system.sample_bounds();
-  Draw d;
+  Sample d;
   d.towards_goal = rng.uniform() < s.goal_bias;
   for (int axis = 0; axis < 3; ++axis) d.point[axis] = rng.uniform(bounds.lower[axis], bounds.upper[axis]);
   if (d.towards_goal) d.point = s.goal.center_of_mass_m;
@@ -36,13 +36,13 @@ Draw draw(const Settings& s, const System& system, std::int64_t iteration) {
   d.force_n = s.max_force_n * rng.uniform(s.min_force_share, s.max_force_share);
   d.robot_node = rng.below(system.robot_nodes());
   d.steps = steps_of(rng.uniform(s.min_duration_s, s.max_duration_s), system.dt_s());
-  d.guided = rng.uniform() < s.laws.guidance && !d.towards_goal;
+  d.guided = rng.uniform() < s.search_options.guidance && !d.towards_goal;
   d.rank = rng.uniform(), d.ahead = rng.uniform(), d.stretch = rng.uniform();
   d.aside = rng.direction();
   return d;
 }
 
-Control steered_control(const Draw& d, const Settings& s, const System& system, const Departure& from,
+Control steered_control(const Sample& d, const Settings& s, const System& system, const NodeMotion& from,
                         const Vec3& target, const Vec3& target_velocity) {
   const double force = d.force_n * just_below_one, acceleration = force / system.robot_mass_kg();
   Control control;
@@ -60,12 +60,12 @@ Control steered_control(const Draw& d, const Settings& s, const System& system, 
   return control;
 }
 
-Control control_of(const Draw& d, const Settings& s, const Vec3& center, const Vec3& goal_shift) {
+Control control_of(const Sample& d, const Settings& s, const Vec3& center, const Vec3& goal_shift) {
   Control control;
   control.manipulation = d.manipulation;
   control.steps = d.steps;
   if (d.manipulation == Manipulation::interpolation) {
-    if (s.laws.hold) control.manipulation = Manipulation::hold;
+    if (s.search_options.hold) control.manipulation = Manipulation::hold;
     control.target_m = (s.goal.center_of_mass_m + goal_shift).cast<float>();
     control.max_force_n = float(d.force_n * just_below_one);
     return control;
@@ -83,7 +83,7 @@ Control control_of(const Draw& d, const Settings& s, const Vec3& center, const V
 
 Control goal_control(const Settings& s, int steps) {
   Control control;
-  control.manipulation = s.laws.hold ? Manipulation::hold : Manipulation::interpolation;
+  control.manipulation = s.search_options.hold ? Manipulation::hold : Manipulation::interpolation;
   control.target_m = s.goal.center_of_mass_m.cast<float>();
   control.max_force_n = float(s.max_force_n * s.settle.max_force_share * just_below_one);
   control.steps = steps;

@@ -9,7 +9,7 @@ namespace limber::plan {
 constexpr double just_below_one = 1 - 1e-6;
 
 // A pure function of (seed, iteration): whoever draws expansion 17, and when, draws the same.
-struct Draw {
+struct Sample {
   Vec3 point = Vec3::Zero();  // x of Algorithm 1, metres: random, or the goal
   bool towards_goal = false;
   Manipulation manipulation = Manipulation::none;
@@ -23,24 +23,24 @@ struct Draw {
   double stretch = 0;         // how much longer than it should take it pushes
   Vec3 aside = Vec3::Zero();  // unit; where it aims besides
 };
-Draw draw(const Settings&, const System&, std::int64_t iteration);
+Sample draw_sample(const Settings&, const System&, std::int64_t iteration);
 
 // Where an expansion begins: a node's robot, and the goal as it is there.
-struct Departure {
+struct NodeMotion {
   Vec3 center = Vec3::Zero(), velocity = Vec3::Zero();
   Vec3 goal_shift = Vec3::Zero(), goal_velocity = Vec3::Zero();
 };
 
 // Pushes towards `target` (which moves at `target_velocity`) reckoning with the velocity; the way there takes
 // as long as the control lasts, save for the settings' limits and the draw's stretch.
-Control steered_control(const Draw&, const Settings&, const System&, const Departure&, const Vec3& target,
+Control steered_control(const Sample&, const Settings&, const System&, const NodeMotion&, const Vec3& target,
                         const Vec3& target_velocity);
 
 // The control of an expansion from a node whose robot has its centre of mass at `center`: body and control
 // point push along point − center, interpolation draws to the goal. largest_force() never exceeds
 // max_force_n.
 // The goal is where the settings have it, moved by `goal_shift`.
-Control control_of(const Draw&, const Settings&, const Vec3& center, const Vec3& goal_shift = Vec3::Zero());
+Control control_of(const Sample&, const Settings&, const Vec3& center, const Vec3& goal_shift = Vec3::Zero());
 
 // Draws the robot to the goal with the force of the settle, by interpolation or as the laws have it; and as
 // the settle has it, which ends a path. `steps` long.

@@ -34,11 +34,11 @@ Guide guide_of(const System& system, const Settings& settings, const Trajectory&
       guide.control.push_back(int(c));
       left -= piece.steps;
     }
-  Course course;
+  ControlRollout course;
   course.from = system.start();
   course.controls = guide.pieces;
   run(system, settings, {&course, 1},
-      {.settle = CourseOptions::never, .ask_acceptable = false, .stoppable = true});
+      {.settle = ControlRolloutOptions::never, .ask_acceptable = false, .stoppable = true});
   LIMBER_CHECK(course.states.size() == guide.pieces.size(), course.states.size(), guide.pieces.size());
   const auto add = [&](const State& state) {
     guide.centers.push_back(system.robot_center(state));

@@ -2,7 +2,7 @@
 // and figures: docs/planning.md.
 #pragma once
 
-#include "plan/course.h"
+#include "plan/control_rollout.h"
 #include "plan/trajectory.h"
 
 namespace limber::plan {

@@ -15,7 +15,7 @@ namespace {
 constexpr const char* format_name = "limber plan 3";
 constexpr const char* unsealed_format_name = "limber plan 2";  // without hash.txt
 constexpr const char* seal_name = "hash.txt";                  // of all other entries
-constexpr std::int64_t most_counted = std::int64_t(1) << 53;   // steps of all rollouts, …
+constexpr std::int64_t max_counted = std::int64_t(1) << 53;    // steps of all rollouts, …
 constexpr const char* earlier_format_name = "limber plan 1";   // the tree as a list of states like any other
 
 // A list of states is three arrays: NAME_step (n), NAME_positions and NAME_velocities (n × 3N).
@@ -217,7 +217,7 @@ class Reader {
     const std::span<const std::int64_t> steps = t.states.steps();
     for (std::size_t i = 0; i < steps.size(); ++i) {
       const std::int64_t due = i == 0 ? steps[0] : steps[std::size_t(t.parents[i])] + t.controls[i].steps;
-      require(steps[i] >= 0 && steps[i] <= most_counted && steps[i] == due,
+      require(steps[i] >= 0 && steps[i] <= max_counted && steps[i] == due,
               fmt::format("node {} is at step {}, its control ends at step {}", i, steps[i], due));
       require(t.iterations[i] >= -1 && t.iterations[i] <= most_iterations,
               fmt::format("node {} is of iteration {}", i, t.iterations[i]));
@@ -302,8 +302,8 @@ class Reader {
 Statistics statistics_from_json(const Reader& reader, const Json& json) {
   const auto count = [&](const char* name) {
     const auto n = json.at(name).get<double>();  // of a whole number beyond 64 bits this, too, is a number
-    reader.require(n >= 0 && n <= double(most_counted),
-                   fmt::format("statistics.{} is {}; it must be in [0, {}]", name, n, most_counted));
+    reader.require(n >= 0 && n <= double(max_counted),
+                   fmt::format("statistics.{} is {}; it must be in [0, {}]", name, n, max_counted));
     return json.at(name).get<std::int64_t>();
   };
   const auto seconds = [&](const char* name) {
@@ -368,7 +368,7 @@ void read_simulation(const Reader& reader, const Json& json, double frames_per_s
   reader.require(ending != std::end(simulation_endings),
                  "its ending is " + json.at("ending").dump() + ", which is none");
   simulation.ending = ending->first;
-  reader.require(frames_per_second >= least_frames_per_second && frames_per_second <= most_frames_per_second,
+  reader.require(frames_per_second >= min_frames_per_second && frames_per_second <= max_frames_per_second,
                  fmt::format("frames_per_second is {}", frames_per_second));
   plan.settings.frames_per_second = frames_per_second;
   simulation.steered = json.value("steered", false);

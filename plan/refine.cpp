@@ -5,7 +5,7 @@
 
 #include "core/error.h"
 #include "core/progress.h"
-#include "plan/course.h"
+#include "plan/control_rollout.h"
 #include "plan/expansion.h"
 #include "plan/frame_times.h"
 #include "plan/shortcut.h"
@@ -48,7 +48,7 @@ Plan chain(const System& system, const Settings& settings, const std::vector<Con
   return plan;
 }
 
-Plan solved_by(const System& system, const Settings& settings, const Course& path) {
+Plan solved_by(const System& system, const Settings& settings, const ControlRollout& path) {
   Plan plan = chain(system, settings, path.controls, path.states);
   plan.best_node = plan.tree.size() - 1;
   adopt(system, plan, path, {0});
@@ -69,8 +69,8 @@ class ReferenceFollower {
 
   // What was run, from the start. The last state is the last good one: acceptable, and not far from where the
   // reference was.
-  Course follow(RefineReport& report) {
-    Course path;
+  ControlRollout follow(RefineReport& report) {
+    ControlRollout path;
     path.from = system_.start();
     State state = path.from;
     const int piece = steps_of(piece_s, system_.dt_s());
@@ -150,8 +150,8 @@ class ReferenceFollower {
 };
 
 // From the end of what was followed into the goal and to rest.
-Course arrive(const System& system, const Settings& settings, const Course& followed) {
-  Course path;
+ControlRollout arrive(const System& system, const Settings& settings, const ControlRollout& followed) {
+  ControlRollout path;
   path.from = system.start();
   path.controls = followed.controls;
   path.reach_force_n = settings.max_force_n * just_below_one;
@@ -218,22 +218,22 @@ Plan refine(const System& system, const Settings& settings, const Reference& ref
     return now - std::exchange(before, now);
   };
 
-  Course replay;
+  ControlRollout replay;
   replay.from = system.start();
   replay.controls = in_steps_of(system.dt_s(), reference.controls, reference.dt_s);
   run(system, settings, {&replay, 1}, {});
   report.replay_cpu_s = spent();
   report.replay_distance_m = distance_from_goal(system, settings, replay.end);
-  if (replay.result == Course::rests_in_goal && may_be_shown(system, settings, replay)) {
+  if (replay.result == ControlRollout::rests_in_goal && may_be_shown(system, settings, replay)) {
     report.how = RefineReport::replayed;
     return solved_by(system, settings, replay);
   }
 
   ReferenceFollower follower(system, settings, reference);
-  const Course followed = follower.follow(report);
-  const Course arrived = follower.complete() ? arrive(system, settings, followed) : Course{};
+  const ControlRollout followed = follower.follow(report);
+  const ControlRollout arrived = follower.complete() ? arrive(system, settings, followed) : ControlRollout{};
   report.track_cpu_s = spent();
-  if (arrived.result == Course::rests_in_goal && may_be_shown(system, settings, arrived)) {
+  if (arrived.result == ControlRollout::rests_in_goal && may_be_shown(system, settings, arrived)) {
     report.how = RefineReport::tracked;
     return solved_by(system, settings, arrived);
   }

@@ -16,9 +16,9 @@
 #include "core/job.h"
 #include "core/progress.h"
 #include "core/threads.h"
-#include "plan/chooser.h"
-#include "plan/course.h"
+#include "plan/control_rollout.h"
 #include "plan/frame_times.h"
+#include "plan/node_selector.h"
 
 namespace limber::plan {
 
@@ -54,21 +54,21 @@ Outcome outcome_of(const System& system, Rollout& rollout) {
 // One iteration of Algorithm 1, on its way: computed from the node that is nearest as far as is known.
 struct Expansion : Rollout {
   std::int64_t iteration = 0;
-  Draw draw;
-  Aim aimed;  // where the next rollout starts; one that runs may have been aimed before
+  Sample sample;
+  Selection aimed;  // where the next rollout starts; one that runs may have been aimed before
   State start;
   enum { waiting, running, finished } status = waiting;
   bool overtaken = false;  // while it ran, a nearer node was added
   Outcome outcome;
   // What was seen of it on its way.
-  double least_to_go = 0;
+  double min_to_go = 0;
   Vec3 seen_center = Vec3::Zero();
   int looks_at_rest = 0;
 };
 
 std::optional<Guidance> guidance_of(const System& system, const Settings& settings) {
-  if (settings.laws.guidance == 0) return std::nullopt;
-  return Guidance(system.workspace(), settings.goal.center_of_mass_m, settings.laws.soft_price);
+  if (settings.search_options.guidance == 0) return std::nullopt;
+  return Guidance(system.workspace(), settings.goal.center_of_mass_m, settings.search_options.soft_price);
 }
 
 // Threads take expansions from one queue and commit them in its order. With a lag, an expansion is drawn when
@@ -79,28 +79,28 @@ std::optional<Guidance> guidance_of(const System& system, const Settings& settin
 class Search {
  public:
   // `system` and `settings` are those of the plan's last leg; time counts from `started`.
-  Search(const System& system, const Settings& settings, Plan& plan, const Watch& watch,
+  Search(const System& system, const Settings& settings, Plan& plan, const ProgressCallback& on_progress,
          Clock::time_point started)
       : system_(system),
         settings_(settings),
-        laws_(settings.laws),
+        search_options_(settings.search_options),
         plan_(plan),
-        watch_(watch),
+        on_progress_(on_progress),
         progress_("plan", settings.max_iterations),
         started_(started),
         frames_(system, settings.frames_per_second),
         guidance_(guidance_of(system, settings)),
-        chooser_(system, settings, guidance_ ? &*guidance_ : nullptr, plan.legs.back().root),
+        selector_(system, settings, guidance_ ? &*guidance_ : nullptr, plan.legs.back().root),
         next_iteration_(plan.legs.back().first_iteration),
         committed_(next_iteration_) {
     const int lanes = std::max(1, system.lanes()), threads = std::max(1, thread_count());
     // With single lanes a thread that waits to be committed needs a second expansion; a batch holds enough.
     const int automatic = threads == 1 ? lanes : threads * std::max(lanes, 2);
     window_ = settings.in_flight > 0 ? settings.in_flight : automatic;
-    if (laws_.lag > 0) window_ = laws_.lag + 1;
+    if (search_options_.lag > 0) window_ = search_options_.lag + 1;
     threads_ = std::min(threads, window_);
     share_ = std::min(lanes, (window_ + threads_ - 1) / threads_);
-    look_every_ = laws_.look_s > 0 ? steps_of(laws_.look_s, system.dt_s()) : 0;
+    look_every_ = search_options_.look_s > 0 ? steps_of(search_options_.look_s, system.dt_s()) : 0;
     restore();
   }
 
@@ -126,7 +126,7 @@ class Search {
 
  private:
   // What one thread has in its lanes.
-  class Lanes final : public Supply {
+  class Lanes final : public RolloutSource {
    public:
     explicit Lanes(Search& search) : search_(search) {}
     int at_once() const override { return search_.share_; }
@@ -138,7 +138,7 @@ class Search {
       took_any_ = took_any_ || e;
       return e;
     }
-    bool goes_on(const Rollout& rollout, const Look& look) override {
+    bool goes_on(const Rollout& rollout, const Observation& look) override {
       // No lane but this thread's touches the rollout.
       return search_.goes_on(const_cast<Expansion&>(static_cast<const Expansion&>(rollout)), look);
     }
@@ -202,7 +202,7 @@ class Search {
       e.control = e.aimed.control;
       e.looks_at_rest = 0;
       e.seen_center = plan_.tree.centers[e.aimed.node].cast<double>();
-      e.least_to_go = std::numeric_limits<double>::infinity();
+      e.min_to_go = std::numeric_limits<double>::infinity();
       return &e;
     }
     return nullptr;
@@ -219,33 +219,35 @@ class Search {
   }
 
   // A function of the rollout and of what was seen of it, save when nobody wants the result any more.
-  bool goes_on(Expansion& e, const Look& look) const {
+  bool goes_on(Expansion& e, const Observation& look) const {
     if (ended_ || look.lost) return false;
     if (look_every_ == 0) return true;
     const Vec3 place = look.center - look.goal_shift;
-    if (laws_.stop_in_goal && holds(settings_.goal, place)) return false;
-    if (!laws_.end_hopeless) return true;
+    if (search_options_.stop_in_goal && holds(settings_.goal, place)) return false;
+    if (!search_options_.end_hopeless) return true;
     // It should move (slow in one look alone, it turns round) and, where it is guided, come nearer.
     const double moved = (look.center - e.seen_center).norm();
     e.seen_center = look.center;
-    e.looks_at_rest = moved < settings_.settle.mean_speed_m_s * laws_.look_s ? e.looks_at_rest + 1 : 0;
+    e.looks_at_rest =
+        moved < settings_.settle.mean_speed_m_s * search_options_.look_s ? e.looks_at_rest + 1 : 0;
     if (e.looks_at_rest == 2) return false;
-    if (!e.draw.guided) return true;
+    if (!e.sample.guided) return true;
     const double to_go = guidance_->to_go(place);
-    e.least_to_go = std::min(e.least_to_go, to_go);
-    return to_go <= e.least_to_go + leads_away * guidance_->workspace().robot_radius_m;
+    e.min_to_go = std::min(e.min_to_go, to_go);
+    return to_go <= e.min_to_go + leads_away * guidance_->workspace().robot_radius_m;
   }
 
   // Expansions are drawn in order, each when all that it may know is committed, and no more.
   void draw_ahead() {
     while (next_iteration_ < settings_.max_iterations &&
-           (laws_.lag > 0 ? next_iteration_ <= committed_ + laws_.lag : int(queue_.size()) < window_)) {
+           (search_options_.lag > 0 ? next_iteration_ <= committed_ + search_options_.lag
+                                    : int(queue_.size()) < window_)) {
       const std::int64_t iteration = next_iteration_++;
       if (iteration < plan_.statistics.iterations) continue;  // of the earlier plan
       Expansion& e = queue_.emplace_back();
       e.iteration = iteration;
-      e.draw = draw(settings_, system_, iteration);
-      e.aimed = chooser_.choose(e.draw);
+      e.sample = draw_sample(settings_, system_, iteration);
+      e.aimed = selector_.choose(e.sample);
     }
   }
 
@@ -253,11 +255,11 @@ class Search {
   // was.
   void restore() try {
     int node = plan_.legs.back().root;
-    for (chooser_.add(plan_.tree, node++);; ++committed_) {
-      if (laws_.lag > 0) draw_ahead();
+    for (selector_.add(plan_.tree, node++);; ++committed_) {
+      if (search_options_.lag > 0) draw_ahead();
       if (committed_ == plan_.statistics.iterations) break;
       if (node == plan_.tree.size() || plan_.tree.iterations[std::size_t(node)] != committed_) continue;
-      chooser_.add(plan_.tree, node);
+      selector_.add(plan_.tree, node);
       if (!plan_.solved()) {
         const State state = plan_.tree.states[std::size_t(node)];
         const Arrival arrival = arrival_of(state, place_of(state), plan_.tree.parents[std::size_t(node)],
@@ -288,7 +290,7 @@ class Search {
   }
 
   void commit(const Expansion& e) {
-    const bool grows = e.outcome.kind == Outcome::node && !chooser_.refused(e.aimed.node);
+    const bool grows = e.outcome.kind == Outcome::node && !selector_.refused(e.aimed.node);
     const Vec3 place = e.outcome.center - e.outcome.goal_shift;
     Arrival arrival;
     try {
@@ -305,7 +307,7 @@ class Search {
     if (grows) {
       const int node = plan_.tree.add(e.outcome.state, e.aimed.node, e.control, e.iteration,
                                       e.outcome.center.cast<float>());
-      chooser_.add(plan_.tree, node);
+      selector_.add(plan_.tree, node);
       if (arrival.kind == Arrival::refused) {
         ++statistics.refused;
         refuse(arrival, node);
@@ -314,13 +316,13 @@ class Search {
         consider(node, distance_at(place), arrival.kind == Arrival::rests);
         if (arrival.kind == Arrival::rests) way_ = std::move(arrival.way);
       }
-      if (laws_.lag == 0) aim_overtaken(node);
+      if (search_options_.lag == 0) aim_overtaken(node);
     }
     progress_.update(statistics.iterations, fmt::format("{} nodes, {:.3g} m from the goal, {:.0f} a second",
                                                         plan_.tree.size(), plan_.best_distance_m,
                                                         double(statistics.iterations - iterations_before_) /
                                                             seconds_since(leg_started_)));
-    if (watch_) watch_({statistics_now(), plan_.leg(), plan_.tree.size(), plan_.best_distance_m});
+    if (on_progress_) on_progress_({statistics_now(), plan_.leg(), plan_.tree.size(), plan_.best_distance_m});
   }
 
   Statistics statistics_now() const {
@@ -345,10 +347,10 @@ class Search {
   // Of the state to which `control` leads from `parent`, at `place`. Throws Interrupted.
   Arrival arrival_of(const State& state, const Vec3& place, int parent, const Control& control) const {
     if (!holds(settings_.goal, place)) return {};
-    Course settle, way;
+    ControlRollout settle, way;
     settle.from = state;
     plan::run(system_, settings_, {&settle, 1}, {.keep_frames = true, .stoppable = true});
-    if (settle.result != Course::rests_in_goal) return {};
+    if (settle.result != ControlRollout::rests_in_goal) return {};
     const Tree& tree = plan_.tree;
     const int root = plan_.legs.back().root;
     std::vector<int> path;  // from the root, which is not in it, to the parent
@@ -357,9 +359,11 @@ class Search {
     way.from = tree.states[std::size_t(root)];
     for (const int node : path) way.controls.push_back(tree.controls[std::size_t(node)]);
     way.controls.push_back(control);
-    plan::run(
-        system_, settings_, {&way, 1},
-        {.settle = CourseOptions::never, .keep_frames = true, .ask_acceptable = false, .stoppable = true});
+    plan::run(system_, settings_, {&way, 1},
+              {.settle = ControlRolloutOptions::never,
+               .keep_frames = true,
+               .ask_acceptable = false,
+               .stoppable = true});
     LIMBER_CHECK(way.states.size() == path.size() + 1 && way.end == state, way.states.size(), path.size());
     for (std::size_t i = 0; i < path.size(); ++i)
       LIMBER_CHECK(way.states[i] == tree.states[std::size_t(path[i])], i, way.states[i].step);
@@ -386,21 +390,21 @@ class Search {
     const auto root = std::find(path.begin(), path.end(), plan_.legs.back().root);
     const int first = root[arrival.edges_before + 1];
     for (int n = first; n <= node; ++n)
-      if (!chooser_.refused(n) && (n == first || chooser_.refused(plan_.tree.parents[std::size_t(n)])))
-        chooser_.refuse(n);
+      if (!selector_.refused(n) && (n == first || selector_.refused(plan_.tree.parents[std::size_t(n)])))
+        selector_.refuse(n);
   }
 
   // What was aimed at, or the best, may have been refused.
   void choose_again() {
-    if (chooser_.refused(plan_.best_node)) {
+    if (selector_.refused(plan_.best_node)) {
       plan_.best_distance_m = std::numeric_limits<double>::infinity();
       for (int n = plan_.legs.back().root; n < plan_.tree.size(); ++n)
-        if (!chooser_.refused(n))
+        if (!selector_.refused(n))
           consider(n, distance_at(place_of(plan_.tree.states[std::size_t(n)])), false);
     }
     for (Expansion& e : queue_) {
-      if (laws_.lag > 0 || !chooser_.refused(e.aimed.node)) continue;
-      e.aimed = chooser_.choose(e.draw);
+      if (search_options_.lag > 0 || !selector_.refused(e.aimed.node)) continue;
+      e.aimed = selector_.choose(e.sample);
       aimed_anew(e);
     }
   }
@@ -416,8 +420,8 @@ class Search {
 
   void aim_overtaken(int node) {
     for (Expansion& e : queue_) {
-      if (!(chooser_.cost(e.draw, node) < e.aimed.cost)) continue;  // the first of equals stays
-      e.aimed = chooser_.aim(e.draw, node);
+      if (!(selector_.cost(e.sample, node) < e.aimed.cost)) continue;  // the first of equals stays
+      e.aimed = selector_.aim(e.sample, node);
       aimed_anew(e);
     }
   }
@@ -441,9 +445,9 @@ class Search {
 
   const System& system_;
   const Settings& settings_;
-  const Laws& laws_;
+  const SearchOptions& search_options_;
   Plan& plan_;
-  const Watch& watch_;
+  const ProgressCallback& on_progress_;
   Progress progress_;
   int window_, threads_, share_;  // expansions in flight, threads, expansions a thread has in its lanes
   int look_every_;                // steps; 0: laws do not look
@@ -457,7 +461,7 @@ class Search {
   std::atomic<bool> ended_ = false;
   std::mutex mutex_;  // guards all below, and plan_ (states already in the tree are read without it)
   std::condition_variable changed_;
-  Chooser chooser_;
+  NodeSelector selector_;
   std::deque<Expansion>
       queue_;  // in order of iteration; a deque, so that pointers to the taken ones stay good
   std::int64_t next_iteration_, committed_;
@@ -490,7 +494,7 @@ Plan begin(const System& system, const Settings& settings) {
 // Where the next leg begins: the goal's node, or a node behind it in which the robot has come to rest.
 int reached(const System& system, const Settings& settings, Plan& plan) {
   if (settings.settle.max_duration_s == 0) return plan.goal_node;
-  Course settle;
+  ControlRollout settle;
   settle.from = plan.tree.states[std::size_t(plan.goal_node)];
   run(system, settings, {&settle, 1}, {.ask_acceptable = false});
   if (settle.settle_steps == 0) return plan.goal_node;
@@ -511,7 +515,8 @@ void require_same_search(const System& system, const Settings& settings, const P
 
 }  // namespace
 
-Plan plan(const System& system, const Settings& settings, std::optional<Plan> earlier, const Watch& watch) {
+Plan plan(const System& system, const Settings& settings, std::optional<Plan> earlier,
+          const ProgressCallback& on_progress) {
   validate(settings, system);
   if (earlier) require_same_search(system, settings, *earlier);
   Plan plan = earlier ? std::move(*earlier) : begin(system, settings);
@@ -525,7 +530,7 @@ Plan plan(const System& system, const Settings& settings, std::optional<Plan> ea
     // search for.
     std::optional<Trajectory> way;
     if (!plan.solved() || leg == int(settings.via.size())) {
-      Search search(on_leg, of_leg, plan, watch, started);
+      Search search(on_leg, of_leg, plan, on_progress, started);
       search.run();
       way = std::move(search).way();
     }

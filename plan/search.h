@@ -61,14 +61,14 @@ struct Plan {
 };
 
 // Where a search stands after an iteration; times include those of an earlier plan that it goes on from.
-struct Moment {
+struct SearchProgress {
   Statistics statistics;
   int leg = 0;
   int nodes = 0;
   double best_distance_m = 0;  // from the leg's goal
 };
 // Called after every iteration, in their order, by one thread at a time.
-using Watch = std::function<void(const Moment&)>;
+using ProgressCallback = std::function<void(const SearchProgress&)>;
 
 // Searches until a node lies in the goal and comes to rest there (one goal after the other where there are
 // several) by a way no frame of which is refused, or a limit ends it. A refused way stays in the tree, but
@@ -77,7 +77,8 @@ using Watch = std::function<void(const Moment&)>;
 // alone; in_flight and threads are free. With `earlier` (the plan of a search that was cut short, of the same
 // system and settings save for limits) goes on from there, to the bytes that one uninterrupted search gives.
 // Throws InputError when settings are out of range or `earlier` is not of this system and these settings.
-Plan plan(const System&, const Settings&, std::optional<Plan> earlier = std::nullopt, const Watch& = {});
+Plan plan(const System&, const Settings&, std::optional<Plan> earlier = std::nullopt,
+          const ProgressCallback& = {});
 
 // "via 1 of 2", or "the goal".
 std::string name_of_goal(const Settings&, int leg);

@@ -18,7 +18,7 @@ void require_within(double value, double lower, double upper, const char* name) 
     throw InputError(fmt::format("planner: {} is {}; it must be in [{}, {}]", name, value, lower, upper));
 }
 
-void validate_laws(const Laws& l) {
+void validate_search_options(const SearchOptions& l) {
   require_within(l.lag, 0, 65535, "lag");
   require_within(l.time_weight, 0, 1, "time_weight");
   require_within(l.guidance, 0, 1, "guidance");
@@ -114,8 +114,8 @@ void validate(const Settings& s) {
   require(std::isfinite(s.settle.mean_speed_m_s) && s.settle.mean_speed_m_s > 0, "settle mean_speed_m_s",
           s.settle.mean_speed_m_s, "above 0");
   require_within(s.settle.max_force_share, 0, 1, "settle max_force_share");
-  validate_laws(s.laws);
-  require_within(s.frames_per_second, least_frames_per_second, most_frames_per_second, "frames_per_second");
+  validate_search_options(s.search_options);
+  require_within(s.frames_per_second, min_frames_per_second, max_frames_per_second, "frames_per_second");
   require_within(s.in_flight, 0, 65536, "in_flight");
   require(s.time_limit_s >= 0, "time_limit_s", s.time_limit_s, "at least 0");
 }
@@ -149,7 +149,7 @@ Json json_of(const Settings& s) {
                     {"mean_speed_m_s", s.settle.mean_speed_m_s},
                     {"max_force_share", s.settle.max_force_share},
                     {"hold", s.settle.hold}};
-  const Laws& l = s.laws;
+  const SearchOptions& l = s.search_options;
   json["laws"] = {{"lag", l.lag},
                   {"metric", l.metric == Metric::distance ? "distance" : "time_to_go"},
                   {"time_weight", l.time_weight},
@@ -195,19 +195,19 @@ Settings settings_from_json(const Json& json, const std::string& what) try {
   json.at("settle").at("max_duration_s").get_to(s.settle.max_duration_s);
   json.at("settle").at("mean_speed_m_s").get_to(s.settle.mean_speed_m_s);
   json.at("settle").at("max_force_share").get_to(s.settle.max_force_share);
-  const Json& laws = json.at("laws");
-  laws.at("lag").get_to(s.laws.lag);
-  s.laws.metric = laws.at("metric") == "distance" ? Metric::distance : Metric::time_to_go;
-  laws.at("time_weight").get_to(s.laws.time_weight);
-  laws.at("guidance").get_to(s.laws.guidance);
-  laws.at("soft_price").get_to(s.laws.soft_price);
-  laws.at("learn_prices").get_to(s.laws.learn_prices);
-  laws.at("steer").get_to(s.laws.steer);
-  laws.at("look_s").get_to(s.laws.look_s);
-  laws.at("stop_in_goal").get_to(s.laws.stop_in_goal);
-  laws.at("hold").get_to(s.laws.hold);
-  s.settle.hold = json.at("settle").value("hold", s.laws.hold);  // before there were two of them
-  laws.at("end_hopeless").get_to(s.laws.end_hopeless);
+  const Json& search_options = json.at("laws");
+  search_options.at("lag").get_to(s.search_options.lag);
+  s.search_options.metric = search_options.at("metric") == "distance" ? Metric::distance : Metric::time_to_go;
+  search_options.at("time_weight").get_to(s.search_options.time_weight);
+  search_options.at("guidance").get_to(s.search_options.guidance);
+  search_options.at("soft_price").get_to(s.search_options.soft_price);
+  search_options.at("learn_prices").get_to(s.search_options.learn_prices);
+  search_options.at("steer").get_to(s.search_options.steer);
+  search_options.at("look_s").get_to(s.search_options.look_s);
+  search_options.at("stop_in_goal").get_to(s.search_options.stop_in_goal);
+  search_options.at("hold").get_to(s.search_options.hold);
+  s.settle.hold = json.at("settle").value("hold", s.search_options.hold);  // before there were two of them
+  search_options.at("end_hopeless").get_to(s.search_options.end_hopeless);
   json.at("frames_per_second").get_to(s.frames_per_second);
   json.at("in_flight").get_to(s.in_flight);
   if (const Json& limit = json.at("time_limit_s"); !limit.is_null()) limit.get_to(s.time_limit_s);

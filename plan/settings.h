@@ -45,7 +45,7 @@ struct Settle {
 
 // What the preset `fast` does beyond Algorithm 1; each can be switched alone. Method: docs/planning.md.
 enum class Metric { distance, time_to_go };
-struct Laws {
+struct SearchOptions {
   // An expansion knows the nodes of all expansions but the `lag` before it, so that those can be computed
   // side by side for certain; 0: of all.
   int lag = 0;
@@ -62,7 +62,7 @@ struct Laws {
 };
 
 inline constexpr std::int64_t most_iterations = 1'000'000'000;
-inline constexpr double least_frames_per_second = 1e-3, most_frames_per_second = 10000;
+inline constexpr double min_frames_per_second = 1e-3, max_frames_per_second = 10000;
 
 struct Settings {
   std::uint64_t seed = 1;
@@ -78,7 +78,7 @@ struct Settings {
   double max_duration_s = 1;
   double control_point_radius_m = 0.25;  // > 0, in the rest shape
   Settle settle;
-  Laws laws;
+  SearchOptions search_options;
   double frames_per_second = 30;  // of the trajectory's stored states, in the range below
   // None of these changes the tree, save for how far it gets.
   int in_flight = 0;  // expansions computed ahead; 0: chosen from the threads and the lanes

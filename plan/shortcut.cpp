@@ -26,10 +26,10 @@ struct Change {
 class Changes {
  public:
   Changes(const System& system, const Settings& settings, const ShortcutSettings& shortcuts,
-          const Course& path)
+          const ControlRollout& path)
       : system_(system), settings_(settings), cost_(shortcuts.cost), keep_(shortcuts.keep), path_(path) {}
 
-  Change draw(int round, int number) const {
+  Change draw_change(int round, int number) const {
     Rng rng(settings_.seed, first_stream + std::uint64_t(round) * changes_a_round + std::uint64_t(number));
     const double largest = settings_.max_force_n * just_below_one;
     Change c;
@@ -154,11 +154,11 @@ class Changes {
   const Settings& settings_;
   CostKind cost_;
   int keep_;
-  const Course& path_;
+  const ControlRollout& path_;
 };
 
 // The path as far as the course's start, then the course.
-Course joined(const Course& path, int first, Course course) {
+ControlRollout joined(const ControlRollout& path, int first, ControlRollout course) {
   const auto n = std::size_t(first);
   const auto before = [n](auto& list, const auto& of_path) {
     list.insert(list.begin(), of_path.begin(), of_path.begin() + std::ptrdiff_t(n));
@@ -184,18 +184,18 @@ Json json_of(const ShortcutReport& report) {
           {"wall_s", report.wall_s}};
 }
 
-Course path_of(const System& system, const Settings& settings, const std::vector<Control>& controls) {
-  Course path;
+ControlRollout path_of(const System& system, const Settings& settings, const std::vector<Control>& controls) {
+  ControlRollout path;
   path.from = system.start();
   path.controls = controls;
   run(system, settings, {&path, 1}, {.ask_acceptable = false, .measure = true});
   return path;
 }
 
-Course shortcut(const System& system, const Settings& settings, const ShortcutSettings& shortcuts,
-                Course path, ShortcutReport& report) {
+ControlRollout shortcut(const System& system, const Settings& settings, const ShortcutSettings& shortcuts,
+                        ControlRollout path, ShortcutReport& report) {
   using Clock = std::chrono::steady_clock;
-  LIMBER_CHECK(path.result == Course::rests_in_goal, int(path.result));
+  LIMBER_CHECK(path.result == ControlRollout::rests_in_goal, int(path.result));
   const Clock::time_point started = Clock::now();
   const double cpu_before = cpu_seconds();
   report.settings = shortcuts;
@@ -204,10 +204,10 @@ Course shortcut(const System& system, const Settings& settings, const ShortcutSe
   for (int& round = report.settings.rounds_done; round < shortcuts.rounds && stop_signal() == 0; ++round) {
     const Changes changes(system, settings, shortcuts, path);
     const double now = cost_in(path.costs, shortcuts.cost);
-    std::vector<Course> courses(changes_a_round);
+    std::vector<ControlRollout> courses(changes_a_round);
     std::vector<int> first(courses.size());
     for (std::size_t i = 0; i < courses.size(); ++i) {
-      const Change change = changes.draw(round, int(i));
+      const Change change = changes.sample(round, int(i));
       const auto n = std::size_t(change.first);
       first[i] = change.first;
       courses[i].from = n == 0 ? path.from : path.states[n - 1];
@@ -222,7 +222,7 @@ Course shortcut(const System& system, const Settings& settings, const ShortcutSe
     double least = now;
     for (std::size_t i = 0; i < courses.size(); ++i) {
       const double cost = cost_in(courses[i].costs, shortcuts.cost);
-      if (courses[i].result == Course::rests_in_goal && cost < least) best = int(i), least = cost;
+      if (courses[i].result == ControlRollout::rests_in_goal && cost < least) best = int(i), least = cost;
     }
     try {
       // Where it may not, the next best is not asked: how many of the others a race lets end is chance.
@@ -250,7 +250,7 @@ std::vector<int> controls_before_legs(const Plan& plan) {
   return counts;
 }
 
-void adopt(const System& system, Plan& plan, const Course& path,
+void adopt(const System& system, Plan& plan, const ControlRollout& path,
            const std::vector<int>& controls_before_legs) {
   const std::vector<int> old = path_to(plan.tree, plan.best_node);
   LIMBER_CHECK(path.from == plan.tree.states[0] && path.states.size() == path.controls.size(),
@@ -284,7 +284,7 @@ ShortcutReport shorten(const System& system, Plan& plan, const ShortcutSettings&
   ShortcutSettings of_last_leg = shortcuts;
   of_last_leg.keep = before_legs.back();
   ShortcutReport report;
-  const Course path =
+  const ControlRollout path =
       shortcut(system, plan.settings, of_last_leg, path_of(system, plan.settings, controls), report);
   if (report.accepted > 0) adopt(system, plan, path, before_legs);
   return report;

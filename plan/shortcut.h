@@ -2,7 +2,7 @@
 // what they lead to. Method and figures: docs/planning.md.
 #pragma once
 
-#include "plan/course.h"
+#include "plan/control_rollout.h"
 #include "plan/search.h"
 
 namespace limber::plan {
@@ -23,13 +23,14 @@ struct ShortcutReport {
 Json json_of(const ShortcutReport&);
 
 // The controls from the start as a course that is measured; the settle follows by itself.
-Course path_of(const System&, const Settings&, const std::vector<Control>&);
+ControlRollout path_of(const System&, const Settings&, const std::vector<Control>&);
 
 // Each round takes the cheapest of its changes, where it costs less than the path and lasts no longer, rests
 // in the goal, and is acceptable at every frame time; so neither cost nor duration ever grows. `path` is one
 // of path_of() that rests in the goal. Changes are drawn from (settings.seed, round): the same bytes for any
 // number of threads. A signal (core/progress.h) ends it between rounds.
-Course shortcut(const System&, const Settings&, const ShortcutSettings&, Course path, ShortcutReport&);
+ControlRollout shortcut(const System&, const Settings&, const ShortcutSettings&, ControlRollout path,
+                        ShortcutReport&);
 
 // The same for a solved plan, on the last of its legs: the new path becomes a branch of its tree (iteration
 // −1), the new goal_node its end. Nothing happens where there are no rounds to do.
@@ -40,6 +41,6 @@ std::vector<int> controls_before_legs(const Plan&);
 
 // Makes a path from the tree's start that rests in the goal the plan's own, its legs beginning after so many
 // controls; nodes that it shares with the path to best_node are shared.
-void adopt(const System&, Plan&, const Course&, const std::vector<int>& controls_before_legs);
+void adopt(const System&, Plan&, const ControlRollout&, const std::vector<int>& controls_before_legs);
 
 }  // namespace limber::plan

@@ -4,7 +4,7 @@
 
 #include "core/error.h"
 #include "core/progress.h"
-#include "plan/course.h"
+#include "plan/control_rollout.h"
 
 namespace limber::plan {
 
@@ -49,7 +49,7 @@ void put_tree(const System& system, Plan& plan) {
 }
 
 // As far as whole controls go.
-void put_chain(const System& system, Plan& plan, Course& course) {
+void put_chain(const System& system, Plan& plan, ControlRollout& course) {
   Trajectory& path = plan.trajectory;
   course.controls.resize(course.states.size());
   plan.tree = {};
@@ -75,7 +75,8 @@ std::int64_t steps_of_simulation(const System& system, double duration_s) {
 }
 
 Plan simulate_for(const System& system, double duration_s, double frames_per_second,
-                  std::optional<Plan> earlier, const std::function<void(double)>& watch, const Steer& steer) {
+                  std::optional<Plan> earlier, const std::function<void(double)>& on_progress,
+                  const Steer& steer) {
   LIMBER_CHECK(!steer || !earlier, bool(steer));
   const std::int64_t first_step = system.start().step,
                      last_step = first_step + steps_of_simulation(system, duration_s);
@@ -88,7 +89,7 @@ Plan simulate_for(const System& system, double duration_s, double frames_per_sec
 
   Settings settings;
   settings.frames_per_second = frames_per_second;
-  Course course;
+  ControlRollout course;
   course.from = path.end;
   if (steer)
     course.next = [&](const State& state) -> std::optional<Control> {
@@ -102,12 +103,12 @@ Plan simulate_for(const System& system, double duration_s, double frames_per_sec
   bool stopped = false;
   try {
     run(system, settings, {&course, 1},
-        {.settle = CourseOptions::never,
+        {.settle = ControlRolloutOptions::never,
          .keep_frames = true,
          .ask_acceptable = false,
          .stoppable = true,
-         .watch = [&](const State& frame) {
-           if (watch) watch(double(frame.step - first_step) * system.dt_s());
+         .on_progress = [&](const State& frame) {
+           if (on_progress) on_progress(double(frame.step - first_step) * system.dt_s());
          }});
   } catch (const Interrupted&) {
     stopped = true;
@@ -115,7 +116,7 @@ Plan simulate_for(const System& system, double duration_s, double frames_per_sec
   const std::int64_t shown = path.frames.empty() ? -1 : path.frames.back().step;
   for (State& frame : course.frames)
     if (frame.step > shown) path.frames.push_back(std::move(frame));
-  const bool whole = !stopped && course.result != Course::diverged;
+  const bool whole = !stopped && course.result != ControlRollout::diverged;
   if (!steer) path.end = whole ? std::move(course.end) : path.frames.back();
   plan.simulation = Simulation{duration_s,
                                whole     ? Simulation::whole

@@ -17,8 +17,8 @@ namespace limber::plan {
 // with a whole control. Such a simulation is no `earlier`.
 using Steer = std::function<Control(const State&)>;
 Plan simulate_for(const System&, double duration_s, double frames_per_second,
-                  std::optional<Plan> earlier = std::nullopt, const std::function<void(double)>& watch = {},
-                  const Steer& steer = {});
+                  std::optional<Plan> earlier = std::nullopt,
+                  const std::function<void(double)>& on_progress = {}, const Steer& steer = {});
 
 // The steps that a simulation of that duration has.
 std::int64_t steps_of_simulation(const System&, double duration_s);

@@ -5,7 +5,7 @@
 namespace limber::plan {
 
 // |way − v t| − a t²/2 is positive at 0 and negative where a point that fled at |v| would be caught: halved.
-double least_time_to_go(double distance, double speed, double a) {
+double min_time_to_go(double distance, double speed, double a) {
   return (-speed + std::sqrt(speed * speed + 2 * a * distance)) / a;
 }
 
@@ -13,7 +13,7 @@ double time_to_go(const Vec3& way, const Vec3& v, double a) {
   const double distance = way.norm();
   if (distance == 0) return 0;
   const auto short_by = [&](double t) { return (way - v * t).norm() - 0.5 * a * t * t; };
-  double low = least_time_to_go(distance, v.norm(), a), high = least_time_to_go(distance, -v.norm(), a);
+  double low = min_time_to_go(distance, v.norm(), a), high = min_time_to_go(distance, -v.norm(), a);
   for (int i = 0; i < 40; ++i) {
     const double middle = 0.5 * (low + high);
     (short_by(middle) > 0 ? low : high) = middle;

@@ -11,7 +11,7 @@ namespace limber::plan {
 double time_to_go(const Vec3& way, const Vec3& velocity, double acceleration);
 
 // No time is shorter: v points straight there.
-double least_time_to_go(double distance, double speed, double acceleration);
+double min_time_to_go(double distance, double speed, double acceleration);
 
 // The direction of that acceleration, unit; zero where the way is zero.
 Vec3 best_direction(const Vec3& way, const Vec3& velocity, double acceleration);

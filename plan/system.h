@@ -24,7 +24,7 @@ struct Rollout {
 };
 
 // What a rollout shows on its way.
-struct Look {
+struct Observation {
   int steps = 0;  // since it began
   Vec3 center = Vec3::Zero(),
        velocity = Vec3::Zero();    // of the robot: centre of mass, metres, metres a second
@@ -33,14 +33,14 @@ struct Look {
 };
 
 // Hands rollouts to whoever has a lane free.
-class Supply {
+class RolloutSource {
  public:
-  virtual ~Supply() = default;
+  virtual ~RolloutSource() = default;
   virtual int at_once() const = 0;  // so many it may give before one is done
   virtual Rollout* next() = 0;      // nullptr: none now; it stays good until done()
   // Asked every look_every steps of a rollout that has not diverged; false ends it there, and its
   // control.steps are those it took. Must be a function of the rollout and what was seen of it.
-  virtual bool goes_on(const Rollout&, const Look&) { return true; }
+  virtual bool goes_on(const Rollout&, const Observation&) { return true; }
   // The same of whole states: the first step later than `step` (both as State::step) whose state is shown.
   virtual std::int64_t next_shown(std::int64_t) const { return std::numeric_limits<std::int64_t>::max(); }
   virtual bool goes_on(const Rollout&, const State&) { return true; }
@@ -59,7 +59,7 @@ class Propagator {
   virtual void propagate(std::span<Rollout>) = 0;
   // The same for all that the supply gives, until it has none and all are done; a lane is filled again as
   // soon as its rollout ends. look_every > 0.
-  virtual void run(Supply&, int look_every) = 0;
+  virtual void run(RolloutSource&, int look_every) = 0;
 };
 
 // A coarse picture of what stands where at the start, for guidance.

@@ -1,7 +1,7 @@
 #include "plan/trajectory.h"
 
 #include "core/error.h"
-#include "plan/course.h"
+#include "plan/control_rollout.h"
 #include "plan/detail/hash_control.h"
 #include "plan/frame_times.h"
 
@@ -10,7 +10,7 @@ namespace limber::plan {
 namespace {
 
 // Without the settle's control.
-Trajectory trajectory_of(Course course, double frames_per_second) {
+Trajectory trajectory_of(ControlRollout course, double frames_per_second) {
   return {std::move(course.controls), course.settle_steps, frames_per_second, std::move(course.frames),
           std::move(course.end)};
 }
@@ -48,30 +48,33 @@ void require_frame_times(const Trajectory& t, double dt_s, const std::string& wh
 Trajectory simulate(const System& system, const std::vector<Control>& controls, double frames_per_second) {
   Settings settings;
   settings.frames_per_second = frames_per_second;
-  Course course;
+  ControlRollout course;
   course.from = system.start();
   course.controls = controls;
   run(system, settings, {&course, 1},
-      {.settle = CourseOptions::never, .keep_frames = true, .ask_acceptable = false, .stoppable = true});
+      {.settle = ControlRolloutOptions::never,
+       .keep_frames = true,
+       .ask_acceptable = false,
+       .stoppable = true});
   return trajectory_of(std::move(course), frames_per_second);
 }
 
 bool comes_to_rest(const System& system, const Settings& s, const State& in_goal) {
   if (s.settle.max_duration_s == 0) return system.goal_holds(in_goal);
-  Course course;
+  ControlRollout course;
   course.from = in_goal;
   run(system, s, {&course, 1}, {});
-  return course.result == Course::rests_in_goal;
+  return course.result == ControlRollout::rests_in_goal;
 }
 
 Trajectory trajectory_to(const System& system, const Settings& s, const Tree& tree, int node, bool settle) {
   const std::vector<int> path = path_to(tree, node);
-  Course course;
+  ControlRollout course;
   course.from = system.start();
   for (std::size_t i = 1; i < path.size(); ++i)
     course.controls.push_back(tree.controls[std::size_t(path[i])]);
   run(system, s, {&course, 1},
-      {.settle = settle ? CourseOptions::anywhere : CourseOptions::never,
+      {.settle = settle ? ControlRolloutOptions::anywhere : ControlRolloutOptions::never,
        .keep_frames = true,
        .ask_acceptable = false});
   const std::vector<State>& states = course.states;

@@ -11,7 +11,7 @@ namespace {
 constexpr int sides = 20;
 // Rings from the tail: the shaft's two ends, the head's base; then the tail's middle and the tip.
 constexpr int rings = 3, tail = rings * sides, tip = tail + 1;
-constexpr double head_radius = 2.4, head_length = 6, least_length = 8;  // in radii of the shaft
+constexpr double head_radius = 2.4, head_length = 6, min_length = 8;  // in radii of the shaft
 
 }  // namespace
 
@@ -36,7 +36,7 @@ Points arrow(const Vec3& from, const Vec3& to, double shaft_radius_m) {
   Points points(tip + 1, 3);
   points.rowwise() = from.transpose();
   if (length == 0) return points;
-  const double radius = std::min(shaft_radius_m, length / least_length);
+  const double radius = std::min(shaft_radius_m, length / min_length);
   const Vec3 along = (to - from) / length, across = along.unitOrthogonal(), up = along.cross(across);
   const double neck = length - head_length * radius;
   const double at[rings] = {0, neck, neck}, wide[rings] = {radius, radius, head_radius * radius};

@@ -14,19 +14,19 @@ namespace limber::render {
 
 namespace {
 
-constexpr int most_scans = 200;  // of a progressive JPEG; more only cost time
-constexpr long most_jpeg_memory = 1L << 30;
+constexpr int max_scans = 200;  // of a progressive JPEG; more only cost time
+constexpr long max_jpeg_memory = 1L << 30;
 
 // An honest file has a thousandth of a row's bytes at least (PNG, by deflate), or a bit for each of its
 // blocks (JPEG): what says that it is huge and is not takes no memory.
-constexpr std::int64_t most_pixels_a_byte_of_png = 8 * 1100, most_pixels_a_byte_of_jpeg = 8 * 64;
+constexpr std::int64_t max_pixels_a_byte_of_png = 8 * 1100, max_pixels_a_byte_of_jpeg = 8 * 64;
 
-void require_size(std::int64_t width, std::int64_t height, std::int64_t most_pixels_a_byte,
+void require_size(std::int64_t width, std::int64_t height, std::int64_t max_pixels_a_byte,
                   const std::string& bytes, const std::string& name) {
-  if (width > most_image_side || height > most_image_side || width * height > most_image_pixels)
+  if (width > max_image_side || height > max_image_side || width * height > max_image_pixels)
     throw InputError(fmt::format("\"{}\" has {} × {} pixels; at most {} a side and {} in all can be shown",
-                                 name, width, height, most_image_side, most_image_pixels));
-  if (width * height / most_pixels_a_byte > std::ssize(bytes))
+                                 name, width, height, max_image_side, max_image_pixels));
+  if (width * height / max_pixels_a_byte > std::ssize(bytes))
     throw InputError(
         fmt::format("\"{}\": {} bytes cannot hold {} × {} pixels", name, bytes.size(), width, height));
 }
@@ -36,7 +36,7 @@ void require_size(std::int64_t width, std::int64_t height, std::int64_t most_pix
 Image8 from_png(const std::string& bytes, const std::string& name) {
   const std::optional<PngInfo> whole = inspect_png_bytes(bytes);
   if (!whole) throw InputError(fmt::format("\"{}\" is a PNG that is cut short or damaged", name));
-  require_size(whole->width, whole->height, most_pixels_a_byte_of_png, bytes, name);
+  require_size(whole->width, whole->height, max_pixels_a_byte_of_png, bytes, name);
   return rgb_of_png(bytes, name);
 }
 
@@ -60,7 +60,7 @@ struct ScanCounter {
   jpeg_progress_mgr manager;
 };
 void count_scans(j_common_ptr jpeg) {
-  if (reinterpret_cast<j_decompress_ptr>(jpeg)->input_scan_number > most_scans) {
+  if (reinterpret_cast<j_decompress_ptr>(jpeg)->input_scan_number > max_scans) {
     jpeg->err->msg_code = 0;
     leave(jpeg);
   }
@@ -75,7 +75,7 @@ bool decode_jpeg(jpeg_decompress_struct* jpeg, Errors* errors, ScanCounter* prog
   if (setjmp(errors->back)) return false;
   if (step == Step::header) {
     jpeg_create_decompress(jpeg);
-    jpeg->mem->max_memory_to_use = most_jpeg_memory;
+    jpeg->mem->max_memory_to_use = max_jpeg_memory;
     progress->manager.progress_monitor = count_scans;
     jpeg->progress = &progress->manager;
     jpeg_mem_src(jpeg, reinterpret_cast<const unsigned char*>(bytes->data()), bytes->size());
@@ -110,7 +110,7 @@ Image8 from_jpeg(const std::string& bytes, const std::string& name) {
       throw InputError(fmt::format("\"{}\" is a JPEG that cannot be read ({})", name, errors.message));
   };
   require(decode_jpeg(&jpeg, &errors, &progress, &bytes, Step::header, &image));
-  require_size(jpeg.image_width, jpeg.image_height, most_pixels_a_byte_of_jpeg, bytes, name);
+  require_size(jpeg.image_width, jpeg.image_height, max_pixels_a_byte_of_jpeg, bytes, name);
   image = {int(jpeg.image_width), int(jpeg.image_height),
            std::vector<std::uint8_t>(3 * std::size_t(jpeg.image_width) * std::size_t(jpeg.image_height))};
   require(decode_jpeg(&jpeg, &errors, &progress, &bytes, Step::pixels, &image));

@@ -7,8 +7,8 @@
 
 namespace limber::render {
 
-inline constexpr int most_image_side = 16384;
-inline constexpr std::int64_t most_image_pixels = 1 << 26;
+inline constexpr int max_image_side = 16384;
+inline constexpr std::int64_t max_image_pixels = 1 << 26;
 
 // Levels as the file has them; what it says of transparency and of color spaces is left out. Throws
 // InputError with `name` when the bytes are neither PNG nor JPEG, are cut short or damaged, hold other colors

@@ -14,14 +14,14 @@
 
 #include "core/error.h"
 #include "core/progress.h"
-#include "render/detail/finish.h"
+#include "render/detail/compositor.h"
 #include "render/detail/gl_context.h"
+#include "render/detail/gpu_mesh.h"
 #include "render/detail/grain.h"
 #include "render/detail/ground_shade.h"
 #include "render/detail/image_on_card.h"
 #include "render/detail/layer_lists.h"
 #include "render/detail/line_quads.h"
-#include "render/detail/mesh_on_card.h"
 #include "render/detail/program.h"
 #include "render/detail/shaders.h"
 #include "render/detail/targets.h"
@@ -33,7 +33,7 @@ namespace {
 using namespace detail;
 
 constexpr int shadow_size = Targets::shadow_size;
-constexpr double most_shadow = 0.03;  // radius of the half-shade between bodies, over the side of the map
+constexpr double max_shadow = 0.03;  // radius of the half-shade between bodies, over the side of the map
 constexpr int ground_key_cells = 768, ground_sky_cells = 384;
 // A level patch at height h hides the share h²/(π(h²+r²)²) of the sky from a place r beside its foot. Half a
 // narrow and half a wide Gaussian (deviations in units of h) keep within 0.03 of what it sums to over a disk.
@@ -41,7 +41,7 @@ constexpr double sky_spreads[] = {0.5, 1.6};
 
 struct Mesh {
   MeshLook look;
-  MeshOnCard card;
+  GpuMesh card;
   Points colors = {};                                        // linear; empty: the look's
   Eigen::VectorXd occlusion = {};                            // empty: none
   std::vector<SurfaceMaterial> materials = {};               // empty: no appearance
@@ -63,7 +63,7 @@ void require(bool in_range, const std::string& what) {
   if (!in_range) throw InputError(what);
 }
 
-void validate(const Look& look) {
+void validate(const RenderSettings& look) {
   require(
       1 <= look.width && look.width <= 8192 && 1 <= look.height && look.height <= 8192,
       fmt::format("picture of {}×{}: width and height must lie between 1 and 8192", look.width, look.height));
@@ -102,7 +102,7 @@ void validate(const MeshLook& look) {
 }
 
 // The key light's direction turned by 110° about up, 25° above the horizon.
-Vec3 toward_soft_box(const Look& look) {
+Vec3 toward_soft_box(const RenderSettings& look) {
   const Vec3 level = look.toward_key - look.toward_key.dot(look.up) * look.up;
   const Vec3 turned = level.norm() > 1e-6
                           ? Eigen::AngleAxisd(110 * std::numbers::pi / 180, look.up) * level.normalized()
@@ -138,7 +138,7 @@ Points edges_of(const Box& box) {
 namespace {
 
 // How a shader reads the samples of a pixel.
-std::string sample_defines(const Look& look) {
+std::string sample_defines(const RenderSettings& look) {
   if (look.multisampling)
     return "#define SAMPLER sampler2DMS\n#define INTEGER_SAMPLER isampler2DMS\n#define SAMPLES 4\n"
            "#define SAMPLES_A_TEXEL 4\n#define SAMPLE gl_SampleID\n"
@@ -150,7 +150,7 @@ std::string sample_defines(const Look& look) {
       look.supersampling, look.supersampling * look.supersampling);
 }
 
-SampleGrid sample_grid(const Look& look) {
+SampleGrid sample_grid(const RenderSettings& look) {
   if (look.multisampling) return {look.width, look.height, 4};
   return {look.width * look.supersampling, look.height * look.supersampling, 0};
 }
@@ -161,7 +161,7 @@ SampleGrid sample_grid(const Look& look) {
 using RowReader = std::function<void(int y, std::span<const float> rgba)>;
 
 struct Renderer::Impl {
-  explicit Impl(const Look& l);
+  explicit Impl(const RenderSettings& l);
 
   void draw(const Camera&, const RowReader&, Passes*, StageTimes*);
 
@@ -193,7 +193,7 @@ struct Renderer::Impl {
   // Checks the number, and that there is a value for each of its vertices.
   Mesh& mesh_with(int number, Eigen::Index values, bool may_be_empty);
 
-  Look look;
+  RenderSettings look;
   GlContext context;
   Variants mesh_programs{mesh_vertex_shader, mesh_fragment_shader};
   Variants depth_programs{depth_vertex_shader, depth_fragment_shader};
@@ -225,7 +225,7 @@ struct Renderer::Impl {
   std::vector<std::uint16_t> halves;  // the samples, read back
 };
 
-Renderer::Impl::Impl(const Look& l)
+Renderer::Impl::Impl(const RenderSettings& l)
     : look(l), samples(sample_defines(l)), targets(l.width, l.height, sample_grid(l)), lists(sample_grid(l)) {
   look.up.normalize();
   look.toward_key.normalize();
@@ -374,7 +374,7 @@ namespace {
 // Mesa 22.3 clips by what a shader writes even where clipping is off: so a shader writes as many as are
 // wanted.
 std::string plane_defines(const std::vector<Plane>& planes) {
-  for (int i = 0; i <= most_clip_planes; ++i)
+  for (int i = 0; i <= max_clip_planes; ++i)
     (i < int(planes.size()) ? glEnable : glDisable)(GLenum(GL_CLIP_DISTANCE0 + i));
   return fmt::format("#define PLANES {}\n", planes.size());
 }
@@ -432,7 +432,7 @@ const Program& Renderer::Impl::use_mesh(const Mesh& mesh, const std::string& def
   p.set("shadow_from_normal", shadow_from_normal);
   p.set("shadow_softness", shadow_softness);
   p.set("least_shadow", 1.9 / shadow_size);
-  p.set("most_shadow", most_shadow);
+  p.set("most_shadow", max_shadow);
   p.set("ground_x", Vec3(ground.plane_from_world.row(0)));
   p.set("ground_y", Vec3(ground.plane_from_world.row(1)));
   p.set("ground_lower", sky_shade.lower);
@@ -573,7 +573,7 @@ void Renderer::Impl::draw_veils() {
   const Rectangle place = place_of_veils();
   glBindFramebuffer(GL_FRAMEBUFFER, targets.samples_frame);
   glEnable(GL_SCISSOR_TEST);
-  int rows = lists.most_rows();
+  int rows = lists.max_rows();
   for (int row = 0; row < grid.height;) {
     rows = std::min(rows, grid.height - row);
     glScissor(0, row, grid.width, rows);
@@ -686,7 +686,7 @@ void Renderer::Impl::finish(const RowReader& read) {
       .fade_end_m = 4 * stage_box.diagonal() + 1e-6,
       .haze_m = 18 * stage_box.diagonal() + 1e-6,
       .transparent = look.transparent_background};
-  const Finish finished(backdrop, camera, look.width, look.height);
+  const Compositor finished(backdrop, camera, look.width, look.height);
   std::vector<float> row(4 * std::size_t(look.width));
   for (int y = 0; y < look.height; ++y) {
     finished.row(y, halves.data(), per_side, row.data());
@@ -733,7 +733,7 @@ Passes Renderer::Impl::finish_passes() {
   return passes;
 }
 
-Renderer::Renderer(const Look& look) {
+Renderer::Renderer(const RenderSettings& look) {
   validate(look);
   impl_ = std::make_unique<Impl>(look);
 }
@@ -748,7 +748,7 @@ int Renderer::add_mesh(const Triangles& triangles, const Points& rest_positions,
   if (!appearance.empty())
     limber::validate(appearance, triangles.rows(), fmt::format("appearance of mesh '{}'", look.name));
   LIMBER_CHECK(images.size() == appearance.images.size(), look.name, images.size(), appearance.images.size());
-  impl_->meshes.push_back({look, MeshOnCard(triangles, rest_positions, look.crease_angle_deg, appearance)});
+  impl_->meshes.push_back({look, GpuMesh(triangles, rest_positions, look.crease_angle_deg, appearance)});
   Mesh& made = impl_->meshes.back();
   made.materials = appearance.materials;
   std::map<std::pair<int, bool>, ImageOnCard> on_card;  // an image once, as colors and as numbers
@@ -821,8 +821,8 @@ void Renderer::set_opacity(int number, double opacity) {
 }
 
 void Renderer::set_clip_planes(const std::vector<Plane>& planes) {
-  require(planes.size() <= most_clip_planes,
-          fmt::format("{} clip planes: at most {}", planes.size(), most_clip_planes));
+  require(planes.size() <= max_clip_planes,
+          fmt::format("{} clip planes: at most {}", planes.size(), max_clip_planes));
   impl_->clip_planes.clear();
   for (std::size_t i = 0; i < planes.size(); ++i) {
     require(planes[i].allFinite() && planes[i].head<3>().norm() > 0,

@@ -14,7 +14,7 @@
 namespace limber::render {
 
 // Holds for every picture of a renderer. Colours are sRGB, 0 … 1 a channel.
-struct Look {
+struct RenderSettings {
   int width = 1920, height = 1080;  // pixels, 1 … 8192
   int supersampling = 2;            // samples a pixel are this squared; 1 … 4
   // 4 samples a pixel that share one shading (MSAA); supersampling then counts for nothing. Not faster where
@@ -74,7 +74,7 @@ struct MeshLook {
 
 // A plane n·p + d = 0 as (n, d).
 using Plane = Eigen::Vector4d;
-constexpr int most_clip_planes = 6;
+constexpr int max_clip_planes = 6;
 
 // What the picture shows, apart from how it looks: of each pixel the sample nearest to the eye. Of opaque
 // meshes only; ground, lines and veils are left out. Row 0 is the top.
@@ -98,8 +98,8 @@ struct StageTimes {
 // One drawing context. A renderer stays in the thread that makes it; several work in several threads.
 class Renderer {
  public:
-  // Throws InputError when a field of Look is out of its range.
-  explicit Renderer(const Look&);
+  // Throws InputError when a field of RenderSettings is out of its range.
+  explicit Renderer(const RenderSettings&);
   ~Renderer();
   Renderer(const Renderer&) = delete;
   Renderer& operator=(const Renderer&) = delete;
@@ -126,7 +126,7 @@ class Renderer {
 
   // What lies where n·p + d < 0 for one of the planes is cut off all meshes and edges, not off other lines,
   // and casts no shadow. Insides seen through the cut are drawn flat and darker; meshes must be wound
-  // outwards for that. Throws InputError when there are more than most_clip_planes or a normal is zero.
+  // outwards for that. Throws InputError when there are more than max_clip_planes or a normal is zero.
   void set_clip_planes(const std::vector<Plane>&);
 
   // ends: row 2i to row 2i + 1. Lines are hidden by what is before them and cast no shadow.

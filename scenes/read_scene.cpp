@@ -124,7 +124,7 @@ void edit(Node& root, const std::string& set) {
         fmt::format("{}: there is no key=value; write for example --set planner.seed=7", source));
   if (!is_utf8(set)) throw InputError(fmt::format("{}: is no UTF-8; write it so, as the scene is", source));
   std::vector<std::string> parts = split_path(std::string_view(set).substr(0, equals));
-  if (constexpr std::size_t most_parts = 16; parts.size() > most_parts)
+  if (constexpr std::size_t max_parts = 16; parts.size() > max_parts)
     throw InputError(
         fmt::format("{}: its key has {} parts, and none of a scene has more than five; see docs/scene.md",
                     source, parts.size()));
@@ -230,13 +230,13 @@ std::vector<Box> read_boxes(const Node& table, std::string_view key) {
 }
 
 BlocksModel read_blocks(const Node& table, const std::string& what) {
-  constexpr std::size_t most_boxes = 32;
+  constexpr std::size_t max_boxes = 32;
   BlocksModel model{read_boxes(table, "solids"), read_boxes(table, "holes"), number(table, "bevel_m"), 0};
-  if (model.solids.empty() || model.solids.size() + model.holes.size() > most_boxes)
+  if (model.solids.empty() || model.solids.size() + model.holes.size() > max_boxes)
     complain(child(table, "solids"),
              fmt::format("{} has {} solids and {} holes; write one solid at least, and at "
                          "most {} boxes in all",
-                         what, model.solids.size(), model.holes.size(), most_boxes));
+                         what, model.solids.size(), model.holes.size(), max_boxes));
   if (const std::string fault = fault_of(model); !fault.empty())
     complain(table, fmt::format("{}: {}; move the boxes until it is one body", what, fault));
   Box bounds;
@@ -1029,8 +1029,8 @@ void require_plannable(const Scene& scene) {
 
 Scene read_scene_file(const fs::path& file, const std::vector<std::string>& sets, const fs::path& script) {
   ScriptText more;
-  if (!script.empty()) more = {read_file(script, most_scene_bytes), script.string()};
-  Scene scene = read_scene(read_file(file, most_scene_bytes), file.string(), sets, more);
+  if (!script.empty()) more = {read_file(script, max_scene_bytes), script.string()};
+  Scene scene = read_scene(read_file(file, max_scene_bytes), file.string(), sets, more);
   scene.folder = fs::absolute(file).parent_path();
   return scene;
 }

@@ -301,7 +301,7 @@ struct Scene {
 // name, and bodies.robot.friction is short for bodies.robot.material.friction. A value that is not TOML is
 // taken as a text. What `script` holds follows the scene's own lists. Throws InputError "NAME:line:column:
 // what; what to try" with the first complaint.
-inline constexpr std::uintmax_t most_scene_bytes = 16 << 20;
+inline constexpr std::uintmax_t max_scene_bytes = 16 << 20;
 Scene read_scene(const std::string& text, const std::string& name_for_messages,
                  const std::vector<std::string>& sets = {}, const ScriptText& script = {});
 // `script` is a file, or empty.

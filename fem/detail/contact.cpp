@@ -114,12 +114,12 @@ Contacts<Real>::Contacts(const World& world, const Kernels<Real>& kernels, int l
       if (world.bodies[a].pushed() || world.bodies[b].pushed()) pairs_.emplace_back(a, b);
   }
   for (const Body& body : world.bodies)
-    if (body.kind == BodyKind::rigid) bearings_.resize(world.bodies.size());
+    if (body.kind == BodyKind::rigid) effective_masses_.resize(world.bodies.size());
   lists_.resize(std::size_t(lanes) * pairs_.size());
   packed_.resize(std::size_t(world.nodes));
   sides_.resize(std::size_t(world.nodes));
   listed_.assign(std::size_t(world.nodes), 0);
-  touch_of_node_.assign(std::size_t(world.nodes), -1);
+  contact_of_node_.assign(std::size_t(world.nodes), -1);
 }
 
 template <class Real>
@@ -135,10 +135,10 @@ void Contacts<Real>::forget(int lane) {
 
 template <class Real>
 void Contacts<Real>::add_forces(int lane, const LaneView<Real>& view, Friction<Real>* friction) {
-  if (!bearings_.empty()) return add_forces_with_rigid(lane, view, friction);
+  if (!effective_masses_.empty()) return add_forces_with_rigid(lane, view, friction);
   for (const auto& [a, b] : pairs_) {
     if (view.sleeps(a) && view.sleeps(b)) continue;
-    for (const Touch<Real>& touch : find(lane, view, a, b)) respond(view, a, b, touch, friction);
+    for (const Contact<Real>& contact : find(lane, view, a, b)) respond(view, a, b, contact, friction);
   }
   add_wall_forces(view, friction);
 }
@@ -147,31 +147,33 @@ void Contacts<Real>::add_forces(int lane, const LaneView<Real>& view, Friction<R
 template <class Real>
 void Contacts<Real>::add_forces_with_rigid(int lane, const LaneView<Real>& view, Friction<Real>* friction) {
   held_.clear();
-  for (Bearing& bearing : bearings_) bearing.depths = 0;
+  for (EffectiveMass& effective_mass : effective_masses_) effective_mass.depths = 0;
   for (const auto& [a, b] : pairs_) {
     if (view.sleeps(a) && view.sleeps(b)) continue;
-    for (const Touch<Real>& touch : find(lane, view, a, b)) {
-      if (!(touch.depth > 0)) continue;
-      held_.push_back({a, b, touch});
-      bearings_[a].depths += double(touch.depth), bearings_[b].depths += double(touch.depth);
+    for (const Contact<Real>& contact : find(lane, view, a, b)) {
+      if (!(contact.depth > 0)) continue;
+      held_.push_back({a, b, contact});
+      effective_masses_[a].depths += double(contact.depth),
+          effective_masses_[b].depths += double(contact.depth);
     }
   }
   for (int body = 0; body < bodies_; ++body) {
-    Bearing& bearing = bearings_[body];
+    EffectiveMass& effective_mass = effective_masses_[body];
     if (world_.bodies[body].kind != BodyKind::rigid) continue;
-    for_each_beyond_wall(view, body, [&](int, int, Real, Real depth) { bearing.depths += double(depth); });
-    if (bearing.depths > 0) bearing.measure(view, topology_.bodies[body], tables_.node_mass);
+    for_each_beyond_wall(view, body,
+                         [&](int, int, Real, Real depth) { effective_mass.depths += double(depth); });
+    if (effective_mass.depths > 0) effective_mass.measure(view, topology_.bodies[body], tables_.node_mass);
   }
-  for (const Held& held : held_) respond(view, held.a, held.b, held.touch, friction);
+  for (const Held& held : held_) respond(view, held.a, held.b, held.contact, friction);
   add_wall_forces(view, friction);
 }
 
 template <class Real>
-const std::vector<Touch<Real>>& Contacts<Real>::find(int lane, const LaneView<Real>& view, int a, int b) {
-  touches_.clear();
+const std::vector<Contact<Real>>& Contacts<Real>::find(int lane, const LaneView<Real>& view, int a, int b) {
+  contacts_.clear();
   for (int c = 0; c < 3; ++c) {
     const int ka = (3 * a + c) * view.stride, kb = (3 * b + c) * view.stride;
-    if (view.lower[ka] > view.upper[kb] || view.lower[kb] > view.upper[ka]) return touches_;
+    if (view.lower[ka] > view.upper[kb] || view.lower[kb] > view.upper[ka]) return contacts_;
   }
   const auto pair = std::find(pairs_.begin(), pairs_.end(), std::pair(a, b));
   List& list = lists_[lane * pairs_.size() + std::size_t(pair - pairs_.begin())];
@@ -179,22 +181,22 @@ const std::vector<Touch<Real>>& Contacts<Real>::find(int lane, const LaneView<Re
   const Real travel = view.travel[a * view.stride] + view.travel[b * view.stride];
   refresh(view, a, b, reach, travel, list);
   for (int node : list.nodes) fetch(view, node, packed_[node].at);
-  const Span<Real> box_a(view, a), box_b(view, b);
+  const BodyBox<Real> box_a(view, a), box_b(view, b);
   find_points(box_b, reach, travel, list.points[0]);
   find_edges(box_b, reach, travel, a == b, list.edges[0]);
   if (a == b) {
-    for (Touch<Real>& touch : touches_) {
-      touch_of_node_[topology_.points[touch.point].node[0]] = -1;
-      leave_nearest_face(view, a, touch);
+    for (Contact<Real>& contact : contacts_) {
+      contact_of_node_[topology_.points[contact.point].node[0]] = -1;
+      leave_nearest_face(view, a, contact);
     }
-    return touches_;
+    return contacts_;
   }
-  const std::size_t second = touches_.size();
+  const std::size_t second = contacts_.size();
   find_points(box_a, reach, travel, list.points[1]);
   find_edges(box_a, reach, travel, false, list.edges[1]);
   measure_depths(view, a, b, 0, second);
-  measure_depths(view, b, a, second, touches_.size());
-  return touches_;
+  measure_depths(view, b, a, second, contacts_.size());
+  return contacts_;
 }
 
 // A list holds while the two bodies' nodes together have moved less than the reach it was built with; the
@@ -216,7 +218,7 @@ template <class Real>
 void Contacts<Real>::build_direction(const LaneView<Real>& view, int from, int into, Real reach, List& list,
                                      int direction) {
   const Topology::Body& other = topology_.bodies[into];
-  const Span<Real> box(view, into);
+  const BodyBox<Real> box(view, into);
   fetch_and_mark(view, from, box.lower, box.upper, reach);
   Slabs &points = slabs_[0], &edges = slabs_[1];
   const bool any_points = sort_near(from, false, reach, points),
@@ -291,10 +293,10 @@ bool Contacts<Real>::may_touch(const TetAndEdge& one, int index) const {
 // of a body that meet do so face to face. (The point's mesh edges are no guide: in a fold they lead round it
 // and out of the point's own skin.)
 template <class Real>
-void Contacts<Real>::leave_nearest_face(const LaneView<Real>& view, int index, Touch<Real>& touch) const {
+void Contacts<Real>::leave_nearest_face(const LaneView<Real>& view, int index, Contact<Real>& contact) const {
   const Topology::Body& body = topology_.bodies[index];
   Real p[3], outward[3] = {0, 0, 0}, nearest2 = std::numeric_limits<Real>::max();
-  place_of(touch.point, touch.share, p);
+  place_of(contact.point, contact.share, p);
   struct Face {
     Real corner[3][3], normal[3];
   };
@@ -310,7 +312,7 @@ void Contacts<Real>::leave_nearest_face(const LaneView<Real>& view, int index, T
     cross(s, t, face.normal);
     return face;
   };
-  for (const int node : topology_.points[touch.point].node) {
+  for (const int node : topology_.points[contact.point].node) {
     const Lists& faces = body.self.node_faces;
     for (int k = faces.begin[node - body.first_node]; k < faces.begin[node - body.first_node + 1]; ++k) {
       const Face face = face_of(faces.items[k]);
@@ -318,7 +320,7 @@ void Contacts<Real>::leave_nearest_face(const LaneView<Real>& view, int index, T
     }
   }
   const Lists& faces = body.self.near_faces;
-  const int tet = touch.tet - body.first_tet;
+  const int tet = contact.tet - body.first_tet;
   for (int k = faces.begin[tet]; k < faces.begin[tet + 1]; ++k) {
     const Face face = face_of(faces.items[k]);
     if (!(dot(face.normal, outward) < 0)) continue;
@@ -327,11 +329,12 @@ void Contacts<Real>::leave_nearest_face(const LaneView<Real>& view, int index, T
     const Real distance2 = dot(way, way), length = std::sqrt(dot(face.normal, face.normal));
     if (!(distance2 < nearest2) || !(length > 0)) continue;
     nearest2 = distance2;
-    touch.known = true;
-    touch.depth = std::sqrt(distance2);
+    contact.known = true;
+    contact.depth = std::sqrt(distance2);
     // On the surface the way has no direction; the face has.
-    const bool on_it = !(touch.depth > Real(1e-6) * std::sqrt(length));
-    for (int c = 0; c < 3; ++c) touch.direction[c] = on_it ? face.normal[c] / length : way[c] / touch.depth;
+    const bool on_it = !(contact.depth > Real(1e-6) * std::sqrt(length));
+    for (int c = 0; c < 3; ++c)
+      contact.direction[c] = on_it ? face.normal[c] / length : way[c] / contact.depth;
   }
 }
 
@@ -462,7 +465,7 @@ int Contacts<Real>::wake(const Near& near, Real travel) {
 // The first tet that contains a point, in ascending order, has it: what is on a shared face has one owner.
 // Middles count where an end is inside.
 template <class Real>
-void Contacts<Real>::find_points(const Span<Real>& box, Real reach, Real travel, Near& near) {
+void Contacts<Real>::find_points(const BodyBox<Real>& box, Real reach, Real travel, Near& near) {
   const int awake = wake(near, travel);
   kernels_.middle_distances(near.candidates.data(), awake_.data(), awake, packed_[0].at, distance_.data());
   int found = -1;
@@ -471,22 +474,22 @@ void Contacts<Real>::find_points(const Span<Real>& box, Real reach, Real travel,
     near.asleep_until[awake_[i]] = travel + kept * distance_[i] - rounding * reach;
     if (distance_[i] > certain * reach || one.point == found) continue;
     const bool vertex = one.from == one.to;
-    if (!vertex && touch_of_node_[one.from] < 0 && touch_of_node_[one.to] < 0) continue;
+    if (!vertex && contact_of_node_[one.from] < 0 && contact_of_node_[one.to] < 0) continue;
     if (!find_inside(box, one)) continue;
     found = one.point;
-    if (vertex) touch_of_node_[one.from] = int(touches_.size()) - 1;
+    if (vertex) contact_of_node_[one.from] = int(contacts_.size()) - 1;
   }
 }
 
 // A ridge with an end inside counts where its middle is in a tet; one with neither is cut by the planes of
 // each tet, and what is left of it is inside.
 template <class Real>
-void Contacts<Real>::find_edges(const Span<Real>& box, Real reach, Real travel, bool itself, Near& near) {
+void Contacts<Real>::find_edges(const BodyBox<Real>& box, Real reach, Real travel, bool itself, Near& near) {
   int awake = 0, with_end_inside = 0;
   for (int i = 0, count = wake(near, travel); i < count; ++i) {
     const int k = awake_[i];
     const bool inside =
-        touch_of_node_[near.candidates[k].from] >= 0 || touch_of_node_[near.candidates[k].to] >= 0;
+        contact_of_node_[near.candidates[k].from] >= 0 || contact_of_node_[near.candidates[k].to] >= 0;
     with_end_inside_[with_end_inside] = awake_[awake] = k;
     with_end_inside += inside, awake += !inside;
   }
@@ -520,24 +523,24 @@ void Contacts<Real>::find_edges(const Span<Real>& box, Real reach, Real travel, 
 
 // Whether the vertex, or the middle of the edge, is in the tet: then appends the touch.
 template <class Real>
-bool Contacts<Real>::find_inside(const Span<Real>& box, const TetAndEdge& one) {
+bool Contacts<Real>::find_inside(const BodyBox<Real>& box, const TetAndEdge& one) {
   const Topology::Point& point = topology_.points[one.point];
-  Touch<Real> touch{one.point, one.tet, {Real(point.share[0]), Real(point.share[1])}, {}, 0, {0, 0, 0},
-                    false,     false};
+  Contact<Real> contact{one.point, one.tet, {Real(point.share[0]), Real(point.share[1])}, {}, 0, {0, 0, 0},
+                        false,     false};
   Real p[3], sum = 0;
-  place_of(one.point, touch.share, p);
+  place_of(one.point, contact.share, p);
   if (!meets(p, p, box.lower, box.upper)) return false;
   const Topology::Tet& tet = topology_.tets[one.tet];
   for (int i = 0; i < 4; ++i) {
     const int* face = tet.face[i];
-    touch.weight[i] =
+    contact.weight[i] =
         Real(tet.sign[i]) * det_from(p, packed_[face[0]].at, packed_[face[1]].at, packed_[face[2]].at);
-    if (!(touch.weight[i] >= 0)) return false;
-    sum += touch.weight[i];
+    if (!(contact.weight[i] >= 0)) return false;
+    sum += contact.weight[i];
   }
   if (!(sum > 0)) return false;
-  for (Real& w : touch.weight) w /= sum;
-  touches_.push_back(touch);
+  for (Real& w : contact.weight) w /= sum;
+  contacts_.push_back(contact);
   return true;
 }
 
@@ -583,18 +586,18 @@ void Contacts<Real>::touch_of_stretches(int point) {
   const Stretch* owner = longest;
   for (const Stretch& s : stretches_)
     if (s.begin <= middle && middle <= s.end) owner = &s;
-  Touch<Real> touch{point, owner->tet, {1 - middle, middle}, {}, 0, {0, 0, 0}, false, true};
+  Contact<Real> contact{point, owner->tet, {1 - middle, middle}, {}, 0, {0, 0, 0}, false, true};
   Real sum = 0;
   for (int i = 0; i < 4; ++i) {
-    touch.weight[i] = touch.share[0] * owner->at_begin[i] + touch.share[1] * owner->at_end[i];
-    sum += touch.weight[i];
+    contact.weight[i] = contact.share[0] * owner->at_begin[i] + contact.share[1] * owner->at_end[i];
+    sum += contact.weight[i];
   }
-  for (Real& w : touch.weight) w /= sum;
+  for (Real& w : contact.weight) w /= sum;
   const int* node = topology_.points[point].node;
   Real way[3];
   for (int c = 0; c < 3; ++c) way[c] = packed_[node[1]].at[c] - packed_[node[0]].at[c];
-  touch.known = leave_over_ridge(*first, *last, way, touch);
-  touches_.push_back(touch);
+  contact.known = leave_over_ridge(*first, *last, way, contact);
+  contacts_.push_back(contact);
 }
 
 // An edge e that comes in through a face of normal n₁ and leaves through the next, of n₂, cuts off a piece of
@@ -603,7 +606,7 @@ void Contacts<Real>::touch_of_stretches(int point) {
 // away from one another.
 template <class Real>
 bool Contacts<Real>::leave_over_ridge(const Stretch& first, const Stretch& last, const Real way[3],
-                                      Touch<Real>& touch) const {
+                                      Contact<Real>& contact) const {
   constexpr Real least = Real(0.2);
   if (first.entry < 0 || last.exit < 0) return false;
   const Topology::Tet &in = topology_.tets[first.tet], &out = topology_.tets[last.tet];
@@ -628,8 +631,8 @@ bool Contacts<Real>::leave_over_ridge(const Stretch& first, const Stretch& last,
   for (int c = 0; c < 3; ++c) ridge[c] = across[1] * normal[0][c] + across[0] * normal[1][c];
   const Real length = std::sqrt(dot(ridge, ridge));
   if (!(length > least * (across[0] + across[1]))) return false;
-  touch.depth = (last.end - first.begin) * across[0] * across[1] / length;
-  for (int c = 0; c < 3; ++c) touch.direction[c] = ridge[c] / length;
+  contact.depth = (last.end - first.begin) * across[0] * across[1] / length;
+  for (int c = 0; c < 3; ++c) contact.direction[c] = ridge[c] / length;
   return true;
 }
 
@@ -643,55 +646,56 @@ void Contacts<Real>::measure_depths(const LaneView<Real>& view, int from, int in
   constexpr Real tiny = Real(1e-12);  // m², keeps 1/distance² finite
   std::size_t unknown = 0;
   for (std::size_t i = first; i < last; ++i) {
-    Touch<Real>& touch = touches_[i];
-    const Touch<Real> along_edges = leave_along_edges(view, touch);
+    Contact<Real>& contact = contacts_[i];
+    const Contact<Real> along_edges = leave_along_edges(view, contact);
     // An edge that lies under a flat face can come in and leave over the ridge of two faces beside it: then
     // that ridge is not the way out. (Over the ridge of a wedge of 60° the other depth is half as large.)
-    const bool elsewhere = along_edges.known && along_edges.depth < Real(0.4) * touch.depth;
-    if (!touch.known || elsewhere) touch = along_edges;
-    unknown += !touch.known;
+    const bool elsewhere = along_edges.known && along_edges.depth < Real(0.4) * contact.depth;
+    if (!contact.known || elsewhere) contact = along_edges;
+    unknown += !contact.known;
   }
   std::vector<std::size_t> layer;
   while (unknown > 0) {
     layer.clear();
     for (std::size_t i = first; i < last; ++i) {
-      Touch<Real>& touch = touches_[i];
-      if (touch.known) continue;
-      const Topology::Point& point = topology_.points[touch.point];
+      Contact<Real>& contact = contacts_[i];
+      if (contact.known) continue;
+      const Topology::Point& point = topology_.points[contact.point];
       Real p[3], sum = 0;
-      place_of(touch.point, touch.share, p);
+      place_of(contact.point, contact.share, p);
       for (int k = point.neighbor_begin; k < point.neighbor_end; ++k) {
-        const int other = touch_of_node_[topology_.neighbors[k]];
-        if (other < 0 || !touches_[other].known) continue;
+        const int other = contact_of_node_[topology_.neighbors[k]];
+        if (other < 0 || !contacts_[other].known) continue;
         Real way[3];
         fetch(view, topology_.neighbors[k], way);
         for (int c = 0; c < 3; ++c) way[c] -= p[c];
         const Real weight = 1 / (dot(way, way) + tiny);
         sum += weight;
-        touch.depth += weight * (dot(way, touches_[other].direction) + touches_[other].depth);
-        for (int c = 0; c < 3; ++c) touch.direction[c] += weight * touches_[other].direction[c];
+        contact.depth += weight * (dot(way, contacts_[other].direction) + contacts_[other].depth);
+        for (int c = 0; c < 3; ++c) contact.direction[c] += weight * contacts_[other].direction[c];
       }
-      if (finish(touch, sum)) layer.push_back(i);
+      if (finish(contact, sum)) layer.push_back(i);
     }
-    for (std::size_t i : layer) touches_[i].known = true;
+    for (std::size_t i : layer) contacts_[i].known = true;
     unknown -= layer.size();
     if (layer.empty()) break;
   }
   if (unknown > 0) leave_along_centers(view, from, into, first, last);
-  for (std::size_t i = first; i < last; ++i) touch_of_node_[topology_.points[touches_[i].point].node[0]] = -1;
+  for (std::size_t i = first; i < last; ++i)
+    contact_of_node_[topology_.points[contacts_[i].point].node[0]] = -1;
 }
 
 // The touch with the mean depth and direction of all ways out along mesh edges, weighted by 1/distance².
 template <class Real>
-Touch<Real> Contacts<Real>::leave_along_edges(const LaneView<Real>& view, Touch<Real> touch) {
+Contact<Real> Contacts<Real>::leave_along_edges(const LaneView<Real>& view, Contact<Real> contact) {
   constexpr Real tiny = Real(1e-12);  // m², keeps 1/distance² finite
-  touch.depth = 0;
-  for (Real& d : touch.direction) d = 0;
-  const Topology::Point& point = topology_.points[touch.point];
-  const Topology::Tet& tet = topology_.tets[touch.tet];
+  contact.depth = 0;
+  for (Real& d : contact.direction) d = 0;
+  const Topology::Point& point = topology_.points[contact.point];
+  const Topology::Tet& tet = topology_.tets[contact.tet];
   const Cell cell(view, tet);
   WayOut<Real> from;
-  place_of(touch.point, touch.share, from.place);
+  place_of(contact.point, contact.share, from.place);
   Real outward[4][3];
   for (int i = 0; i < 4; ++i) {
     const Real* on_face = cell.place[(i + 1) % 4];
@@ -722,29 +726,29 @@ Touch<Real> Contacts<Real>::leave_along_edges(const LaneView<Real>& view, Touch<
     if (const int next = tet.across[exit]; next < 0) {
       const Real share = std::max(share_[k], Real(0));
       for (int c = 0; c < 3; ++c) way[c] = share * (end[c] - from.place[c]), normal[c] = outward[exit][c];
-    } else if (!walk_out(view, next, touch.tet, from.place, end, way, normal)) {
+    } else if (!walk_out(view, next, contact.tet, from.place, end, way, normal)) {
       continue;
     }
     const Real weight = 1 / (dot(way, way) + tiny);
     sum += weight;
-    touch.depth += weight * dot(way, normal);
-    for (int c = 0; c < 3; ++c) touch.direction[c] += weight * normal[c];
+    contact.depth += weight * dot(way, normal);
+    for (int c = 0; c < 3; ++c) contact.direction[c] += weight * normal[c];
   }
-  touch.known = finish(touch, sum);
-  return touch;
+  contact.known = finish(contact, sum);
+  return contact;
 }
 
 // Divides the weighted sums; false when there was nothing to sum, or the directions cancelled.
 template <class Real>
-bool Contacts<Real>::finish(Touch<Real>& touch, Real sum) {
-  const Real length = std::sqrt(dot(touch.direction, touch.direction));
+bool Contacts<Real>::finish(Contact<Real>& contact, Real sum) {
+  const Real length = std::sqrt(dot(contact.direction, contact.direction));
   if (sum > 0 && length > Real(1e-3) * sum) {
-    touch.depth /= sum;
-    for (Real& d : touch.direction) d /= length;
+    contact.depth /= sum;
+    for (Real& d : contact.direction) d /= length;
     return true;
   }
-  touch.depth = 0;
-  for (Real& d : touch.direction) d = 0;
+  contact.depth = 0;
+  for (Real& d : contact.direction) d = 0;
   return false;
 }
 
@@ -762,15 +766,15 @@ void Contacts<Real>::leave_along_centers(const LaneView<Real>& view, int from, i
   if (!(dot(line, line) > Real(1e-8) * size2)) line[0] = 0, line[1] = 0, line[2] = 1;
   const Real scale = 2 * std::sqrt(size2 / dot(line, line));
   for (std::size_t i = first; i < last; ++i) {
-    Touch<Real>& touch = touches_[i];
-    if (touch.known) continue;
+    Contact<Real>& contact = contacts_[i];
+    if (contact.known) continue;
     Real p[3], far[3], way[3], normal[3];
-    place_of(touch.point, touch.share, p);
+    place_of(contact.point, contact.share, p);
     for (int c = 0; c < 3; ++c) far[c] = p[c] + scale * line[c];
-    touch.known = walk_out(view, touch.tet, -1, p, far, way, normal);
-    if (!touch.known) continue;
-    touch.depth = dot(way, normal);
-    std::copy_n(normal, 3, touch.direction);
+    contact.known = walk_out(view, contact.tet, -1, p, far, way, normal);
+    if (!contact.known) continue;
+    contact.depth = dot(way, normal);
+    std::copy_n(normal, 3, contact.direction);
   }
 }
 
@@ -780,9 +784,9 @@ void Contacts<Real>::leave_along_centers(const LaneView<Real>& view, int from, i
 template <class Real>
 bool Contacts<Real>::walk_out(const LaneView<Real>& view, int tet, int before, const Real p[3],
                               const Real q[3], Real way[3], Real normal[3]) const {
-  constexpr int most_tets = 256;  // inverted tets can lead in circles
+  constexpr int max_tets = 256;  // inverted tets can lead in circles
   const Real move[3] = {q[0] - p[0], q[1] - p[1], q[2] - p[2]};
-  for (int walked = 0; walked < most_tets; ++walked) {
+  for (int walked = 0; walked < max_tets; ++walked) {
     const Cell cell(view, topology_.tets[tet]);
     Real soonest = 1;
     int exit = -1;
@@ -809,14 +813,14 @@ bool Contacts<Real>::walk_out(const LaneView<Real>& view, int tet, int before, c
 }
 
 template <class Real>
-void Contacts<Real>::respond(const LaneView<Real>& view, int a, int b, const Touch<Real>& touch,
+void Contacts<Real>::respond(const LaneView<Real>& view, int a, int b, const Contact<Real>& contact,
                              Friction<Real>* friction) const {
-  if (!(touch.depth > 0)) return;
-  const Topology::Point& point = topology_.points[touch.point];
-  const int* corner = topology_.tets[touch.tet].node;
+  if (!(contact.depth > 0)) return;
+  const Topology::Point& point = topology_.points[contact.point];
+  const int* corner = topology_.tets[contact.tet].node;
   const int node[6] = {point.node[0], point.node[1], corner[0], corner[1], corner[2], corner[3]};
-  const Real share[6] = {touch.share[0],   touch.share[1],   -touch.weight[0],
-                         -touch.weight[1], -touch.weight[2], -touch.weight[3]};
+  const Real share[6] = {contact.share[0],   contact.share[1],   -contact.weight[0],
+                         -contact.weight[1], -contact.weight[2], -contact.weight[3]};
   Real relative[3] = {0, 0, 0}, place[3] = {0, 0, 0};
   for (int i = 0; i < 6; ++i)
     for (int c = 0; c < 3; ++c) {
@@ -833,23 +837,24 @@ void Contacts<Real>::respond(const LaneView<Real>& view, int a, int b, const Tou
   if (!any_rigid && !(inverse_mass > 0)) return;
   for (const int body : side)
     if (world_.bodies[body].kind == BodyKind::rigid)
-      inverse_mass += Real(bearings_[body].inverse_mass(place, touch.direction, touch.depth));
+      inverse_mass += Real(effective_masses_[body].inverse_mass(place, contact.direction, contact.depth));
   const Real beta = Real(point.share[1] > 0 ? contact_edge_beta : contact_beta);
-  const Real push = penalty_push(beta, touch.depth, dot(relative, touch.direction), 1 / inverse_mass, step_);
+  const Real push =
+      penalty_push(beta, contact.depth, dot(relative, contact.direction), 1 / inverse_mass, step_);
   if (!(push > 0)) return;
   Real force[3];
-  for (int c = 0; c < 3; ++c) force[c] = push * touch.direction[c];
+  for (int c = 0; c < 3; ++c) force[c] = push * contact.direction[c];
   for (int i = 0; i < 6; ++i)
     if (tables_.inverse_mass[node[i]] > 0)
       for (int c = 0; c < 3; ++c) view.f[view.force.at(node[i], c)] += share[i] * force[c];
-  if (told_)
-    told_->push_back(
-        {side[0], side[1], {place[0], place[1], place[2]}, touch.depth, {force[0], force[1], force[2]}});
+  if (records_)
+    records_->push_back(
+        {side[0], side[1], {place[0], place[1], place[2]}, contact.depth, {force[0], force[1], force[2]}});
   if (!friction) return;
   Share<Real> shares[6];
   for (int i = 0; i < 6; ++i) shares[i] = {node[i], share[i]};
-  friction->add(side[0], side[1], place, touch.direction, tables_.pair_friction[a * bodies_ + b] * push,
-                shares, shares + 2, shares + 6, told_ ? int(told_->size()) - 1 : -1);
+  friction->add(side[0], side[1], place, contact.direction, tables_.pair_friction[a * bodies_ + b] * push,
+                shares, shares + 2, shares + 6, records_ ? int(records_->size()) - 1 : -1);
 }
 
 // Calls each(node, axis, the wall's normal along it, depth).
@@ -880,21 +885,21 @@ void Contacts<Real>::add_wall_forces(const LaneView<Real>& view, Friction<Real>*
       normal[axis] = out;
       fetch(view, n, place);
       const Real mass =
-          rigid ? Real(1 / bearings_[body].inverse_mass(place, normal, depth)) : tables_.node_mass[n];
+          rigid ? Real(1 / effective_masses_[body].inverse_mass(place, normal, depth)) : tables_.node_mass[n];
       const Real push =
           penalty_push(Real(contact_beta), depth, out * view.v[view.state.at(n, axis)], mass, step_);
       if (!(push > 0)) return;
       view.f[view.force.at(n, axis)] += out * push;
-      if (told_)
-        told_->push_back({body,
-                          -1,
-                          {place[0], place[1], place[2]},
-                          depth,
-                          {push * normal[0], push * normal[1], push * normal[2]}});
+      if (records_)
+        records_->push_back({body,
+                             -1,
+                             {place[0], place[1], place[2]},
+                             depth,
+                             {push * normal[0], push * normal[1], push * normal[2]}});
       if (!friction) return;
       const Share<Real> share{n, 1};
       friction->add(body, -1, place, normal, tables_.pair_friction[body * bodies_ + body] * push, &share,
-                    &share + 1, &share + 1, told_ ? int(told_->size()) - 1 : -1);
+                    &share + 1, &share + 1, records_ ? int(records_->size()) - 1 : -1);
     });
   }
 }

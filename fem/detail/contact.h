@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "core/types.h"
-#include "fem/detail/bearing.h"
+#include "fem/detail/effective_mass.h"
 #include "fem/detail/friction.h"
 #include "fem/detail/lane_view.h"
 #include "fem/detail/penalty.h"
@@ -20,7 +20,7 @@ namespace limber::fem::detail {
 // A contact point inside a tet of another body: a vertex; the middle of an edge that has an end inside; or,
 // of an edge that passes through, the middle of the stretch inside. All follows from the present positions.
 template <class Real>
-struct Touch {
+struct Contact {
   int point, tet;     // of the world's points and tets
   Real share[2];      // of the point's two nodes
   Real weight[4];     // barycentric coordinates of the point in the tet
@@ -32,9 +32,9 @@ struct Touch {
 
 // The box of a body.
 template <class Real>
-struct Span {
+struct BodyBox {
   Real lower[3], upper[3];
-  Span(const LaneView<Real>& view, int body) {
+  BodyBox(const LaneView<Real>& view, int body) {
     for (int c = 0; c < 3; ++c) {
       lower[c] = view.lower[(3 * body + c) * view.stride];
       upper[c] = view.upper[(3 * body + c) * view.stride];
@@ -51,11 +51,11 @@ class Contacts {
   // are.
   void add_forces(int lane, const LaneView<Real>& view, Friction<Real>* friction = nullptr);
   // From now on add_forces also appends to this list, unless null.
-  void tell(std::vector<Exerted<Real>>* list) { told_ = list; }
+  void record_to(std::vector<ContactRecord<Real>>* list) { records_ = list; }
   // The touches of bodies a and b, a ≤ b: of a in b vertices and edges with an end inside, then edges that
   // pass through, each ascending; then those of b in a; of a body with itself
   // vertices and edges with an end inside only. For tests and observables; valid until the next call.
-  const std::vector<Touch<Real>>& find(int lane, const LaneView<Real>& view, int a, int b);
+  const std::vector<Contact<Real>>& find(int lane, const LaneView<Real>& view, int a, int b);
 
  private:
   // Points, or ridges (named by their middles' points), and the tets of the other body near them: ascending
@@ -102,7 +102,7 @@ class Contacts {
   void place_of(int point, const Real share[2], Real out[3]) const;  // from packed_
   void refresh(const LaneView<Real>&, int a, int b, Real reach, Real travel, List&);
   bool may_touch(const TetAndEdge&, int body) const;
-  void leave_nearest_face(const LaneView<Real>&, int body, Touch<Real>&) const;
+  void leave_nearest_face(const LaneView<Real>&, int body, Contact<Real>&) const;
   void build_direction(const LaneView<Real>&, int from, int into, Real reach, List&, int direction);
   void fetch_and_mark(const LaneView<Real>&, int body, const Real lower[3], const Real upper[3], Real reach);
   bool apart(int node, int other) const;
@@ -110,20 +110,20 @@ class Contacts {
   void collect_near(const TetAndEdge& tet, const TetPlanes<Real>&, int column, Real reach);
   void list_found(const Slabs&, int from, Real reach, List&, Near&);
   int wake(const Near&, Real travel);
-  void find_points(const Span<Real>& box, Real reach, Real travel, Near&);
-  void find_edges(const Span<Real>& box, Real reach, Real travel, bool itself, Near&);
-  bool find_inside(const Span<Real>& box, const TetAndEdge&);
+  void find_points(const BodyBox<Real>& box, Real reach, Real travel, Near&);
+  void find_edges(const BodyBox<Real>& box, Real reach, Real travel, bool itself, Near&);
+  bool find_inside(const BodyBox<Real>& box, const TetAndEdge&);
   void cut_edge(const Real* p, const Real* q, int tet);
   void touch_of_stretches(int point);
-  bool leave_over_ridge(const Stretch& first, const Stretch& last, const Real way[3], Touch<Real>&) const;
+  bool leave_over_ridge(const Stretch& first, const Stretch& last, const Real way[3], Contact<Real>&) const;
   void measure_depths(const LaneView<Real>&, int from, int into, std::size_t first, std::size_t last);
   void leave_along_centers(const LaneView<Real>&, int from, int into, std::size_t first, std::size_t last);
-  static bool finish(Touch<Real>&, Real sum);
-  Touch<Real> leave_along_edges(const LaneView<Real>&, Touch<Real>);
+  static bool finish(Contact<Real>&, Real sum);
+  Contact<Real> leave_along_edges(const LaneView<Real>&, Contact<Real>);
   bool walk_out(const LaneView<Real>&, int tet, int before, const Real p[3], const Real q[3], Real way[3],
                 Real normal[3]) const;
   void add_forces_with_rigid(int lane, const LaneView<Real>&, Friction<Real>*);
-  void respond(const LaneView<Real>&, int a, int b, const Touch<Real>&, Friction<Real>*) const;
+  void respond(const LaneView<Real>&, int a, int b, const Contact<Real>&, Friction<Real>*) const;
   template <class Each>
   void for_each_beyond_wall(const LaneView<Real>&, int body, const Each&) const;
   void add_wall_forces(const LaneView<Real>&, Friction<Real>*) const;
@@ -133,22 +133,22 @@ class Contacts {
   const Tables<Real>& tables_;
   const Kernels<Real>& kernels_;
   int bodies_;
-  std::vector<Exerted<Real>>* told_ = nullptr;
+  std::vector<ContactRecord<Real>>* records_ = nullptr;
   Real step_;  // the step from which stiffness follows
   std::vector<std::pair<int, int>> pairs_;
   // Where there are rigid bodies that move: a body, in the lane at hand; and all touches of that, with their
   // bodies.
-  std::vector<Bearing> bearings_;
+  std::vector<EffectiveMass> effective_masses_;
   struct Held {
     int a, b;
-    Touch<Real> touch;
+    Contact<Real> contact;
   };
   std::vector<Held> held_;
   std::vector<List> lists_;  // [lane × pairs + pair]
-  std::vector<Touch<Real>> touches_;
-  std::vector<Place> packed_;       // by world node; valid for the nodes of the list at hand
-  std::vector<int> touch_of_node_;  // index into touches_ of a vertex, until depths are measured, else −1
-  std::vector<Stretch> stretches_;  // of the edge at hand
+  std::vector<Contact<Real>> contacts_;
+  std::vector<Place> packed_;         // by world node; valid for the nodes of the list at hand
+  std::vector<int> contact_of_node_;  // index into contacts_ of a vertex, until depths are measured, else −1
+  std::vector<Stretch> stretches_;    // of the edge at hand
   // Of the candidates at hand: those awake, of these those with an end inside, and how far they are apart.
   std::vector<int> awake_, with_end_inside_;
   std::vector<Real> distance_;

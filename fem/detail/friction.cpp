@@ -11,7 +11,7 @@ namespace {
 
 // Places are gone through so often at most, and until no impulse changes by more than this share of its
 // limit.
-constexpr int most_sweeps = 12;
+constexpr int max_sweeps = 12;
 constexpr float settled = 1e-3f;
 
 void times(const double symmetric[6], const double t[3], double out[3]) {  // xx xy xz yy yz zz
@@ -61,14 +61,14 @@ int Friction<Real>::slot_of(int node, int body) {
 template <class Real>
 void Friction<Real>::add(int body, int against, const Real place[3], const Real normal[3], Real most,
                          const Share<Real>* first, const Share<Real>* second, const Share<Real>* last,
-                         int told, Real told_share) {
+                         int records, Real told_share) {
   if (!(most > 0)) return;
-  if (against < 0 && !is_rigid(body)) return bear(body, normal, dt_ * most, first, last, told);
+  if (against < 0 && !is_rigid(body)) return bear(body, normal, dt_ * most, first, last, records);
   Slip& slip = slips_.emplace_back();
   slip.side[0] = body, slip.side[1] = against;
   std::copy_n(place, 3, slip.place), std::copy_n(normal, 3, slip.normal);
   std::fill_n(slip.impulse, 3, Real(0));
-  slip.most = dt_ * most, slip.told = told, slip.told_share = told_share;
+  slip.most = dt_ * most, slip.records = records, slip.told_share = told_share;
   slip.first = int(shares_.size()), slip.inverse_mass = 0;
   const int second_share = slip.first + int(second - first);
   slip.last = slip.first + int(last - first);
@@ -86,7 +86,7 @@ void Friction<Real>::add(int body, int against, const Real place[3], const Real 
 
 template <class Real>
 void Friction<Real>::bear(int body, const Real normal[3], Real most, const Share<Real>* first,
-                          const Share<Real>* last, int told) {
+                          const Share<Real>* last, int records) {
   int axis = 0;
   while (axis < 2 && normal[axis] == 0) ++axis;
   const int side = normal[axis] > 0 ? axis : 3 + axis, first_share = int(wall_shares_.size());
@@ -99,9 +99,9 @@ void Friction<Real>::bear(int body, const Real normal[3], Real most, const Share
       wall_nodes_.push_back({slot, body, side, 0, 0, false, {0, 0, 0}});
     }
     wall_nodes_[std::size_t(wall_node)].load += share->weight * most;
-    if (told >= 0) wall_shares_.push_back({wall_node, share->weight * most});
+    if (records >= 0) wall_shares_.push_back({wall_node, share->weight * most});
   }
-  if (told >= 0) wall_tellings_.push_back({told, first_share, int(wall_shares_.size())});
+  if (records >= 0) wall_tellings_.push_back({records, first_share, int(wall_shares_.size())});
 }
 
 // Weights of Phong Deformation may be negative, and so may what a node bears in all; it then holds nothing,
@@ -147,10 +147,10 @@ void Friction<Real>::predict(const LaneView<Real>& view, const std::vector<const
     Spin& spin = spins_[b];
     if (!spin.met) continue;
     const Topology::Body& body = world_.topology.bodies[b];
-    Bearing bearing;
-    bearing.measure(view, body, tables_.node_mass);
-    spin.inverse_mass = bearing.inverse_mass(), std::copy_n(bearing.center(), 3, spin.center);
-    std::copy_n(bearing.inverse_inertia(), 6, spin.inverse_inertia);
+    EffectiveMass effective_mass;
+    effective_mass.measure(view, body, tables_.node_mass);
+    spin.inverse_mass = effective_mass.inverse_mass(), std::copy_n(effective_mass.center(), 3, spin.center);
+    std::copy_n(effective_mass.inverse_inertia(), 6, spin.inverse_inertia);
     double momentum[3] = {0, 0, 0}, angular[3] = {0, 0, 0};
     for (int n = body.first_node; n < body.last_node; ++n) {
       double r[3], p[3], l[3];
@@ -268,12 +268,12 @@ Real Friction<Real>::step_of(WallNode& node) {
 
 template <class Real>
 void Friction<Real>::add_forces(const LaneView<Real>& view, const std::vector<const Real*>& pushes,
-                                std::vector<Exerted<Real>>* told) {
+                                std::vector<ContactRecord<Real>>* records) {
   if (slips_.empty() && wall_nodes_.empty()) return;
   predict(view, pushes), limit_wall_nodes();
   for (WallNode& node : wall_nodes_)
     if (!node.meets_others) step_of(node);
-  for (int sweep = 0; sweep < most_sweeps; ++sweep) {
+  for (int sweep = 0; sweep < max_sweeps; ++sweep) {
     Real most = 0;
     for (Slip& slip : slips_) most = std::max(most, step_of(slip));
     for (WallNode& node : wall_nodes_)
@@ -291,15 +291,16 @@ void Friction<Real>::add_forces(const LaneView<Real>& view, const std::vector<co
       if (!(tables_.inverse_mass[node] > 0)) continue;
       for (int c = 0; c < 3; ++c) view.f[view.force.at(node, c)] += share.weight * force[c];
     }
-    if (told && slip.told >= 0)
-      for (int c = 0; c < 3; ++c) (*told)[std::size_t(slip.told)].force[c] += slip.told_share * force[c];
+    if (records && slip.records >= 0)
+      for (int c = 0; c < 3; ++c)
+        (*records)[std::size_t(slip.records)].force[c] += slip.told_share * force[c];
   }
   for (const WallTelling& telling : wall_tellings_)
-    for (int k = telling.first; told && k < telling.last; ++k) {
+    for (int k = telling.first; records && k < telling.last; ++k) {
       const auto [wall_node, most] = wall_shares_[std::size_t(k)];
       const WallNode& node = wall_nodes_[std::size_t(wall_node)];
       for (int c = 0; c < 3 && node.load > 0; ++c)
-        (*told)[std::size_t(telling.told)].force[c] += most / node.load * node.impulse[c] / dt_;
+        (*records)[std::size_t(telling.records)].force[c] += most / node.load * node.impulse[c] / dt_;
     }
 }
 

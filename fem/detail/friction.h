@@ -8,7 +8,7 @@
 #include <array>
 #include <vector>
 
-#include "fem/detail/bearing.h"
+#include "fem/detail/effective_mass.h"
 #include "fem/detail/lane_view.h"
 #include "fem/detail/penalty.h"
 #include "fem/detail/tables.h"
@@ -30,12 +30,12 @@ class Friction {
   // of the other. `told` is where among what is told the force is to be added, times `told_share`; −1:
   // nowhere.
   void add(int body, int against, const Real place[3], const Real normal[3], Real most,
-           const Share<Real>* first, const Share<Real>* second, const Share<Real>* last, int told = -1,
+           const Share<Real>* first, const Share<Real>* second, const Share<Real>* last, int records = -1,
            Real told_share = 1);
   // When view.f holds all other forces: adds those of friction, and to what was told. `pushes` [body] as of
   // Motion, at the lane, or null.
   void add_forces(const LaneView<Real>& view, const std::vector<const Real*>& pushes,
-                  std::vector<Exerted<Real>>* told);
+                  std::vector<ContactRecord<Real>>* records);
 
  private:
   // x y z and nothing: added and scaled at once.
@@ -62,7 +62,7 @@ class Friction {
     Real place[3], normal[3], most;
     Real inverse_mass;  // of what is not rigid
     Real impulse[3];    // on `body`, square to the normal
-    int told;
+    int records;
     Real told_share;
   };
   // A node of a soft body and one of the walls, 0 … 2 the lower ones, 3 … 5 the upper.
@@ -75,7 +75,7 @@ class Friction {
   // Where the friction of a place at a wall is to be added: its shares, from `first` on, to what wall nodes
   // bear.
   struct WallTelling {
-    int told, first, last;
+    int records, first, last;
   };
   struct WallShare {
     int wall_node;
@@ -93,7 +93,7 @@ class Friction {
   bool is_rigid(int body) const;
   int slot_of(int node, int body);
   void bear(int body, const Real normal[3], Real most, const Share<Real>* first, const Share<Real>* last,
-            int told);
+            int records);
   void limit_wall_nodes();
   Real step_of(WallNode&);
   void predict(const LaneView<Real>& view, const std::vector<const Real*>& pushes);

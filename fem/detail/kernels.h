@@ -145,11 +145,11 @@ struct WayOut {
 // When a body stands still, [lane].
 template <class Real>
 struct Rest {
-  Real most_speed2;                      // largest |v|² of a node, before and after
-  Real most_gain2, most_gain2_of_still;  // largest |Δv|², where it moved, and where it stood still
+  Real max_speed2;                     // largest |v|² of a node, before and after
+  Real max_gain2, max_gain2_of_still;  // largest |Δv|², where it moved, and where it stood still
   // The same where it may touch something: contact's rounding shakes single nodes, so of each by this, and of
   // their mean by so much.
-  Real most_shake2, most_mean_gain2, most_mean_gain2_of_still;
+  Real max_shake2, max_mean_gain2, max_mean_gain2_of_still;
   const Real *asleep, *speed2_before, *touches;
   Real* stands;  // out: v is 0 now and x as before; `asleep` and `stands` are 0 or 1
 };

@@ -19,7 +19,7 @@ using Triplets = std::vector<Eigen::Triplet<double>>;
 using Vector = Eigen::VectorXd;
 using Solver = Eigen::SimplicialLDLT<Sparse>;
 
-constexpr int most_refined_tets = 1500, most_tets = 20000;
+constexpr int max_refined_tets = 1500, max_tets = 20000;
 constexpr int modes = 4, rigid_modes = 6;
 // Where edges are held, what is missing falls as h^1.4 (stress is singular there), and so by 2.6 when tets
 // are cut.
@@ -408,7 +408,7 @@ Points balanced(const Level& level, const Freedoms& coarse, const std::vector<Po
 double locking_share(const TetMesh& rest, const std::vector<bool>& fixed, const std::vector<Lame>& of_tet,
                      const std::vector<double>& node_mass, const ElementTables<double>& elements) {
   const int tets = int(rest.tets.rows()), nodes = int(rest.positions.rows());
-  if (tets > most_tets) return 1;
+  if (tets > max_tets) return 1;
   const Freedoms coarse(fixed);
   const double hold = coarse.count < 3 * nodes ? 0 : hold_free;
   Sparse stiffness = stiffness_at_rest(elements, rest, of_tet, coarse);
@@ -431,7 +431,7 @@ double locking_share(const TetMesh& rest, const std::vector<bool>& fixed, const 
   Sparse same(nodes, nodes);
   same.setIdentity();
   levels.emplace_back(rest, same, fixed, of_tet, coarse);
-  if (tets <= most_refined_tets) {
+  if (tets <= max_refined_tets) {
     const Middles middles = middles_of(rest);
     std::vector<Lame> of_part;
     for (const Lame& lame : of_tet) of_part.insert(of_part.end(), 8, lame);

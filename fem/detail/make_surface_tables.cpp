@@ -102,7 +102,7 @@ double bend_factor_of(const Body& body, const Tables64& tables) {
 void append(const Body& body, const Topology& topology, Tables64& tables, Tables64::Body& out) {
   const ContactShape& shape = *body.shape;
   const int tets = int(body.cage.tets.rows());
-  LIMBER_CHECK(shape.least_weight.rows() == tets, shape.least_weight.rows(), tets);
+  LIMBER_CHECK(shape.min_weight.rows() == tets, shape.min_weight.rows(), tets);
   out.field = {shape.field.values.data(), {}, {}, 1 / shape.field.cell_m, shape.field.unit_m};
   for (int c = 0; c < 3; ++c)
     out.field.nodes[c] = shape.field.nodes[std::size_t(c)], out.field.lower[c] = shape.field.lower_m[c];
@@ -113,7 +113,7 @@ void append(const Body& body, const Topology& topology, Tables64& tables, Tables
   for (int t = 0; t < tets; ++t) {
     const int tet = body.first_tet + t;
     const Tables64::Core& core = tables.cores.emplace_back(
-        core_of(body.cage.positions, body.cage.tets, t, shape.least_weight, tables.core_reach));
+        core_of(body.cage.positions, body.cage.tets, t, shape.min_weight, tables.core_reach));
     if (core.scale > 0) {
       out.cored_tets.push_back(tet);
       out.reach_factor = std::max(out.reach_factor, reach_factor(core));

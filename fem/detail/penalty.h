@@ -44,7 +44,7 @@ struct Share {
 
 // A force that a contact or a wall gave, for those who ask.
 template <class Real>
-struct Exerted {
+struct ContactRecord {
   int body, against;  // whose point, on whom; against −1: a wall
   Real place[3], depth, force[3];
 };

@@ -20,7 +20,7 @@ using Positions = std::vector<float>;  // of all nodes that move
 // How far the surfaces of two bodies are apart, up to the offset asked for; negative: how deep. And where.
 struct Gap {
   double gap_m;
-  std::optional<SurfaceTouch<double>> nearest;          // nothing: no nearer than that offset
+  std::optional<SurfaceContact<double>> nearest;        // nothing: no nearer than that offset
   std::vector<SurfaceTables<double>::Share> shares[2];  // of it: of the sample's side, of the other
 };
 using Gaps = std::vector<Gap>;  // [body a × bodies + body b], on the diagonal of a body and itself
@@ -45,16 +45,18 @@ Gaps gaps(const World& world, double offset_m, const Positions& positions) {
   }
   constexpr Layout rows{3, 1};
   SurfaceContacts<double> contacts(world, kernels<double>(best_isa(), 1), 1);
-  for (const auto& touch : contacts.find(0, {x.data(), still.data(), forces.data(), rows, rows, 1,
-                                             lower.data(), upper.data(), travel.data(), travel.data()})) {
-    if (touch.against < 0) continue;
-    const std::size_t one = std::size_t(touch.body), other = std::size_t(touch.against);
-    if (const double gap = offset_m - touch.depth; gap < gaps[one * bodies + other].gap_m)
-      gaps[one * bodies + other] = gaps[other * bodies + one] = {
-          gap,
-          touch,
-          {{contacts.shares().begin() + touch.first_share, contacts.shares().begin() + touch.first_against},
-           {contacts.shares().begin() + touch.first_against, contacts.shares().begin() + touch.last_share}}};
+  for (const auto& contact : contacts.find(0, {x.data(), still.data(), forces.data(), rows, rows, 1,
+                                               lower.data(), upper.data(), travel.data(), travel.data()})) {
+    if (contact.against < 0) continue;
+    const std::size_t one = std::size_t(contact.body), other = std::size_t(contact.against);
+    if (const double gap = offset_m - contact.depth; gap < gaps[one * bodies + other].gap_m)
+      gaps[one * bodies + other] =
+          gaps[other * bodies + one] = {gap,
+                                        contact,
+                                        {{contacts.shares().begin() + contact.first_share,
+                                          contacts.shares().begin() + contact.first_against},
+                                         {contacts.shares().begin() + contact.first_against,
+                                          contacts.shares().begin() + contact.last_share}}};
   }
   return gaps;
 }
@@ -70,9 +72,9 @@ constexpr double gentle_push = 0.25, firm_push = 1, apart = 0.25, at_rest = 0.02
 // No more than that share of the smaller body's size is parted: beyond, the nearest way out leads anywhere.
 constexpr double deepest_share = 0.25;
 // Stages without less overlap before more is done about it, and stages after all are apart.
-constexpr int patience = 24, most_resting_stages = 60;
-constexpr int least_steps = 24, most_steps = 400;  // of a stage that goes on to its end
-constexpr int most_steps_in_all = 100000;
+constexpr int patience = 24, max_resting_stages = 60;
+constexpr int min_steps = 24, max_steps = 400;  // of a stage that goes on to its end
+constexpr int max_steps_in_all = 100000;
 constexpr int steps_between_looks = 4;  // at speeds, and at the wish to stop
 
 // One and a half times what a wave needs through the slowest body: then its lowest mode is where it wants to
@@ -87,7 +89,7 @@ int steps_of_stage(const World& world) {
           std::min(slowest, std::sqrt(body.youngs_modulus_from_tet_pa[t] / body.density_from_tet_kg_m3[t]));
     longest_s = std::max(longest_s, bounding_box(body.cage.positions).size().maxCoeff() / slowest);
   }
-  return int(std::clamp(1.5 * longest_s / world.dt_s, double(least_steps), double(most_steps)));
+  return int(std::clamp(1.5 * longest_s / world.dt_s, double(min_steps), double(max_steps)));
 }
 
 // Dynamic relaxation with kinetic damping (Cundall 1976; Barnes 1999): the world is stepped without gravity,
@@ -116,7 +118,7 @@ class Parter {
     Progress progress("parting bodies that overlap", 0);
     state_ = rest_state(world_);
     Batch batch(world_, 1);
-    double push = gentle_push, least_lack = std::numeric_limits<double>::infinity();
+    double push = gentle_push, min_lack = std::numeric_limits<double>::infinity();
     int waited = 0, resting = 0;
     bool calm = false;  // the last stage moved nothing
     while (true) {
@@ -128,18 +130,17 @@ class Parter {
       }
       const bool to_its_end = calm;
       calm = take_stage(batch, to_its_end) < at_rest * offset_m_ && whole;
-      double lack = 0, least_gap = offset_m_;
-      for (const auto& [a, b] : pairs_)
-        lack += offset_m_ - gap(a, b), least_gap = std::min(least_gap, gap(a, b));
-      progress.update(steps_, fmt::format("{:.2g} m deep", std::max(0.0, -least_gap)));
-      if (calm && to_its_end && least_gap >= 0) break;
-      const bool spent = steps_ >= most_steps_in_all;
-      if (whole && least_gap >= apart * offset_m_ && (++resting == most_resting_stages || spent)) break;
-      waited = lack < least_lack - at_rest * offset_m_ ? 0 : waited + 1;
-      least_lack = std::min(least_lack, lack);
+      double lack = 0, min_gap = offset_m_;
+      for (const auto& [a, b] : pairs_) lack += offset_m_ - gap(a, b), min_gap = std::min(min_gap, gap(a, b));
+      progress.update(steps_, fmt::format("{:.2g} m deep", std::max(0.0, -min_gap)));
+      if (calm && to_its_end && min_gap >= 0) break;
+      const bool spent = steps_ >= max_steps_in_all;
+      if (whole && min_gap >= apart * offset_m_ && (++resting == max_resting_stages || spent)) break;
+      waited = lack < min_lack - at_rest * offset_m_ ? 0 : waited + 1;
+      min_lack = std::min(min_lack, lack);
       if (waited >= patience && push < firm_push)
         push = firm_push, waited = 0;
-      else if ((waited >= patience && least_gap < apart * offset_m_) || spent)
+      else if ((waited >= patience && min_gap < apart * offset_m_) || spent)
         refuse_what_stays();
     }
     if (!is_sound(world_, state_))
@@ -236,7 +237,7 @@ double way_of(const World& world, const std::vector<double>& x, const Gap& gap, 
   return way;
 }
 
-void tell(const Gaps& before, const Gaps& now, World& world) {
+void record_to(const Gaps& before, const Gaps& now, World& world) {
   const std::size_t bodies = world.bodies.size();
   const std::vector<double> x = places_of(world, world.start_positions);
   for (std::size_t a = 0; a < bodies; ++a) {
@@ -306,7 +307,7 @@ void set_start(const WorldSpec& spec, World& world) {
                                  spec.start_positions.size(), world.start_positions.size()));
   }
   const Gaps now = gaps(world, offset_m, world.start_positions);
-  tell(before, now, world);
+  record_to(before, now, world);
   // Bodies that are still pressed lie as they were left: the push that holds them there stays.
   const std::size_t bodies = world.bodies.size();
   for (std::size_t k = 0; k < before.size(); ++k) {

@@ -18,10 +18,10 @@ namespace {
 constexpr double goal_frequency = 6;  // rad/s
 
 // A control point pushes at least so much of its robot, or a strong push would tear out a single node.
-constexpr double least_share = 0.1;
+constexpr double min_share = 0.1;
 
 // Mass that a control pushes, by node of the robot; 0: not pushed. Round a control point that is all within
-// its radius and, where that is less than least_share, what is nearest to it.
+// its radius and, where that is less than min_share, what is nearest to it.
 std::vector<double> pushed_masses_kg(const World& world, const Control& control) {
   const Body& robot = world.bodies[world.robot];
   std::vector<double> masses(std::size_t(robot.node_count()), 0);
@@ -37,7 +37,7 @@ std::vector<double> pushed_masses_kg(const World& world, const Control& control)
   std::sort(free.begin(), free.end());
   double pushed = 0;
   for (const auto& [distance, n] : free) {
-    if (!all && distance > control.radius_m && pushed >= least_share * robot.mass_kg) break;
+    if (!all && distance > control.radius_m && pushed >= min_share * robot.mass_kg) break;
     pushed += masses[std::size_t(n)] = robot.node_mass_kg[n];
   }
   return masses;
@@ -67,10 +67,10 @@ Stepper<Real>::Stepper(const World& world, int lanes, Isa isa)
       inner_speed2_(std::size_t(lanes), 0) {
   const Real speed2 = Real(world.rest_speed_m_s * world.rest_speed_m_s),
              gain2 = speed2 * Real(world.dt_s * world.dt_s);  // gained within a second
-  rest_.most_speed2 = speed2, rest_.most_gain2 = gain2;
-  rest_.most_gain2_of_still = 100 * gain2;  // within a tenth of it
-  rest_.most_shake2 = speed2 / 16, rest_.most_mean_gain2 = 16 * gain2,
-  rest_.most_mean_gain2_of_still = 100 * gain2;
+  rest_.max_speed2 = speed2, rest_.max_gain2 = gain2;
+  rest_.max_gain2_of_still = 100 * gain2;  // within a tenth of it
+  rest_.max_shake2 = speed2 / 16, rest_.max_mean_gain2 = 16 * gain2,
+  rest_.max_mean_gain2_of_still = 100 * gain2;
   if (world.touches_on_surfaces())
     surface_contacts_.emplace(world, kernels_, lanes);
   else
@@ -384,26 +384,26 @@ void Stepper<Real>::add_elastic_forces() {
 }
 
 template <class Real>
-void Stepper<Real>::add_friction(std::vector<Exerted<Real>>* told) {
+void Stepper<Real>::add_friction(std::vector<ContactRecord<Real>>* records) {
   for (std::size_t b = 0; b < forced_.size(); ++b) pushes_on_lane_[b] = pushes_on(b);
   for (int lane = 0; lane < lanes_; ++lane) {
-    if (contact_[lane]) friction_[lane].add_forces(view(lane), pushes_on_lane_, told);
+    if (contact_[lane]) friction_[lane].add_forces(view(lane), pushes_on_lane_, records);
     for (const Real*& pushes : pushes_on_lane_)
       if (pushes) ++pushes;
   }
 }
 
 template <class Real>
-std::vector<Exerted<Real>> Stepper<Real>::exerted(int lane) {
+std::vector<ContactRecord<Real>> Stepper<Real>::contact_records(int lane) {
   LIMBER_CHECK(lanes_ == 1 && lane == 0, lanes_, lane);
-  std::vector<Exerted<Real>> told;
-  const auto tell = [&](std::vector<Exerted<Real>>* list) {
-    surface_contacts_ ? surface_contacts_->tell(list) : contacts_->tell(list);
+  std::vector<ContactRecord<Real>> records;
+  const auto record_to = [&](std::vector<ContactRecord<Real>>* list) {
+    surface_contacts_ ? surface_contacts_->record_to(list) : contacts_->record_to(list);
   };
   follow_forces(lane), find_sleepers();
-  tell(&told), add_contact_forces(), tell(nullptr);
-  find_pushes(), add_stretch_limits(), add_elastic_forces(), add_friction(&told);
-  return told;
+  record_to(&records), add_contact_forces(), record_to(nullptr);
+  find_pushes(), add_stretch_limits(), add_elastic_forces(), add_friction(&records);
+  return records;
 }
 
 // As Motion has them; null: none.
@@ -498,7 +498,7 @@ void Stepper<Real>::integrate() {
 template <class Real>
 bool Stepper<Real>::may_stand(std::size_t body) const {
   for (int lane = 0; lane < lanes_; ++lane)
-    if (contact_[lane] && speed2_[body * std::size_t(lanes_) + std::size_t(lane)] <= rest_.most_speed2)
+    if (contact_[lane] && speed2_[body * std::size_t(lanes_) + std::size_t(lane)] <= rest_.max_speed2)
       return true;
   return false;
 }

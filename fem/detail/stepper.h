@@ -47,7 +47,7 @@ class Stepper {
       int lane);            // of each node of the robot, by its control, in the step that begins
   bool is_clear(int lane);  // Batch::is_clear
   // The forces of contact, walls and friction in the step that begins; to be loaded anew after it.
-  std::vector<Exerted<Real>> exerted(int lane);
+  std::vector<ContactRecord<Real>> contact_records(int lane);
   const Cost& cost() const { return cost_; }
 
  private:
@@ -62,7 +62,7 @@ class Stepper {
   void find_pushes();
   void add_stretch_limits();
   void add_elastic_forces();
-  void add_friction(std::vector<Exerted<Real>>* told = nullptr);
+  void add_friction(std::vector<ContactRecord<Real>>* records = nullptr);
   void integrate();
   bool goes_on(int lane, int body) const;
   void move_by_keyframes(std::size_t body);

@@ -117,7 +117,7 @@ SurfaceContacts<Real>::SurfaceContacts(const World& world, const Kernels<Real>& 
       if (world.bodies[a].pushed() || world.bodies[b].pushed()) pairs_.emplace_back(a, b);
   }
   for (const auto& body : world.bodies)
-    if (body.kind == BodyKind::rigid) bearings_.resize(world.bodies.size());
+    if (body.kind == BodyKind::rigid) effective_masses_.resize(world.bodies.size());
   const std::size_t tets = topology_.tets.size(), samples = surface_.samples.size();
   lists_.resize(std::size_t(lanes) * pairs_.size());
   places_.resize(std::size_t(first_sample_row_) + samples);
@@ -266,11 +266,11 @@ Real SurfaceContacts<Real>::travel_of(const LaneView<Real>& view, int a, int b) 
 template <class Real>
 void SurfaceContacts<Real>::add_forces(int lane, const LaneView<Real>& view, Friction<Real>* friction) {
   find(lane, view);
-  if (touches_.empty()) return;
+  if (contacts_.empty()) return;
   share_loads(view);
-  for (const SurfaceTouch<Real>& touch : touches_) respond(touch, friction);
-  for (const SurfaceTouch<Real>& touch : touches_)
-    for (int i = touch.first_share; i < touch.last_share; ++i) {
+  for (const SurfaceContact<Real>& contact : contacts_) respond(contact, friction);
+  for (const SurfaceContact<Real>& contact : contacts_)
+    for (int i = contact.first_share; i < contact.last_share; ++i) {
       const int node = shares_[i].node;
       if (loads_[node] == 0) continue;
       for (int c = 0; c < 3; ++c) view.f[view.force.at(node, c)] += forces_[node].at[c];
@@ -281,21 +281,22 @@ void SurfaceContacts<Real>::add_forces(int lane, const LaneView<Real>& view, Fri
 template <class Real>
 Real SurfaceContacts<Real>::deepest_overlap(int lane, const LaneView<Real>& view) {
   Real deepest = 0;
-  for (const SurfaceTouch<Real>& touch : find(lane, view))
-    if (touch.against >= 0 && touch.against != touch.body)
-      deepest = std::max(
-          deepest, touch.depth - std::max(surface_.offset[touch.body * bodies_ + touch.against], Real(0)));
+  for (const SurfaceContact<Real>& contact : find(lane, view))
+    if (contact.against >= 0 && contact.against != contact.body)
+      deepest =
+          std::max(deepest, contact.depth -
+                                std::max(surface_.offset[contact.body * bodies_ + contact.against], Real(0)));
   return deepest;
 }
 
 template <class Real>
-const std::vector<SurfaceTouch<Real>>& SurfaceContacts<Real>::find(int lane, const LaneView<Real>& view) {
+const std::vector<SurfaceContact<Real>>& SurfaceContacts<Real>::find(int lane, const LaneView<Real>& view) {
   if (++stamp_ == 0) std::fill(stamps_.begin(), stamps_.end(), 0u), stamp_ = 1;
-  touches_.clear(), shares_.clear();
+  contacts_.clear(), shares_.clear();
   for (std::size_t p = 0; p < pairs_.size(); ++p) find_pair(lane, view, p);
   for (int body = 0; body < bodies_ && world_.walls; ++body)
     if (topology_.bodies[body].pushed && !view.sleeps(body)) find_walls(lane, view, body);
-  return touches_;
+  return contacts_;
 }
 
 template <class Real>
@@ -611,7 +612,7 @@ bool SurfaceContacts<Real>::find_surface(const LaneView<Real>& view, int body, i
 template <class Real>
 bool SurfaceContacts<Real>::find_bent_surface(const LaneView<Real>& view, int body, int tet,
                                               const Place& place, Real weight[4], Surface& found) {
-  constexpr int usual_steps = 2, most_steps = 6;
+  constexpr int usual_steps = 2, max_steps = 6;
   constexpr Real thin = Real(1e-2);
   const int* node = topology_.tets[tet].node;
   const Real* weight_gradient = &surface_.weight_gradients[9 * std::size_t(tet)];
@@ -633,7 +634,7 @@ bool SurfaceContacts<Real>::find_bent_surface(const LaneView<Real>& view, int bo
     if (!(volume > thin)) return false;
     for (int c = 0; c < 3; ++c) row[c].row *= 1 / volume;
     if (step >= usual_steps && dot(off.at, off.at) <= exact * exact) break;
-    if (step == most_steps) return false;
+    if (step == max_steps) return false;
     Real way[3];
     for (int c = 0; c < 3; ++c) way[c] = dot(row[c].at, off.at);
     for (int i = 0; i < 3; ++i) {
@@ -705,25 +706,25 @@ bool SurfaceContacts<Real>::measure(const LaneView<Real>& view, int from, int in
                      : find_surface(view, into, tet, against, surface)))
       return false;
   }
-  SurfaceTouch<Real> touch;
-  touch.depth = apart - surface.distance;
-  if (!(touch.depth > 0)) return false;
+  SurfaceContact<Real> contact;
+  contact.depth = apart - surface.distance;
+  if (!(contact.depth > 0)) return false;
   Real slack = surface_.core_reach;
   if (into_bends) {
     const Place way = bend(bends_of(view, tet), against);
     slack += std::sqrt(dot(way.at, way.at));
   }
   if (!is_beside(tet, against, slack)) return false;
-  touch.body = from, touch.against = into, touch.sample = sample, touch.tet = tet;
-  share_sample(from, sample, touch);
+  contact.body = from, contact.against = into, contact.sample = sample, contact.tet = tet;
+  share_sample(from, sample, contact);
   if (into_bends)
     surface_.spread(tables_.rest_positions.data(), node, against, -1, spread_, shares_);
   else
     for (int i = 0; i < 4; ++i) shares_.push_back({node[i], -against[i]});
-  touch.last_share = int(shares_.size());
-  std::copy_n(place.at, 3, touch.place);
-  std::copy_n(surface.normal, 3, touch.normal);
-  touches_.push_back(touch);
+  contact.last_share = int(shares_.size());
+  std::copy_n(place.at, 3, contact.place);
+  std::copy_n(surface.normal, 3, contact.normal);
+  contacts_.push_back(contact);
   return true;
 }
 
@@ -773,9 +774,9 @@ void SurfaceContacts<Real>::find_walls(int lane, const LaneView<Real>& view, int
     for (int i = 0; i < 4; ++i) corner[i] = node_place(view, topology_.tets[tet].node[i]).at;
     const int first = surface_.first_sample[tet], count = surface_.first_held_sample[tet] - first;
     const Bends* bends = table.phong ? &bends_of(view, tet) : nullptr;
-    const std::size_t most_found = std::size_t(count + block_size);
-    if (within_.size() < most_found) within_.resize(most_found);
-    if (awake_.size() < most_found) awake_.resize(most_found), distance_.resize(most_found);
+    const std::size_t max_found = std::size_t(count + block_size);
+    if (within_.size() < max_found) within_.resize(max_found);
+    if (awake_.size() < max_found) awake_.resize(max_found), distance_.resize(max_found);
     for (int side = 0; side < 6; ++side) {
       if ((sides_[tet] >> side & 1) == 0) continue;
       const int axis = side % 3;
@@ -801,15 +802,15 @@ void SurfaceContacts<Real>::find_walls(int lane, const LaneView<Real>& view, int
       for (int i = 0; i < found; ++i) {
         const int k = awake_[i];
         if (!(within[k] < 0)) continue;
-        SurfaceTouch<Real>& touch = touches_.emplace_back();
-        touch.body = body, touch.against = -1, touch.sample = first + k, touch.tet = -1;
-        touch.depth = -within[k];
-        share_sample(body, first + k, touch);
+        SurfaceContact<Real>& contact = contacts_.emplace_back();
+        contact.body = body, contact.against = -1, contact.sample = first + k, contact.tet = -1;
+        contact.depth = -within[k];
+        share_sample(body, first + k, contact);
         Place place = sample_place(view, first + k);
         if (bends) place.row += bend(*bends, surface_.samples[first + k].weight).row;
-        std::copy_n(place.at, 3, touch.place);
-        for (Real& c : touch.normal) c = 0;
-        touch.normal[axis] = inward;
+        std::copy_n(place.at, 3, contact.place);
+        for (Real& c : contact.normal) c = 0;
+        contact.normal[axis] = inward;
       }
     }
     sides_[tet] = 0;
@@ -817,8 +818,8 @@ void SurfaceContacts<Real>::find_walls(int lane, const LaneView<Real>& view, int
 }
 
 template <class Real>
-void SurfaceContacts<Real>::share_sample(int body, int index, SurfaceTouch<Real>& touch) {
-  touch.first_share = int(shares_.size());
+void SurfaceContacts<Real>::share_sample(int body, int index, SurfaceContact<Real>& contact) {
+  contact.first_share = int(shares_.size());
   if (surface_.bodies[body].phong) {
     const Share* shares = surface_.shares.data();
     shares_.insert(shares_.end(), shares + surface_.first_share[index],
@@ -827,22 +828,22 @@ void SurfaceContacts<Real>::share_sample(int body, int index, SurfaceTouch<Real>
     const typename Tables::Sample& sample = surface_.samples[index];
     for (int i = 0; i < 4; ++i) shares_.push_back({sample.node[i], sample.weight[i]});
   }
-  touch.first_against = touch.last_share = int(shares_.size());
+  contact.first_against = contact.last_share = int(shares_.size());
 }
 
 template <class Real>
-Real SurfaceContacts<Real>::load_of(const SurfaceTouch<Real>& touch) const {
-  return surface_.samples[touch.sample].area * touch.depth;
+Real SurfaceContacts<Real>::load_of(const SurfaceContact<Real>& contact) const {
+  return surface_.samples[contact.sample].area * contact.depth;
 }
 
 // What each node bears over its mass, and each rigid body, of all touches: their shares of it are shares of
 // mass.
 template <class Real>
 void SurfaceContacts<Real>::share_loads(const LaneView<Real>& view) {
-  for (Bearing& bearing : bearings_) bearing.depths = 0;
-  for (const SurfaceTouch<Real>& touch : touches_) {
-    const Real load = load_of(touch);
-    for (int i = touch.first_share; i < touch.last_share; ++i) {
+  for (EffectiveMass& effective_mass : effective_masses_) effective_mass.depths = 0;
+  for (const SurfaceContact<Real>& contact : contacts_) {
+    const Real load = load_of(contact);
+    for (int i = contact.first_share; i < contact.last_share; ++i) {
       const auto [node, weight] = shares_[i];
       if (loads_[node] == 0) {
         const Real* v = view.v + view.state.at(node, 0);
@@ -850,26 +851,26 @@ void SurfaceContacts<Real>::share_loads(const LaneView<Real>& view) {
       }
       loads_[node] += load * std::abs(weight) * reciprocal_mass_[node];
     }
-    if (bearings_.empty()) continue;
-    bearings_[touch.body].depths += double(load);
-    if (touch.against >= 0) bearings_[touch.against].depths += double(load);
+    if (effective_masses_.empty()) continue;
+    effective_masses_[contact.body].depths += double(load);
+    if (contact.against >= 0) effective_masses_[contact.against].depths += double(load);
   }
-  for (std::size_t body = 0; body < bearings_.size(); ++body)
-    if (is_rigid(int(body)) && bearings_[body].depths > 0)
-      bearings_[body].measure(view, topology_.bodies[body], tables_.node_mass);
+  for (std::size_t body = 0; body < effective_masses_.size(); ++body)
+    if (is_rigid(int(body)) && effective_masses_[body].depths > 0)
+      effective_masses_[body].measure(view, topology_.bodies[body], tables_.node_mass);
 }
 
 template <class Real>
-void SurfaceContacts<Real>::respond(const SurfaceTouch<Real>& touch, Friction<Real>* friction) {
-  const Real load = load_of(touch);
-  const int side[2] = {touch.body, touch.against};
+void SurfaceContacts<Real>::respond(const SurfaceContact<Real>& contact, Friction<Real>* friction) {
+  const Real load = load_of(contact);
+  const int side[2] = {contact.body, contact.against};
   Place relative;
   relative.row = Row{};
   Real loads = 0;                           // of what is not rigid
   Real borne[2] = {0, 0}, all[2] = {0, 0};  // of the force: by nodes that move
   for (const int k : {0, 1}) {
-    const int begin = k == 0 ? touch.first_share : touch.first_against,
-              end = k == 0 ? touch.first_against : touch.last_share;
+    const int begin = k == 0 ? contact.first_share : contact.first_against,
+              end = k == 0 ? contact.first_against : contact.last_share;
     Real loads_of_side = 0;
     for (int i = begin; i < end; ++i) {
       const auto [node, weight] = shares_[i];
@@ -888,30 +889,30 @@ void SurfaceContacts<Real>::respond(const SurfaceTouch<Real>& touch, Friction<Re
   Real inverse_mass = loads / load;
   for (const int body : side)
     if (body >= 0 && is_rigid(body))
-      inverse_mass += Real(bearings_[body].inverse_mass(touch.place, touch.normal, load));
-  const Real push =
-      penalty_push(Real(surface_beta), touch.depth, dot(relative.at, touch.normal), 1 / inverse_mass, step_);
+      inverse_mass += Real(effective_masses_[body].inverse_mass(contact.place, contact.normal, load));
+  const Real push = penalty_push(Real(surface_beta), contact.depth, dot(relative.at, contact.normal),
+                                 1 / inverse_mass, step_);
   if (!(push > 0)) return;
-  const Real force[3] = {push * touch.normal[0], push * touch.normal[1], push * touch.normal[2]};
-  for (int i = touch.first_share; i < touch.last_share; ++i) {
+  const Real force[3] = {push * contact.normal[0], push * contact.normal[1], push * contact.normal[2]};
+  for (int i = contact.first_share; i < contact.last_share; ++i) {
     const auto [node, weight] = shares_[i];
     if (tables_.inverse_mass[node] > 0) forces_[node].row += weight * Row{force[0], force[1], force[2], 0};
   }
   // What is set against nodes that never move on both sides, or against a wall, is borne by none.
-  const Real share = touch.against < 0 ? borne[0] / all[0] : std::max(borne[0] / all[0], borne[1] / all[1]);
-  if (told_)
-    told_->push_back({touch.body,
-                      touch.against,
-                      {touch.place[0], touch.place[1], touch.place[2]},
-                      touch.depth,
-                      {share * force[0], share * force[1], share * force[2]}});
+  const Real share = contact.against < 0 ? borne[0] / all[0] : std::max(borne[0] / all[0], borne[1] / all[1]);
+  if (records_)
+    records_->push_back({contact.body,
+                         contact.against,
+                         {contact.place[0], contact.place[1], contact.place[2]},
+                         contact.depth,
+                         {share * force[0], share * force[1], share * force[2]}});
   if (!friction) return;
-  const int other = touch.against < 0 ? touch.body : touch.against;
+  const int other = contact.against < 0 ? contact.body : contact.against;
   const Share* shares = shares_.data();
-  friction->add(touch.body, touch.against, touch.place, touch.normal,
-                tables_.pair_friction[touch.body * bodies_ + other] * push, shares + touch.first_share,
-                shares + touch.first_against, shares + touch.last_share, told_ ? int(told_->size()) - 1 : -1,
-                share);
+  friction->add(contact.body, contact.against, contact.place, contact.normal,
+                tables_.pair_friction[contact.body * bodies_ + other] * push, shares + contact.first_share,
+                shares + contact.first_against, shares + contact.last_share,
+                records_ ? int(records_->size()) - 1 : -1, share);
 }
 
 template struct SurfaceTables<float>;

@@ -6,8 +6,8 @@
 #include <utility>
 #include <vector>
 
-#include "fem/detail/bearing.h"
 #include "fem/detail/contact.h"
+#include "fem/detail/effective_mass.h"
 #include "fem/detail/friction.h"
 #include "fem/detail/lane_view.h"
 #include "fem/detail/penalty.h"
@@ -19,7 +19,7 @@ namespace limber::fem::detail {
 // A sample of one body within the offset of another's surface, or beyond a wall. All follows from the present
 // positions.
 template <class Real>
-struct SurfaceTouch {
+struct SurfaceContact {
   int body, against;  // whose sample, in whose cage; against −1: a wall
   int sample, tet;    // of the world's; tet −1: a wall
   // Of shares(): those of the nodes that move the sample, then minus those that move the place it is at.
@@ -36,14 +36,14 @@ class SurfaceContacts {
   // are.
   void add_forces(int lane, const LaneView<Real>& view, Friction<Real>* friction = nullptr);
   // From now on add_forces also appends to this list, unless null.
-  void tell(std::vector<Exerted<Real>>* list) { told_ = list; }
+  void record_to(std::vector<ContactRecord<Real>>* list) { records_ = list; }
   // How near two bodies' boxes must be for contact.
   Real offset(int a, int b) const {
     return std::max(surface_.offset[a * bodies_ + b], Real(0)) + surface_.bodies[a].bulge +
            surface_.bodies[b].bulge;
   }
   // Of all bodies, as add_forces finds them; valid until the next call.
-  const std::vector<SurfaceTouch<Real>>& find(int lane, const LaneView<Real>& view);
+  const std::vector<SurfaceContact<Real>>& find(int lane, const LaneView<Real>& view);
   // How deep the samples of bodies are below the surfaces of others at most, beyond what they are where
   // bodies start; 0 where none is.
   Real deepest_overlap(int lane, const LaneView<Real>& view);
@@ -124,10 +124,10 @@ class SurfaceContacts {
   bool is_beside(int tet, const Real weight[4], Real slack) const;
   bool barycentric(const LaneView<Real>&, int tet, const Real place[3], Real weight[4]);
   void find_walls(int lane, const LaneView<Real>&, int body);
-  void share_sample(int body, int sample, SurfaceTouch<Real>&);
+  void share_sample(int body, int sample, SurfaceContact<Real>&);
   void share_loads(const LaneView<Real>&);
-  void respond(const SurfaceTouch<Real>&, Friction<Real>*);
-  Real load_of(const SurfaceTouch<Real>&) const;
+  void respond(const SurfaceContact<Real>&, Friction<Real>*);
+  Real load_of(const SurfaceContact<Real>&) const;
   bool is_rigid(int body) const;
 
   const World& world_;
@@ -136,13 +136,13 @@ class SurfaceContacts {
   const Tables& surface_;
   const Kernels<Real>& kernels_;
   int bodies_, world_nodes_, first_sample_row_, first_sample_stamp_, first_slopes_stamp_, first_bends_stamp_;
-  std::vector<Exerted<Real>>* told_ = nullptr;
+  std::vector<ContactRecord<Real>>* records_ = nullptr;
   Real step_;
   std::vector<std::pair<int, int>> pairs_;  // a body with itself, or a < b
   std::vector<List> lists_;                 // [lane × pairs + pair]
   // [lane × bodies + body], of its wall_nodes: travel before which they cannot be beyond a wall.
   std::vector<std::vector<Real>> walls_asleep_until_;
-  std::vector<SurfaceTouch<Real>> touches_;
+  std::vector<SurfaceContact<Real>> contacts_;
   std::vector<Share> shares_;
   std::vector<Real> spread_;  // a node: 0
   // Rows: the world's nodes, four corners of each core, the samples; those are of this call whose stamp is.
@@ -155,8 +155,8 @@ class SurfaceContacts {
   std::vector<Real> distance_;
   std::vector<Real> loads_;            // a node: Σ area × depth × weight of its touches, over its mass
   std::vector<Real> reciprocal_mass_;  // a node, held ones too
-  std::vector<Place> velocities_, forces_;  // of nodes with a load; 0 of the others' forces
-  std::vector<Bearing> bearings_;           // a body; empty without rigid ones
+  std::vector<Place> velocities_, forces_;       // of nodes with a load; 0 of the others' forces
+  std::vector<EffectiveMass> effective_masses_;  // a body; empty without rigid ones
   // Scratch of a list's building.
   static constexpr int slabs = 32;
   std::vector<Group> groups_, unsorted_groups_;

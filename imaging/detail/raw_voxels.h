@@ -17,7 +17,7 @@ struct RawVoxels {
   std::string bytes;
 };
 
-constexpr std::int64_t most_voxels = std::int64_t(1) << 31;
+constexpr std::int64_t max_voxels = std::int64_t(1) << 31;
 constexpr double metres_a_millimetre = 1e-3;
 
 // Throws InputError where a size is not positive or there are too many voxels.

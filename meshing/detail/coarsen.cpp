@@ -15,14 +15,14 @@ class Coarsener {
     for (int v : vertices_of(boundary_triangles(mesh.tets))) on_boundary_[v] = true;
   }
 
-  void run(int most_tets) {
+  void run(int max_tets) {
     std::vector<bool> changed(tets_.positions.size(), true);
-    while (tets_.tet_count > most_tets) {
+    while (tets_.tet_count > max_tets) {
       // What was refused before is asked again only where something changed since.
       std::vector<bool> changes(changed.size(), false);
       bool any = false;
       for (const Collapse& c : collapses(changed)) {
-        if (tets_.tet_count <= most_tets) return;
+        if (tets_.tet_count <= max_tets) return;
         // An earlier one may have taken the edge.
         if (tets_.tets_round(c.from, c.to).empty() || !allowed(c.from, c.to)) continue;
         for (int t : tets_.star[c.from])

@@ -32,7 +32,7 @@ bool leads_out(const fs::path& relative) {
 }  // namespace
 
 std::string tamed(const std::string& name) {
-  std::string plain = name.substr(0, most_letters_of_names);
+  std::string plain = name.substr(0, max_letters_of_names);
   std::replace_if(
       plain.begin(), plain.end(), [](char c) { return std::uint8_t(c) < 32 || c == 127; }, '?');
   if (!is_utf8(plain))
@@ -61,7 +61,7 @@ std::optional<fs::path> path_beside(const fs::path& model, std::string named) {
   return relative.lexically_normal();
 }
 
-Companion read_companion(const fs::path& model, const std::string& named, std::uintmax_t most_bytes) {
+Companion read_companion(const fs::path& model, const std::string& named, std::uintmax_t max_bytes) {
   const std::string said = tamed(named);
   const std::optional<fs::path> relative = path_beside(model, named);
   if (!relative)
@@ -73,7 +73,7 @@ Companion read_companion(const fs::path& model, const std::string& named, std::u
   if (!fs::exists(path, error))
     return {{}, fmt::format("\"{}\" is not there; put it beside the model", said)};
   try {
-    return {read_file(path, most_bytes), ""};
+    return {read_file(path, max_bytes), ""};
   } catch (const InputError& complaint) {
     return {{}, complaint.what()};
   }

@@ -10,7 +10,7 @@
 namespace limber::meshing::detail {
 
 // As many letters of a name that a file gives, so that messages and files end.
-constexpr std::size_t most_letters_of_names = 100;
+constexpr std::size_t max_letters_of_names = 100;
 // A name that a file gives, cut and without control letters, as UTF-8.
 std::string tamed(const std::string& name);
 
@@ -23,6 +23,6 @@ struct Companion {
   std::string complaint;  // where there are none: "… is not there"
 };
 // Reads a file that the model names.
-Companion read_companion(const fs::path& model, const std::string& named, std::uintmax_t most_bytes);
+Companion read_companion(const fs::path& model, const std::string& named, std::uintmax_t max_bytes);
 
 }  // namespace limber::meshing::detail

@@ -18,7 +18,7 @@ namespace limber::meshing::detail {
 
 namespace {
 
-constexpr double least_growth = 2e-6;
+constexpr double min_growth = 2e-6;
 constexpr double float32_share = 1e-3;  // by which a shell may grow for the sake of float32
 
 Points rows_of(std::span<const Vec3> points) {
@@ -242,10 +242,10 @@ ConvexShell enclosing_shell(std::span<const Vec3> corners, std::span<const Vec3>
     for (const Vec3& p : corners) result.push_back(center + (1 + growth) * (p - center));
     return result;
   };
-  for (double growth = least_growth; growth < float32_share; growth *= 2)
+  for (double growth = min_growth; growth < float32_share; growth *= 2)
     if (const std::vector<Vec3> rounded = outwards_in_float32(grown(growth), center); !rounded.empty())
       if (std::optional<ConvexShell> shell = shell_round(rounded, points, margin)) return *std::move(shell);
-  for (double growth = least_growth; growth < 1; growth *= 2)
+  for (double growth = min_growth; growth < 1; growth *= 2)
     if (std::optional<ConvexShell> shell = shell_round(grown(growth), points, margin))
       return *std::move(shell);
   throw InternalError("a shell does not hold its points even at twice its size");

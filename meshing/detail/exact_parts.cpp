@@ -36,7 +36,7 @@ struct PointCollector {
 };
 
 constexpr int cpu_seconds = 60;
-constexpr Eigen::Index most_triangles = 2000;
+constexpr Eigen::Index max_triangles = 2000;
 constexpr const char* what_to_try = "; without --exact every model is taken";
 
 Mesh mesh_of(const SurfaceMesh& surface) {
@@ -77,8 +77,8 @@ std::vector<std::vector<Vec3>> exact_convex_parts(const SurfaceMesh& surface) {
   const auto refuse = [](const std::string& why) {
     throw InputError("the model to decompose exactly " + why + what_to_try);
   };
-  if (surface.triangles.rows() > most_triangles)
-    refuse(fmt::format("has {} triangles, and {} are the most", surface.triangles.rows(), most_triangles));
+  if (surface.triangles.rows() > max_triangles)
+    refuse(fmt::format("has {} triangles, and {} are the most", surface.triangles.rows(), max_triangles));
   // Its time grows with the square of the reflex edges, and nothing can stop it from inside.
   const OwnProcessResult result = run_in_own_process([&] { return decomposed(surface); }, cpu_seconds);
   if (!result.finished) refuse(result.bytes);

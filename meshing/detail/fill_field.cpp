@@ -16,7 +16,7 @@ namespace {
 
 constexpr double near_cells = 1.2;  // within which distances are exact
 constexpr double largest_value = 32'000;
-constexpr double spots_a_cell = 4, most_spots = 2e6;  // a face of a cell; to fit the field to
+constexpr double spots_a_cell = 4, max_spots = 2e6;  // a face of a cell; to fit the field to
 constexpr int fitting_steps = 4;
 
 class Filler {
@@ -201,7 +201,7 @@ class Filler {
     const double spots = spots_a_cell * surface.area_m2 / (cell_ * cell_);
     if (!(spots >= 1)) return;
     const SurfaceSpots sequence(surface);
-    std::vector<Place> places(std::size_t(std::min(spots, most_spots)));
+    std::vector<Place> places(std::size_t(std::min(spots, max_spots)));
     for (std::size_t i = 0; i < places.size(); ++i) {
       throw_if_stopped();
       places[i] = place_of(sequence.at(std::uint32_t(i)).position);
@@ -321,16 +321,16 @@ class Filler {
 
 }  // namespace
 
-DistanceField grid_over(const Box& box, double cell_m, std::int64_t most_nodes) {
+DistanceField grid_over(const Box& box, double cell_m, std::int64_t max_nodes) {
   DistanceField field;
   while (true) {
     std::int64_t count = 1;
     for (int axis = 0; axis < 3; ++axis) {
       const double nodes = std::ceil(box.size()[axis] / cell_m) + 3;
       field.nodes[std::size_t(axis)] = int(std::min(nodes, 1e6));
-      count *= std::min<std::int64_t>(field.nodes[std::size_t(axis)], most_nodes);
+      count *= std::min<std::int64_t>(field.nodes[std::size_t(axis)], max_nodes);
     }
-    if (count <= most_nodes) break;
+    if (count <= max_nodes) break;
     cell_m *= 1.02;
   }
   field.cell_m = cell_m;

@@ -6,9 +6,9 @@
 
 namespace limber::meshing::detail {
 
-// The grid of cells `cell_m` wide, or wider so that it has no more than `most_nodes` nodes, that covers the
+// The grid of cells `cell_m` wide, or wider so that it has no more than `max_nodes` nodes, that covers the
 // box and a cell more on each side; no values yet.
-DistanceField grid_over(const Box&, double cell_m, std::int64_t most_nodes);
+DistanceField grid_over(const Box&, double cell_m, std::int64_t max_nodes);
 
 // Distance to the nearest of what is seen, exact at a cell and seldom too large by much beyond; nearer, such
 // that the field between the nodes is as near to 0 on the surface as it can. Inside is where the winding

@@ -72,7 +72,7 @@ class Splitter {
         }
     for (const auto& [p, q] : edges) {
       const Vec3 &a = tets_.positions[p], &b = tets_.positions[q];
-      if (tets_.tet_count >= limits_.most_tets) return;
+      if (tets_.tet_count >= limits_.max_tets) return;
       if ((a - b).norm() < shortest * limits_.spacing_m) continue;
       const std::optional<Gap> gap = gap_on(model_, limits_.spacing_m, a, b);
       if (!gap) continue;

@@ -8,7 +8,7 @@ namespace limber::meshing::detail {
 struct GapLimits {
   double spacing_m;  // of the lattice; wider gaps are left to it
   TetLimits tets;    // kept by what splitting makes
-  int most_tets;     // no edge is split beyond that number
+  int max_tets;      // no edge is split beyond that number
 };
 
 // Gives the edges of glued tets a vertex in the middle of the gap that they cross. The union of the tets

@@ -241,7 +241,7 @@ std::vector<Vec3> GrowingHull::vertices() const {
 }
 
 Eigen::Matrix<double, Eigen::Dynamic, 4> GrowingHull::planes() const {
-  constexpr double least_altitude = 1e-9;
+  constexpr double min_altitude = 1e-9;
   Eigen::Matrix<double, Eigen::Dynamic, 4> planes(Eigen::Index(faces_.size()), 4);
   Eigen::Index count = 0;
   for (std::size_t f = 0; f < faces_.size(); ++f) {
@@ -249,7 +249,7 @@ Eigen::Matrix<double, Eigen::Dynamic, 4> GrowingHull::planes() const {
     if (a < 0) continue;
     const Vec3 &pa = points_[std::size_t(a)], &pb = points_[std::size_t(b)], &pc = points_[std::size_t(c)];
     const double longest = std::max({(pb - pa).norm(), (pc - pb).norm(), (pa - pc).norm()});
-    if (faces_[f].twice_area > least_altitude * longest)
+    if (faces_[f].twice_area > min_altitude * longest)
       planes.row(count++) << nx_[f], ny_[f], nz_[f], offset_[f];
   }
   return planes.topRows(count);

@@ -23,7 +23,7 @@ std::vector<std::string> names_of_images(const PolygonSoup& soup) {
   std::set<std::string> taken;
   for (const NamedImage& image : soup.images) {
     const std::string& path = image.path;
-    const std::string end = tamed(path.substr(path.size() - std::min(path.size(), most_letters_of_names)));
+    const std::string end = tamed(path.substr(path.size() - std::min(path.size(), max_letters_of_names)));
     std::string name = end;
     while (!taken.insert(name).second) name = fmt::format("{} ({})", end, ++times[end] + 1);
     names.push_back(std::move(name));
@@ -113,21 +113,21 @@ void read_images(const fs::path& model, const PolygonSoup& soup, Appearance& a,
   const std::vector<std::string> names = names_of_images(soup);
   for (std::size_t i = 0; i < names.size(); ++i) image_named[names[i]] = &soup.images[i];
   std::vector<bool> gone(a.images.size(), false);
-  if (a.images.size() > most_images) {
-    std::fill(gone.begin() + most_images, gone.end(), true);
+  if (a.images.size() > max_images) {
+    std::fill(gone.begin() + max_images, gone.end(), true);
     warnings.push_back(fmt::format("{} images are shown, and {} more are left out; what shows them is plain",
-                                   most_images, a.images.size() - most_images));
+                                   max_images, a.images.size() - max_images));
   }
-  for (std::size_t i = 0; i < std::min(a.images.size(), most_images); ++i) {
+  for (std::size_t i = 0; i < std::min(a.images.size(), max_images); ++i) {
     ImageFile& image = a.images[i];
     const NamedImage* named = image_named.at(image.name);
     std::string complaint;
     if (!named->bytes.empty()) {
       image.bytes = named->bytes;
-      if (image.bytes.size() > most_image_bytes)
+      if (image.bytes.size() > max_image_bytes)
         complaint = fmt::format("\"{}\" has {} bytes, more than 64 MiB", image.name, image.bytes.size());
     } else {
-      Companion found = read_companion(model, named->path, most_image_bytes);
+      Companion found = read_companion(model, named->path, max_image_bytes);
       if (found.bytes)
         image.bytes = std::move(*found.bytes);
       else

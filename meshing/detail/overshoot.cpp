@@ -74,7 +74,7 @@ double SurfaceDistance::at(const Vec3& point) const {
 
 Eigen::Matrix<double, Eigen::Dynamic, 4> planes_of(const ConvexShell& shell) {
   Eigen::Matrix<double, Eigen::Dynamic, 4> planes(shell.triangles.rows(), 4);
-  constexpr double least_altitude = 1e-9;
+  constexpr double min_altitude = 1e-9;
   const double size = bounding_box(shell.vertices).diagonal();
   Eigen::Index count = 0;
   for (Eigen::Index f = 0; f < shell.triangles.rows(); ++f) {
@@ -82,7 +82,7 @@ Eigen::Matrix<double, Eigen::Dynamic, 4> planes_of(const ConvexShell& shell) {
                c = shell.vertices.row(shell.triangles(f, 2));
     const Vec3 cross = (b - a).cross(c - a);
     const double longest = std::max({(b - a).norm(), (c - b).norm(), (a - c).norm()});
-    if (!(cross.norm() > least_altitude * size * longest)) continue;
+    if (!(cross.norm() > min_altitude * size * longest)) continue;
     const Vec3 normal = cross.normalized();
     planes.row(count++) << normal.transpose(), -normal.dot(a);
   }

@@ -18,7 +18,7 @@ namespace {
 constexpr double overcut = 1.2;
 // A cut that gains less than this, over the cube of the diagonal, is none: a hull's volume is not known
 // better.
-constexpr double least_gain = 5e-7;
+constexpr double min_gain = 5e-7;
 // Looking two cuts ahead is dear, so only parts of this share of the whole hull's volume may.
 constexpr double worth_looking_ahead = 0.1;
 // Two parts may touch when their boxes are no farther apart.
@@ -63,13 +63,13 @@ std::vector<Part> cut_up(Model& model, Part root, InsideTest& inside, const Surf
   while (leaves.size() < wanted) {
     Leaf* best = nullptr;
     for (Leaf& leaf : leaves)
-      if (leaf.cut.gain > (best ? best->cut.gain : least_gain) &&
+      if (leaf.cut.gain > (best ? best->cut.gain : min_gain) &&
           (limits.max_overshoot == 0 || leaf.overshoot > limits.max_overshoot))
         best = &leaf;
     if (!best) break;
     auto [below, above] = cut(model, best->part, best->cut.plane, inside);
     if (!best->cut.is_first_of_two &&
-        best->part.hull_volume - below.hull_volume - above.hull_volume <= least_gain) {
+        best->part.hull_volume - below.hull_volume - above.hull_volume <= min_gain) {
       best->cut.gain = 0;  // the sketch promised too much
       continue;
     }
@@ -137,7 +137,7 @@ void unite_cheapest(std::vector<Part>& parts, InsideTest& inside, const SurfaceD
     std::sort(by_cost.begin(), by_cost.end());
     auto chosen = std::find_if(by_cost.begin(), by_cost.end(), [&](const auto& entry) {
       const auto& [value, pair] = entry;
-      const double limit = too_many || value <= least_gain ? worst : limits.max_overshoot;
+      const double limit = too_many || value <= min_gain ? worst : limits.max_overshoot;
       if (limit == 0 || refused.contains({pair, limit})) return false;
       const std::vector<Vec3> both = outlines[pair.first]->corners_with(*outlines[pair.second]);
       if (hull_overshoot(both, inside, distance, limit) <= limit) return true;
@@ -190,7 +190,7 @@ void cut_anew(Model& model, std::vector<Part>& parts, InsideTest& inside, const 
     const Cut best = best_cut(model, both, inside);
     if (best.gain <= 0) continue;
     auto [below, above] = cut(model, both, best.plane, inside);
-    if (below.hull_volume + above.hull_volume > parts[a].hull_volume + parts[b].hull_volume - least_gain)
+    if (below.hull_volume + above.hull_volume > parts[a].hull_volume + parts[b].hull_volume - min_gain)
       continue;
     const auto overshoot = [&](const Part& part) { return hull_overshoot(part.hull, inside, distance, 0); };
     if (std::max(overshoot(below), overshoot(above)) >

@@ -21,8 +21,8 @@ namespace {
 
 constexpr int cpu_seconds = 60;
 // A few nested instances can ask for more triangles than any memory holds.
-constexpr std::size_t most_vertices = 100'000'000;
-constexpr std::size_t most_embedded_bytes = 256 << 20;  // of all images within the file
+constexpr std::size_t max_vertices = 100'000'000;
+constexpr std::size_t max_embedded_bytes = 256 << 20;  // of all images within the file
 
 Eigen::Matrix4d matrix_of(const aiMatrix4x4& m) {
   Eigen::Matrix4d matrix;
@@ -48,7 +48,7 @@ SurfaceMaterial material_of(const aiScene& scene, const aiMaterial& from, Polygo
           return -1;
         }
         const bool known = soup.has_image(named.path);
-        if (!known && (embedded_bytes += within->mWidth) > most_embedded_bytes) {
+        if (!known && (embedded_bytes += within->mWidth) > max_embedded_bytes) {
           soup.warnings.push_back("the images within the file are larger than 256 MiB together; left out");
           return -1;
         }
@@ -81,9 +81,8 @@ void add_looks(const aiMesh& mesh, PolygonSoup& soup) {
 
 void add_mesh(const aiMesh& mesh, const Eigen::Matrix4d& world_from_mesh, PolygonSoup& soup,
               int& lines_and_points) {
-  if (soup.positions.size() + mesh.mNumVertices > most_vertices)
-    throw InputError(
-        fmt::format("the instances of the scene add up to more than {} vertices", most_vertices));
+  if (soup.positions.size() + mesh.mNumVertices > max_vertices)
+    throw InputError(fmt::format("the instances of the scene add up to more than {} vertices", max_vertices));
   const int first = int(soup.positions.size());
   const double stretch = world_from_mesh.topLeftCorner<3, 3>().norm();
   for (unsigned v = 0; v < mesh.mNumVertices; ++v) {

@@ -9,7 +9,7 @@ namespace limber::meshing::detail {
 
 namespace {
 
-constexpr std::uintmax_t most_bytes = 16 << 20;
+constexpr std::uintmax_t max_bytes = 16 << 20;
 
 // How many words follow an option of a map at least; numbers after -o, -s and -t may be up to three.
 int words_after(std::string_view option) {
@@ -81,7 +81,7 @@ void read_materials(const fs::path& model, PolygonSoup& soup) {
   for (const SurfaceMaterial& m : soup.materials) material_named.emplace(m.name, int(material_named.size()));
   std::vector<bool> defined(soup.materials.size(), false);
   for (const std::string& file : soup.material_files) {
-    const Companion found = read_companion(model, file, most_bytes);
+    const Companion found = read_companion(model, file, max_bytes);
     if (found.bytes)
       read_mtl(without_byte_order_mark(*found.bytes), file, soup, material_named, defined);
     else

@@ -14,7 +14,7 @@ namespace limber::meshing::detail {
 namespace {
 
 constexpr double probes_a_disc = 1.5, candidates_a_disc = 5;  // a square of the least spacing
-constexpr int most_candidates = 400'000;
+constexpr int max_candidates = 400'000;
 constexpr double same_side = 0.2;  // cosine of normals, below which points are not of one side of a sheet
 const double crease_cosine = std::cos(std::numbers::pi / 6), corner_cosine = std::cos(std::numbers::pi / 6);
 
@@ -22,7 +22,7 @@ const double crease_cosine = std::cos(std::numbers::pi / 6), corner_cosine = std
 class SpacingMap {
  public:
   SpacingMap(const SurfaceSpots& sequence, int count, const Box& box, const SampleSpacing& limits)
-      : limits_(limits), grid_(box, 0.5 * limits.most_flat_m), fine_grid_(box, limits.least_m) {
+      : limits_(limits), grid_(box, 0.5 * limits.max_flat_m), fine_grid_(box, limits.min_m) {
     std::vector<std::pair<int, int>> order;
     for (int i = 0; i < count; ++i) {
       spots_.push_back(sequence.at(std::uint32_t(i)));
@@ -46,7 +46,7 @@ class SpacingMap {
     spacing_.resize(spots_.size());
     for_all([&](std::size_t i) {
       Vec3 sum = spots_[i].normal;
-      fine_grid_.any_within(spots_[i].position, limits_.least_m, [&](int n, double) {
+      fine_grid_.any_within(spots_[i].position, limits_.min_m, [&](int n, double) {
         const Vec3& normal = spots_[std::size_t(n)].normal;
         if (normal.dot(spots_[i].normal) > same_side) sum += normal;
         return false;
@@ -58,21 +58,20 @@ class SpacingMap {
 
   double measured(const SurfaceSpot& at) const {
     constexpr double rounding = 1e-9;
-    const double flat = 0.1 * limits_.missed_m, least = limits_.least_m * limits_.least_m,
-                 farthest = limits_.most_flat_m * limits_.most_flat_m;
-    double least_squared = limits_.most_m * limits_.most_m, bend = 0;
-    grid_.any_cell(at.position, limits_.most_flat_m, [&](int index) {
+    const double flat = 0.1 * limits_.missed_m, least = limits_.min_m * limits_.min_m,
+                 farthest = limits_.max_flat_m * limits_.max_flat_m;
+    double min_squared = limits_.most_m * limits_.most_m, bend = 0;
+    grid_.any_cell(at.position, limits_.max_flat_m, [&](int index) {
       const Cell& cell = cells_[std::size_t(index)];
       if (cell.begin == cell.end) return false;
       // No point of the cell falls farther, or is nearer; most cells of what is flat change nothing.
       const Vec3 middle = 0.5 * (cell.box.lower + cell.box.upper), half = 0.5 * cell.box.size();
-      const double most_fall = (1 + rounding) * (std::abs((at.position - middle).dot(at.normal)) +
-                                                 half.dot(at.normal.cwiseAbs())),
+      const double max_fall = (1 + rounding) * (std::abs((at.position - middle).dot(at.normal)) +
+                                                half.dot(at.normal.cwiseAbs())),
                    nearest =
                        (1 - rounding) * ((at.position - middle).cwiseAbs() - half).cwiseMax(0).squaredNorm();
-      if (nearest > farthest ||
-          ((bend >= flat || most_fall < flat) &&
-           most_fall * least_squared <= 2 * limits_.missed_m * std::max(nearest, least)))
+      if (nearest > farthest || ((bend >= flat || max_fall < flat) &&
+                                 max_fall * min_squared <= 2 * limits_.missed_m * std::max(nearest, least)))
         return false;
       for (int n = cell.begin; n < cell.end; ++n) {
         const SurfaceSpot& other = spots_[std::size_t(n)];
@@ -82,18 +81,18 @@ class SpacingMap {
         const double fall = -way.dot(at.normal);
         bend = std::max(bend, std::abs(fall));
         if (fall > 0 && squared_distance >= least)
-          least_squared = std::min(least_squared, squared_distance * 2 * limits_.missed_m / fall);
+          min_squared = std::min(min_squared, squared_distance * 2 * limits_.missed_m / fall);
       }
       return false;
     });
-    if (bend < flat) return limits_.most_flat_m;
-    return std::max(limits_.least_m, std::sqrt(least_squared));
+    if (bend < flat) return limits_.max_flat_m;
+    return std::max(limits_.min_m, std::sqrt(min_squared));
   }
 
   // That of the nearest spot on this side of the surface.
   double at(const SurfaceSpot& p) const {
     double nearest = 1e300, spacing = 0;
-    for (const double radius : {limits_.least_m, 2 * limits_.least_m}) {
+    for (const double radius : {limits_.min_m, 2 * limits_.min_m}) {
       fine_grid_.any_within(p.position, radius, [&](int n, double squared_distance) {
         if (squared_distance < nearest && spots_[std::size_t(n)].normal.dot(p.normal) > same_side)
           nearest = squared_distance, spacing = spacing_[std::size_t(n)];
@@ -227,12 +226,12 @@ std::vector<SurfaceSample> sample_surface(const SurfaceMesh& surface, const Seen
   if (!(seen.area_m2 > 0)) return {};
   const Box box = bounding_box(surface.positions);
   const SurfaceSpots sequence(seen);
-  const double discs = seen.area_m2 / (spacing.least_m * spacing.least_m);
-  const int probes = int(std::clamp(probes_a_disc * discs, 1000.0, 0.25 * most_candidates)),
-            candidates = int(std::clamp(candidates_a_disc * discs, 4000.0, 1.0 * most_candidates));
+  const double discs = seen.area_m2 / (spacing.min_m * spacing.min_m);
+  const int probes = int(std::clamp(probes_a_disc * discs, 1000.0, 0.25 * max_candidates)),
+            candidates = int(std::clamp(candidates_a_disc * discs, 4000.0, 1.0 * max_candidates));
   const SpacingMap map(sequence, probes, box, spacing);
 
-  std::vector<SurfaceSpot> spots = spots_that_stick_out(surface, seen.seen, spacing.least_m / 3);
+  std::vector<SurfaceSpot> spots = spots_that_stick_out(surface, seen.seen, spacing.min_m / 3);
   const std::size_t sticking_out = spots.size();
   for (int i = 0; i < candidates; ++i) spots.push_back(sequence.at(std::uint32_t(i)));
   std::vector<double> wanted;
@@ -269,7 +268,7 @@ std::vector<SurfaceSample> sample_surface(const SurfaceMesh& surface, const Seen
     }
     if (int(samples.size()) > most) continue;
     if (samples.empty()) return {};
-    share_area(sequence, std::min(candidates, 100'000), seen.area_m2, grid, spacing.least_m, samples);
+    share_area(sequence, std::min(candidates, 100'000), seen.area_m2, grid, spacing.min_m, samples);
     return samples;
   }
 }

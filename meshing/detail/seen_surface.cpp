@@ -10,7 +10,7 @@ namespace limber::meshing::detail {
 
 namespace {
 
-constexpr std::size_t most_extra_pieces = 400'000;
+constexpr std::size_t max_extra_pieces = 400'000;
 constexpr double unclear = 0.2;  // a winding number so far from any whole number
 
 // Halves the longest edge until none is longer than `length`. Stops at `most`.
@@ -56,7 +56,7 @@ SeenSurface seen_surface(const SurfaceMesh& surface, const WindingNumber& windin
   SeenSurface result;
   result.seen.assign(std::size_t(surface.triangles.rows()), 0);
   std::vector<SurfacePiece>& pieces = result.pieces;
-  while (!cut(surface, longest, result.seen.size() + most_extra_pieces, pieces)) longest *= 2;
+  while (!cut(surface, longest, result.seen.size() + max_extra_pieces, pieces)) longest *= 2;
 
   // Those that face the same way in the same cell, one group after the other.
   struct Place {

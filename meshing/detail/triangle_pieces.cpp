@@ -15,7 +15,7 @@ constexpr double thin = 1.0 / 16;  // a box is close whose sides but one are les
 constexpr double smallest_share =
     1.0 / 256;                         // of the model's diagonal; halving goes on until boxes are that long
 constexpr double pieces_a_length = 3;  // for each `smallest` that a needle is long, about
-constexpr double most_pieces = 400'000;
+constexpr double max_pieces = 400'000;
 constexpr double much_length = 64;  // of needles, in diagonals of the model: worth a look for other axes
 
 Corners corners_of(const Points& positions, const Triangles& triangles, std::size_t f) {
@@ -89,7 +89,7 @@ std::vector<TrianglePiece> pieces_of(const Points& positions, const Triangles& t
   const auto count = std::size_t(triangles.rows());
   smallest = std::max(smallest, smallest_share * bounding_box(positions).diagonal());
   smallest =
-      std::max(smallest, pieces_a_length * loose_of(positions, triangles, smallest).length / most_pieces);
+      std::max(smallest, pieces_a_length * loose_of(positions, triangles, smallest).length / max_pieces);
   std::vector<TrianglePiece> pieces;
   pieces.reserve(count);
   for (std::size_t f = 0; f < count; ++f) {

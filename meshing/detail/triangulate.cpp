@@ -8,7 +8,7 @@ namespace limber::meshing::detail {
 namespace {
 
 using Vec2 = Eigen::Vector2d;
-constexpr std::size_t most_corners_to_clip = 5'000;
+constexpr std::size_t max_corners_to_clip = 5'000;
 
 double turn(const Vec2& a, const Vec2& b, const Vec2& c) {
   return (b.x() - a.x()) * (c.y() - a.y()) - (b.y() - a.y()) * (c.x() - a.x());
@@ -66,7 +66,7 @@ void triangulate(const Points& positions, std::span<const int> given,
   const auto fan = [&] {
     for (int i = 1; i + 1 < n; ++i) triangles.push_back({corners[0], corners[i], corners[i + 1]});
   };
-  if (n == 3 || corners.size() > most_corners_to_clip) return fan();
+  if (n == 3 || corners.size() > max_corners_to_clip) return fan();
   const std::vector<Vec2> flat = flattened(positions, corners);
   if (flat.empty()) return fan();
 

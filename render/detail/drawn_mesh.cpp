@@ -77,7 +77,7 @@ std::vector<int> smoothing_groups(const Triangles& triangles, const Points& posi
     }
   std::sort(edges.begin(), edges.end());
 
-  const double least_cosine = std::cos(crease_angle_deg * std::numbers::pi / 180);
+  const double min_cosine = std::cos(crease_angle_deg * std::numbers::pi / 180);
   const auto vertex = [&](int corner) { return triangles(corner / 3, corner % 3); };
   const auto next = [](int corner) { return corner % 3 == 2 ? corner - 2 : corner + 1; };
   for (std::size_t begin = 0, end; begin < edges.size(); begin = end) {
@@ -88,7 +88,7 @@ std::vector<int> smoothing_groups(const Triangles& triangles, const Points& posi
     const int a = edges[begin].corner, b = edges[begin + 1].corner;
     const bool same_way = vertex(a) == vertex(b);  // then the two are wound against each other
     const Vec3 na = area_vector(triangles, positions, a / 3), nb = area_vector(triangles, positions, b / 3);
-    if ((same_way ? -1 : 1) * na.dot(nb) < least_cosine * na.norm() * nb.norm() || same_way) continue;
+    if ((same_way ? -1 : 1) * na.dot(nb) < min_cosine * na.norm() * nb.norm() || same_way) continue;
     join(a, next(b)), join(next(a), b);
   }
   std::vector<int> group(parent.size());

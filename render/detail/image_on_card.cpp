@@ -64,7 +64,7 @@ ImageOnCard image_on_card(const Image8& image, bool colors) {
         std::pair{GL_TEXTURE_WRAP_T, GL_REPEAT}})
     glTexParameteri(GL_TEXTURE_2D, GLenum(name), value);
   Level level = largest(image, colors);
-  while (std::max(level.width, level.height) > most_texels_a_side) level = halved(level);
+  while (std::max(level.width, level.height) > max_texels_a_side) level = halved(level);
   for (GLint number = 0;; ++number) {
     glTexImage2D(GL_TEXTURE_2D, number, GL_RGBA16, level.width, level.height, 0, GL_RGBA, GL_UNSIGNED_SHORT,
                  level.rgba.data());

@@ -7,7 +7,7 @@
 namespace limber::render::detail {
 
 // Beyond, only its smaller sizes are kept.
-inline constexpr int most_texels_a_side = 4096;
+inline constexpr int max_texels_a_side = 4096;
 
 struct ImageOnCard {
   Texture texture;

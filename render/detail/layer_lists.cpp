@@ -23,7 +23,7 @@ LayerLists::LayerLists(const SampleGrid& grid) : grid_(grid) {
   largest_buffer_ = std::min(std::size_t(largest), std::size_t(1) << 30);
 }
 
-int LayerLists::most_rows() const {
+int LayerLists::max_rows() const {
   return int(std::min(std::size_t(grid_.height), largest_buffer_ / word_bytes / words_a_row(grid_) - 1));
 }
 

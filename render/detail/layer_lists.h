@@ -15,9 +15,9 @@ class LayerLists {
  public:
   explicit LayerLists(const SampleGrid&);
 
-  // Empty lists for so many rows of texels; 1 … most_rows().
+  // Empty lists for so many rows of texels; 1 … max_rows().
   void clear(int first_row, int rows);
-  int most_rows() const;
+  int max_rows() const;
   void set_uniforms(const Program&) const;  // of a program that puts or reads, in use
 
   // How many were put since they were cleared; those beyond the room are not in any list.

@@ -18,7 +18,7 @@ bool stands_before(const Where& a, const Where& b) {
 
 // What walks through tables within tables calls itself, toml++ on the way out of them, too: so a key like
 // a.b.c may have few parts. (toml++ itself bounds how deep lists and inline tables are.)
-constexpr int most_parts = 16, most_depth = 64;
+constexpr int max_parts = 16, max_depth = 64;
 
 void require_short_keys(std::string_view text, const std::string& source) {
   int dots = 0, line = 1;
@@ -42,22 +42,22 @@ void require_short_keys(std::string_view text, const std::string& source) {
       i += std::min(rest.find('\n'), rest.size()) - 1;
     } else if (std::string_view("\n=,[]{}").find(c) != std::string_view::npos) {
       dots = 0;
-    } else if (c == '.' && ++dots >= most_parts) {
+    } else if (c == '.' && ++dots >= max_parts) {
       throw InputError(
           fmt::format("{}: a key has more than {} parts, and none of a scene has more than five; see "
                       "docs/scene.md",
-                      Where{source, line, 1}.text(), most_parts));
+                      Where{source, line, 1}.text(), max_parts));
     }
   }
 }
 
 Node converted(const toml::node& node, const std::string& source, int depth = 0) {
   Node made{where_of(node.source().begin, source), {}};
-  if (depth > most_depth)
+  if (depth > max_depth)
     throw InputError(
         fmt::format("{}: tables and lists are more than {} deep here, and none of a scene is; see "
                     "docs/scene.md",
-                    made.where.text(), most_depth));
+                    made.where.text(), max_depth));
   if (const auto* table = node.as_table()) {
     Table entries;
     for (const auto& [key, value] : *table)

@@ -294,17 +294,17 @@ List of_the_plan() {
       {"settle.mean_speed_m_s", [](Settings& s) { s.settle.mean_speed_m_s = 9; }},
       {"settle.max_force_share", [](Settings& s) { s.settle.max_force_share = 0.5; }},
       {"settle.hold", [](Settings& s) { s.settle.hold = !s.settle.hold; }},
-      {"laws.lag", [](Settings& s) { ++s.laws.lag; }},
-      {"laws.metric", [](Settings& s) { s.laws.metric = plan::Metric::distance; }},
-      {"laws.time_weight", [](Settings& s) { s.laws.time_weight = 0.5; }},
-      {"laws.guidance", [](Settings& s) { s.laws.guidance = 0.5; }},
-      {"laws.soft_price", [](Settings& s) { s.laws.soft_price = 1; }},
-      {"laws.learn_prices", [](Settings& s) { s.laws.learn_prices = false; }},
-      {"laws.steer", [](Settings& s) { s.laws.steer = false; }},
-      {"laws.look_s", [](Settings& s) { s.laws.look_s = 0.2; }},
-      {"laws.stop_in_goal", [](Settings& s) { s.laws.stop_in_goal = false; }},
-      {"laws.hold", [](Settings& s) { s.laws.hold = false; }},
-      {"laws.end_hopeless", [](Settings& s) { s.laws.end_hopeless = false; }}};
+      {"laws.lag", [](Settings& s) { ++s.search_options.lag; }},
+      {"laws.metric", [](Settings& s) { s.search_options.metric = plan::Metric::distance; }},
+      {"laws.time_weight", [](Settings& s) { s.search_options.time_weight = 0.5; }},
+      {"laws.guidance", [](Settings& s) { s.search_options.guidance = 0.5; }},
+      {"laws.soft_price", [](Settings& s) { s.search_options.soft_price = 1; }},
+      {"laws.learn_prices", [](Settings& s) { s.search_options.learn_prices = false; }},
+      {"laws.steer", [](Settings& s) { s.search_options.steer = false; }},
+      {"laws.look_s", [](Settings& s) { s.search_options.look_s = 0.2; }},
+      {"laws.stop_in_goal", [](Settings& s) { s.search_options.stop_in_goal = false; }},
+      {"laws.hold", [](Settings& s) { s.search_options.hold = false; }},
+      {"laws.end_hopeless", [](Settings& s) { s.search_options.end_hopeless = false; }}};
   for (const auto& [key, change] : keys)
     add(std::string("the setting ") + key, settings,
         [change = change](plan::Plan& p) { change(p.settings); });
@@ -446,7 +446,7 @@ List of_bodies() {
   add(ball, "a tet less", outside, [=](PreparedBody& body, auto&) {
     body.cage.tets.conservativeResize(body.cage.tets.rows() - 1, 4);
     body.shell_from_tet.pop_back();
-    body.contact.least_weight.conservativeResize(body.cage.tets.rows(), 4);
+    body.contact.min_weight.conservativeResize(body.cage.tets.rows(), 4);
     for (Eigen::Index s = 0; s < body.contact.samples.tet_from_sample.size(); ++s)
       body.contact.samples.tet_from_sample[s] =
           std::min(body.contact.samples.tet_from_sample[s], int(body.cage.tets.rows()) - 1);
@@ -511,7 +511,7 @@ List of_bodies() {
       [](PreparedBody& body, auto&) { body.binding.farthest_outside_vertex = 4; });
 
   const auto fit = [](PreparedBody& body) {  // what follows from the field
-    body.contact.least_weight = meshing::least_weights(body.contact.field, body.cage);
+    body.contact.min_weight = meshing::min_weights(body.contact.field, body.cage);
   };
   add(ball, "all distances larger", field, [=](PreparedBody& body, auto&) {
     const int by = int(2 * body.contact.field.cell_m / body.contact.field.unit_m);
@@ -543,9 +543,9 @@ List of_bodies() {
     fit(body);
   });
   add(ball, "tets in which nothing is solid", field,
-      [](PreparedBody& body, auto&) { body.contact.least_weight.setConstant(2); });
+      [](PreparedBody& body, auto&) { body.contact.min_weight.setConstant(2); });
   add(ball, "tets that may be solid anywhere", field,
-      [](PreparedBody& body, auto&) { body.contact.least_weight.setZero(); });
+      [](PreparedBody& body, auto&) { body.contact.min_weight.setZero(); });
   add(ball, "a sample off the surface", samples,
       [](PreparedBody& body, auto&) { body.contact.samples.positions_m(9, 0) += 1e-4; });
   add(ball, "a sample bound beside itself", samples, [](PreparedBody& body, auto&) {
@@ -818,7 +818,7 @@ List of_other_bodies() {
     DistanceField& field = m.bodies[ball].contact.field;
     const int by = int(0.9 * field.cell_m / field.unit_m);
     for (std::int16_t& v : field.values) v = std::int16_t(std::min(32000, v + by));
-    m.bodies[ball].contact.least_weight = meshing::least_weights(field, m.bodies[ball].cage);
+    m.bodies[ball].contact.min_weight = meshing::min_weights(field, m.bodies[ball].cage);
   });
   add(ball, "a cage that is a little larger", cage_again, true, [](Mutant& m) {
     PreparedBody& body = m.bodies[ball];

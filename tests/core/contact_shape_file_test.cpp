@@ -34,8 +34,8 @@ ContactShape shape() {
   s.samples.tet_from_sample << 0, 1, 1;
   s.samples.weights << 0.4, 0.1, 0.2, 0.3, 1, 0, 0, 0, 1.5, 0.5, -0.75, -0.25;
   s.samples.area_m2 << 0.1, 0.2, 1e-12;
-  s.least_weight = Weights::Constant(2, 4, 2);
-  s.least_weight.row(0) << 0.1, 0, 0.2, 0;
+  s.min_weight = Weights::Constant(2, 4, 2);
+  s.min_weight.row(0) << 0.1, 0, 0.2, 0;
   return s;
 }
 
@@ -57,7 +57,7 @@ TEST(ContactShapeFile, ReadsBackWhatItWrote) {
     EXPECT_EQ(read.samples.tet_from_sample, written.samples.tet_from_sample);
     EXPECT_EQ(read.samples.weights, written.samples.weights);
     EXPECT_EQ(read.samples.area_m2, written.samples.area_m2);
-    EXPECT_EQ(read.least_weight, written.least_weight);
+    EXPECT_EQ(read.min_weight, written.min_weight);
   }
 }
 
@@ -113,9 +113,9 @@ TEST(ContactShapeFile, WhatContradictsItselfIsAnInputErrorThatSaysWhatToDo) {
   with("sample_weights holds", [](auto& s) { s.samples.weights(1, 2) = std::nan(""); });
   with("sample_positions_m holds", [](auto& s) { s.samples.positions_m(1, 2) = INFINITY; });
   with("stands for", [](auto& s) { s.samples.area_m2[1] = 0; });
-  with("least_weight of tet 1", [](auto& s) { s.least_weight(1, 1) = -0.5; });
-  with("least_weight of tet 0", [](auto& s) { s.least_weight(0, 1) = 3; });
-  with("least_weight has", [](auto& s) { s.least_weight = Weights::Zero(3, 4); });
+  with("least_weight of tet 1", [](auto& s) { s.min_weight(1, 1) = -0.5; });
+  with("least_weight of tet 0", [](auto& s) { s.min_weight(0, 1) = 3; });
+  with("least_weight has", [](auto& s) { s.min_weight = Weights::Zero(3, 4); });
   with("cell_m", [](auto& s) { s.field.cell_m = 0; });
   with("unit_m", [](auto& s) { s.field.unit_m = -1; });
   with("lower_m", [](auto& s) { s.field.lower_m[1] = 1e300; });

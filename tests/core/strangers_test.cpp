@@ -37,7 +37,7 @@ TEST(Strangers, ASizeBeyondTheLimitIsRefusedBeforeItIsRead) {
   fs::resize_file(folder / "large.npz", std::uintmax_t(1) << 42);
   EXPECT_NE(complaint([&] { read_npz(folder / "large.npz"); }).find("4398046511104 bytes"),
             std::string::npos);
-  fs::resize_file(folder / "large.npz", most_json_bytes + 1);
+  fs::resize_file(folder / "large.npz", max_json_bytes + 1);
   EXPECT_NE(complaint([&] { read_json(folder / "large.npz"); }).find("at most 67108864"), std::string::npos);
 }
 
@@ -56,8 +56,8 @@ TEST(Strangers, AJsonOfAnyDepthIsAnAnswer) {
     for (int i = depth; i-- > 0;) text += i % 2 ? '}' : ']';
     return text;
   };
-  EXPECT_FALSE(parse_json(nested(most_json_depth), "a").dump().empty());
-  EXPECT_NE(complaint([&] { parse_json(nested(most_json_depth + 1), "a"); }).find("a:2: has lists within"),
+  EXPECT_FALSE(parse_json(nested(max_json_depth), "a").dump().empty());
+  EXPECT_NE(complaint([&] { parse_json(nested(max_json_depth + 1), "a"); }).find("a:2: has lists within"),
             std::string::npos);
   EXPECT_NE(complaint([] { parse_json(std::string(200000, '['), "a"); }), "");
 }

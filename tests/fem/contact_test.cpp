@@ -88,7 +88,7 @@ struct Tally {
 
 // The touches of bodies 0 and 1 are those of every vertex, edge middle and ridge against every tet. What is
 // within rounding of a face may go either way.
-Tally expect_brute_force(const Lane& lane, const std::vector<detail::Touch<float>>& found) {
+Tally expect_brute_force(const Lane& lane, const std::vector<detail::Contact<float>>& found) {
   const World& world = lane.world;
   Tally tally;
   std::size_t at = 0;
@@ -103,13 +103,14 @@ Tally expect_brute_force(const Lane& lane, const std::vector<detail::Touch<float
     const auto is_found = [&](int point, bool passes) {
       return at < found.size() && found[at].point == point && found[at].passes == passes;
     };
-    const auto expect_place = [&](const detail::Touch<float>& touch) {
-      const auto& point = world.topology.points[touch.point];
+    const auto expect_place = [&](const detail::Contact<float>& contact) {
+      const auto& point = world.topology.points[contact.point];
       const Vec3 place =
-          touch.share[0] * lane.node(point.node[0]) + touch.share[1] * lane.node(point.node[1]);
+          contact.share[0] * lane.node(point.node[0]) + contact.share[1] * lane.node(point.node[1]);
       Vec3 back = Vec3::Zero();
-      for (int i = 0; i < 4; ++i) back += touch.weight[i] * lane.node(world.topology.tets[touch.tet].node[i]);
-      agree((back - place).norm() < 1e-5, touch.point);
+      for (int i = 0; i < 4; ++i)
+        back += contact.weight[i] * lane.node(world.topology.tets[contact.tet].node[i]);
+      agree((back - place).norm() < 1e-5, contact.point);
     };
     for (int p = body.first_point; p < body.last_point; ++p) {
       const auto& point = world.topology.points[p];
@@ -264,11 +265,11 @@ TEST(Contact, EdgesThatCrossMeasureTheirDistance) {
     detail::Contacts<float> contacts(world, detail::kernels<float>(detail::best_isa(), 1), 1);
     const auto& touches = contacts.find(0, lane.view(), 0, 1);
     ASSERT_EQ(touches.size(), 2u);
-    for (const auto& touch : touches) {
-      EXPECT_TRUE(touch.passes && touch.known);
-      const bool of_a = world.topology.points[touch.point].node[0] < world.topology.bodies[0].last_node;
-      EXPECT_NEAR(touch.direction[2], of_a ? 1 : -1, 1e-5);
-      EXPECT_NEAR(touch.depth, depth, 1e-5);
+    for (const auto& contact : touches) {
+      EXPECT_TRUE(contact.passes && contact.known);
+      const bool of_a = world.topology.points[contact.point].node[0] < world.topology.bodies[0].last_node;
+      EXPECT_NEAR(contact.direction[2], of_a ? 1 : -1, 1e-5);
+      EXPECT_NEAR(contact.depth, depth, 1e-5);
     }
   }
 }
@@ -282,12 +283,12 @@ TEST(Contact, DepthOfAFlatContactIsTheDistance) {
   lane.move(0, [](const Vec3f& p) -> Vec3f { return p + Vec3f(0.03f, 0.02f, -0.04f); });
   detail::Contacts<float> contacts(world, detail::kernels<float>(detail::best_isa(), 1), 1);
   int from_cube = 0;
-  for (const auto& touch : contacts.find(0, lane.view(), 0, 1)) {
-    EXPECT_TRUE(touch.known);
-    if (world.topology.points[touch.point].node[0] >= world.topology.bodies[0].last_node) continue;
+  for (const auto& contact : contacts.find(0, lane.view(), 0, 1)) {
+    EXPECT_TRUE(contact.known);
+    if (world.topology.points[contact.point].node[0] >= world.topology.bodies[0].last_node) continue;
     ++from_cube;
-    EXPECT_NEAR(touch.depth, 0.04, 1e-5);
-    EXPECT_NEAR(touch.direction[2], 1, 1e-5);
+    EXPECT_NEAR(contact.depth, 0.04, 1e-5);
+    EXPECT_NEAR(contact.direction[2], 1, 1e-5);
   }
   EXPECT_EQ(from_cube, 16 + 33);  // vertices and edges of a face of 3 × 3 cells
 }

@@ -254,10 +254,10 @@ struct Settled {
   int rounds;    // of 20 steps
 };
 template <class AnyState, class Take>
-Settled<AnyState> settled(const World& world, AnyState state, int most_rounds, const Take& take) {
+Settled<AnyState> settled(const World& world, AnyState state, int max_rounds, const Take& take) {
   double before = 0, speed = 1;
   int round = 0;
-  for (; round < most_rounds && speed > still_m_s(world); ++round) {
+  for (; round < max_rounds && speed > still_m_s(world); ++round) {
     take(state);
     double kinetic = 0, momentum = 0;
     for (int n = 0; n < world.nodes; ++n) {
@@ -275,15 +275,15 @@ Settled<AnyState> settled(const World& world, AnyState state, int most_rounds, c
   }
   return {std::move(state), speed, round};
 }
-inline Settled<State> settled(const World& world, const State& state, int most_rounds) {
+inline Settled<State> settled(const World& world, const State& state, int max_rounds) {
   Control few;
   few.steps = 20;
-  return settled(world, state, most_rounds, [&](State& s) { s = propagate(world, s, few).end; });
+  return settled(world, state, max_rounds, [&](State& s) { s = propagate(world, s, few).end; });
 }
-inline Settled<ReferenceState> settled(const World& world, const ReferenceState& state, int most_rounds) {
+inline Settled<ReferenceState> settled(const World& world, const ReferenceState& state, int max_rounds) {
   Control few;
   few.steps = 20;
-  return settled(world, state, most_rounds, [&](ReferenceState& s) { advance(world, few, s); });
+  return settled(world, state, max_rounds, [&](ReferenceState& s) { advance(world, few, s); });
 }
 
 // Largest way of a node from where it is at rest.

@@ -33,7 +33,7 @@ TetMesh bent_bar() {
 
 // How far the ends of the arms are apart, from surface to surface, at the least, while the arms move towards
 // one another, each at `speed` at its end; negative: one is in the other, or beyond it.
-double least_gap(bool self_contact, double speed) {
+double min_gap(bool self_contact, double speed) {
   WorldSpec spec = testing::alone({"bar", bent_bar(), {}, {}});
   spec.bodies[0].self_contact = self_contact;
   const World world = build_world(spec);
@@ -65,10 +65,10 @@ double least_gap(bool self_contact, double speed) {
 }
 
 TEST(SelfContact, TheEndsOfABentBarMeetAndDoNotPass) {
-  EXPECT_LT(least_gap(false, 2), -0.2);  // through one another
+  EXPECT_LT(min_gap(false, 2), -0.2);  // through one another
   for (const double speed : {1.0, 2.0, 4.0}) {
     SCOPED_TRACE(speed);
-    const double gap = least_gap(true, speed);
+    const double gap = min_gap(true, speed);
     EXPECT_LT(gap, 0.01);  // they met
     // Up to 2 m/s they press no deeper than this; whatever the speed, no arm gets half through the other.
     testing::prove_at_least(15, fmt::format("ends of a bent bar's arms at {} m/s: least gap, m", speed),

@@ -80,7 +80,7 @@ inline std::shared_ptr<const ContactShape> shape_of(const TetMesh& cage, const D
     }
   samples.positions_m.conservativeResize(s, 3), samples.weights.conservativeResize(s, 4);
   samples.tet_from_sample.conservativeResize(s), samples.area_m2.conservativeResize(s);
-  shape.least_weight = Weights::Zero(cage.tets.rows(), 4);
+  shape.min_weight = Weights::Zero(cage.tets.rows(), 4);
   return std::make_shared<ContactShape>(std::move(shape));
 }
 

@@ -88,22 +88,22 @@ Pairs by_lists(detail::Contacts<float>& contacts, const Scene& scene, int from) 
   contacts.forget(0);
   Pairs pairs;
   const auto& body = world.topology.bodies[from];
-  for (const auto& touch : contacts.find(0,
-                                         {scene.x.data(),
-                                          still.data(),
-                                          still.data(),
-                                          {3, 1},
-                                          {3, 1},
-                                          1,
-                                          lower.data(),
-                                          upper.data(),
-                                          travel.data(),
-                                          travel.data()},
-                                         0, 1)) {
-    const auto& point = world.topology.points[touch.point];
+  for (const auto& contact : contacts.find(0,
+                                           {scene.x.data(),
+                                            still.data(),
+                                            still.data(),
+                                            {3, 1},
+                                            {3, 1},
+                                            1,
+                                            lower.data(),
+                                            upper.data(),
+                                            travel.data(),
+                                            travel.data()},
+                                           0, 1)) {
+    const auto& point = world.topology.points[contact.point];
     const bool vertex = point.node[0] == point.node[1];
     if (vertex && point.node[0] >= body.first_node && point.node[0] < body.last_node)
-      pairs.emplace(point.node[0], touch.tet);
+      pairs.emplace(point.node[0], contact.tet);
   }
   return pairs;
 }

@@ -52,14 +52,14 @@ WorldSpec barriers_with_bevels(bool phong) {
   return spec;
 }
 
-std::vector<detail::SurfaceTouch<float>> touches_of(Lane& lane) {
+std::vector<detail::SurfaceContact<float>> touches_of(Lane& lane) {
   detail::SurfaceContacts<float> contacts(lane.world, detail::kernels<float>(detail::best_isa(), 1), 1);
   return contacts.find(0, lane.view());
 }
 
-double deepest(const std::vector<detail::SurfaceTouch<float>>& touches) {
+double deepest(const std::vector<detail::SurfaceContact<float>>& touches) {
   float depth = 0;
-  for (const auto& touch : touches) depth = std::max(depth, touch.depth);
+  for (const auto& contact : touches) depth = std::max(depth, contact.depth);
   return double(depth);
 }
 
@@ -84,9 +84,9 @@ TEST_P(SurfaceContact, DepthIsThatOfTheSurfacesThroughAffineMaps) {
       const auto touches = touches_of(lane);
       ASSERT_FALSE(touches.empty());
       EXPECT_NEAR(deepest(touches), depth + 0.005, 0.1 * depth + 0.0015);
-      for (const auto& touch : touches) {  // out of the other body, against one's own centre
-        EXPECT_GT(touch.normal[0] * (touch.against == 0 ? 1 : -1), 0.9f);
-        EXPECT_NEAR(Eigen::Map<const Vec3f>(touch.normal).norm(), 1, 1e-5);
+      for (const auto& contact : touches) {  // out of the other body, against one's own centre
+        EXPECT_GT(contact.normal[0] * (contact.against == 0 ? 1 : -1), 0.9f);
+        EXPECT_NEAR(Eigen::Map<const Vec3f>(contact.normal).norm(), 1, 1e-5);
       }
     }
 }
@@ -124,9 +124,9 @@ TEST_P(SurfaceContact, DepthsInAnEllipsoidAreThoseOfBruteForce) {
       Lane lane(world);
       lane.move(0, [&](const Vec3f& p) { return Vec3f(map.cast<float>() * p); });
       lane.move(1, [&](const Vec3f& p) { return Vec3f(p + moved.cast<float>()); });
-      for (const auto& touch : touches_of(lane)) {
-        if (touch.body != 1) continue;
-        const Vec3 place = Eigen::Map<const Vec3f>(touch.place).cast<double>();
+      for (const auto& contact : touches_of(lane)) {
+        if (contact.body != 1) continue;
+        const Vec3 place = Eigen::Map<const Vec3f>(contact.place).cast<double>();
         std::size_t nearest = 0;
         double least = 1;
         for (std::size_t i = 0; i < directions.size(); ++i)
@@ -134,7 +134,7 @@ TEST_P(SurfaceContact, DepthsInAnEllipsoidAreThoseOfBruteForce) {
             least = d, nearest = i;
         const Vec3& n = directions[nearest];
         const double depth = (map * (radius * n) - place).dot((normal_map * n).normalized());
-        if (depth > 0.002) errors.push_back(std::abs(double(touch.depth) - offset - depth) / depth);
+        if (depth > 0.002) errors.push_back(std::abs(double(contact.depth) - offset - depth) / depth);
       }
     }
     std::sort(errors.begin(), errors.end());
@@ -259,18 +259,18 @@ TEST(SurfaceContacts, PhongSurfacesTouchWhereTheyAre) {
     const auto touches = touches_of(lane);
     double deepest = 0, worst = 0;
     int of_ball = 0;
-    for (const auto& touch : touches) {
-      if (touch.body != 0) continue;
+    for (const auto& contact : touches) {
+      if (contact.body != 0) continue;
       ++of_ball;
-      const Vec3 place = Eigen::Map<const Vec3f>(touch.place).cast<double>();
+      const Vec3 place = Eigen::Map<const Vec3f>(contact.place).cast<double>();
       EXPECT_NEAR((place - Vec3(1.75, 0.5, 0.8 - depth)).norm(), 0.3,
                   0.004);  // on the ball, moved as a whole
       std::size_t nearest = 0;
       for (std::size_t k = 1; k < places.size(); ++k)
         if ((places[k] - place).norm() < (places[nearest] - place).norm()) nearest = k;
       const double expected = 0.005 - normals[nearest].dot(place - places[nearest]);
-      worst = std::max(worst, std::abs(double(touch.depth) - expected));
-      deepest = std::max(deepest, double(touch.depth));
+      worst = std::max(worst, std::abs(double(contact.depth) - expected));
+      deepest = std::max(deepest, double(contact.depth));
     }
     EXPECT_GT(of_ball, 2);
     EXPECT_NEAR(deepest, depth + 0.005, 0.1 * depth + 0.002);
@@ -314,13 +314,13 @@ TEST(SurfaceContacts, FoldsTouchNothingInTheAir) {
         for (int i = 0; i < 4; ++i) place += dense.weights(k, i) * lane.node(tet.node[i]);
         places.push_back(place);
       }
-      for (const auto& touch : touches_of(lane)) {
-        if (touch.body != 0) continue;
+      for (const auto& contact : touches_of(lane)) {
+        if (contact.body != 0) continue;
         ++touched;
-        const Vec3 place = Eigen::Map<const Vec3f>(touch.place).cast<double>();
+        const Vec3 place = Eigen::Map<const Vec3f>(contact.place).cast<double>();
         double nearest = 1;
         for (const Vec3& p : places) nearest = std::min(nearest, (p - place).norm());
-        EXPECT_LT(nearest, touch.depth + 2 * offset + spacing);
+        EXPECT_LT(nearest, contact.depth + 2 * offset + spacing);
       }
     }
   EXPECT_GT(touched, 20);
@@ -372,8 +372,8 @@ TEST_P(SurfaceContact, NoNodeBearsWhatHeldOnesDo) {
   Lane lane(world);
   lane.move(0, [](const Vec3f& p) { return Vec3f(p - 0.002f * (1 - p.z() / 0.05f) * Vec3f::UnitX()); });
   detail::SurfaceContacts<float> contacts(world, detail::kernels<float>(detail::best_isa(), 1), 1);
-  std::vector<detail::Exerted<float>> told;
-  contacts.tell(&told);
+  std::vector<detail::ContactRecord<float>> records;
+  contacts.record_to(&records);
   contacts.add_forces(0, lane.view());
   double heaviest = 0, told_in_all = 0, all = 0;
   for (const double mass : world.bodies[0].node_mass_kg) heaviest = std::max(heaviest, mass);
@@ -382,7 +382,7 @@ TEST_P(SurfaceContact, NoNodeBearsWhatHeldOnesDo) {
     EXPECT_LT(lane.f[3 * n], 1.1 * most) << n;
     all += double(lane.f[3 * n]);
   }
-  for (const auto& one : told) told_in_all += double(one.force[0]);
+  for (const auto& one : records) told_in_all += double(one.force[0]);
   EXPECT_GT(all, 1);
   EXPECT_LT(told_in_all, most);
   if (!GetParam()) {  // whose weights are not negative

@@ -80,7 +80,7 @@ struct Good {
       bodies.push_back({name, read_file(work / "bodies" / name / "shells.obj"), prepared});
       // Of a field for show a thousandth will do.
       bodies.back().body.contact = meshing::make_contact_shape(
-          prepared.surface, prepared.cage, {.cells = 8, .most_cells = 8, .most_nodes = 1000});
+          prepared.surface, prepared.cage, {.cells = 8, .max_cells = 8, .max_nodes = 1000});
       write_body(bodies.back());
     }
     detail::PlanOptions options;

@@ -259,7 +259,7 @@ void read_label_map(std::string_view bytes) {
   if (map.voxels() > 5000) return;
   std::vector<int> rows;
   for (int row = 1; row < int(std::min<std::size_t>(map.labels.size(), 5)); ++row) rows.push_back(row);
-  for (const imaging::LabelSurface& one : imaging::surfaces_of(map, rows, {.least_island = 0}))
+  for (const imaging::LabelSurface& one : imaging::surfaces_of(map, rows, {.min_island = 0}))
     validate(one.surface, "what surfaces_of gives");
 }
 
@@ -482,7 +482,7 @@ std::vector<Target> made_targets() {
     shape.field = {Vec3::Zero(), 0.5, {2, 2, 2}, 1e-4, std::vector<std::int16_t>(8, -3)};
     shape.samples = {Points::Zero(1, 3), Eigen::VectorXi::Zero(1), Weights::Constant(1, 4, 0.25),
                      Eigen::VectorXd::Ones(1)};
-    shape.least_weight = Weights::Zero(2, 4);
+    shape.min_weight = Weights::Zero(2, 4);
     write_contact_shape(p, shape, surface(), cage());
   });
   const std::string plan_npz = written("plan.npz", [](const fs::path& p) {

@@ -88,7 +88,7 @@ TEST(SurfaceNets, OfNoiseTooEachSurfaceIsAManifold) {
     Rng rng(seed, 0);
     const LabelMap map =
         made_map({9, 8, 7}, millimetres, Vec3::Zero(), [&](const Vec3&) { return rng.below(4); });
-    for (const LabelSurface& one : surfaces_of(map, {1, 2, 3}, {.least_island = 0}))
+    for (const LabelSurface& one : surfaces_of(map, {1, 2, 3}, {.min_island = 0}))
       expect_manifold(one.surface);
   }
 }
@@ -113,7 +113,7 @@ TEST(SurfaceNets, SurfacesMeetNeitherThemselvesNorOneAnother) {
     for (int row = 1; row < int(map.labels.size()); ++row)
       if (std::count(map.material.begin(), map.material.end(), row) > 20) rows.push_back(row);
     ASSERT_GE(rows.size(), 3u);
-    const std::vector<LabelSurface> found = surfaces_of(map, rows, {.least_island = 0});
+    const std::vector<LabelSurface> found = surfaces_of(map, rows, {.min_island = 0});
     for (std::size_t a = 0; a < rows.size(); ++a) {
       expect_manifold(found[a].surface);
       EXPECT_TRUE(meshing::self_intersections(found[a].surface).pairs.empty());
@@ -128,7 +128,7 @@ TEST(SurfaceNets, WithoutSmoothingAVoxelIsACubeAndFacesAddUp) {
   const LabelMap map = made_map({3, 3, 3}, millimetres, Vec3(1, 2, 3) * 0.001, [](const Vec3& p) {
     return int((p - Vec3(0.002, 0.003, 0.004)).norm() < 1e-6);
   });
-  const LabelSurface cube = surfaces_of(map, {1}, {.gap = 0, .rounds = 0, .least_island = 0})[0];
+  const LabelSurface cube = surfaces_of(map, {1}, {.gap = 0, .rounds = 0, .min_island = 0})[0];
   EXPECT_EQ(cube.surface.triangles.rows(), 12);
   EXPECT_NEAR(volume(cube.surface), 1e-9, 1e-18);
   const Box box = bounding_box(cube.surface.positions);
@@ -137,7 +137,7 @@ TEST(SurfaceNets, WithoutSmoothingAVoxelIsACubeAndFacesAddUp) {
   Rng rng(5, 0);
   const LabelMap noise =
       made_map({7, 7, 7}, millimetres, Vec3::Zero(), [&](const Vec3&) { return rng.below(2); });
-  const LabelSurface all = surfaces_of(noise, {1}, {.gap = 0, .rounds = 0, .least_island = 0})[0];
+  const LabelSurface all = surfaces_of(noise, {1}, {.gap = 0, .rounds = 0, .min_island = 0})[0];
   EXPECT_NEAR(volume(all.surface), 1e-9 * double(all.voxels), 1e-15);
 }
 
@@ -173,7 +173,7 @@ TEST(SurfaceNets, ShellsWithinShellsAndSheetsOfOneVoxelKeepApartAndWhole) {
     const double r = (p - middle).norm();
     return r < 0.006 ? 1 : r < 0.010 ? 2 : r < 0.011 ? 3 : r < 0.014 ? 1 : 0;
   });
-  const std::vector<LabelSurface> found = surfaces_of(map, {1, 2, 3}, {.least_island = 0});
+  const std::vector<LabelSurface> found = surfaces_of(map, {1, 2, 3}, {.min_island = 0});
   for (const LabelSurface& one : found) {
     expect_manifold(one.surface);
     EXPECT_TRUE(meshing::self_intersections(one.surface).pairs.empty());
@@ -195,14 +195,14 @@ TEST(SurfaceNets, IslandsAreLeftOutAndTold) {
     if ((p - Vec3(0.006, 0.006, 0.006)).norm() < 0.004) return 1;
     return int(p.x() > 0.0195 && p.y() < 0.0015 && p.z() < 0.0005);  // 4 × 2 × 1 voxels
   });
-  const LabelSurface all = surfaces_of(map, {1}, {.least_island = 8})[0];
-  const LabelSurface large = surfaces_of(map, {1}, {.least_island = 9})[0];
+  const LabelSurface all = surfaces_of(map, {1}, {.min_island = 8})[0];
+  const LabelSurface large = surfaces_of(map, {1}, {.min_island = 9})[0];
   EXPECT_EQ(all.islands_dropped, 0);
   EXPECT_EQ(large.islands_dropped, 1);
   EXPECT_EQ(large.voxels_dropped, 8);
   EXPECT_EQ(large.voxels + 8, all.voxels);
   EXPECT_LT(bounding_box(large.surface.positions).upper.x(), 0.012);
-  const LabelSurface none = surfaces_of(map, {1}, {.least_island = 1e6})[0];
+  const LabelSurface none = surfaces_of(map, {1}, {.min_island = 1e6})[0];
   EXPECT_EQ(none.voxels, 0);
   EXPECT_EQ(none.voxels_dropped, all.voxels);
   EXPECT_EQ(none.surface.triangles.rows(), 0);

@@ -7,7 +7,7 @@
 #include "fem/batch.h"
 #include "fem/observe.h"
 #include "limber/detail/world/fem_system.h"
-#include "plan/course.h"
+#include "plan/control_rollout.h"
 #include "plan/search.h"
 #include "tests/fem/worlds.h"
 
@@ -102,7 +102,7 @@ TEST(Goal, TheRobotComesToRestTurnedInTheBox) {
   EXPECT_TRUE((center.array() >= s.goal.box_m->lower.array()).all() &&
               (center.array() <= s.goal.box_m->upper.array()).all());
   EXPECT_LT(system.mean_speed(end), s.settle.mean_speed_m_s);
-  s.laws.hold = s.settle.hold = true;  // held, it never turns
+  s.search_options.hold = s.settle.hold = true;  // held, it never turns
   EXPECT_FALSE(plan::plan(system, s).solved());
 }
 
@@ -113,12 +113,12 @@ TEST(Goal, RolloutsThatDivergeOnTheirWayAreOnlyCounted) {
   plan::Settings s;
   s.goal.center_of_mass_m = Vec3(1, 0.5, 2), s.goal.radius_m = 1e-9;
   s.max_force_n = 1e12, s.max_iterations = 40;
-  s.laws = {.lag = 3,
-            .guidance = 0.7,
-            .soft_price = 10,
-            .look_s = 0.02,
-            .stop_in_goal = true,
-            .end_hopeless = true};
+  s.search_options = {.lag = 3,
+                      .guidance = 0.7,
+                      .soft_price = 10,
+                      .look_s = 0.02,
+                      .stop_in_goal = true,
+                      .end_hopeless = true};
   const plan::Plan p = plan::plan(system, s);
   EXPECT_FALSE(p.solved());
   EXPECT_GT(p.statistics.diverged, 10);
@@ -131,7 +131,7 @@ TEST(Goal, TheSettleHoldsARobotInWhateverTurnItIs) {
   const Vec3 middle(0.3, 0.2, 1.1);
   Points p = world.bodies[0].cage.positions.rowwise() - middle.transpose();
   p = turned(p, Vec3::UnitX(), 60).rowwise() + middle.transpose();
-  plan::Course arriving;
+  plan::ControlRollout arriving;
   arriving.from = with_robot_at(world, p);
   const fem::Body& robot = world.bodies[0];
   for (int n = 0; n < robot.node_count(); ++n)
@@ -140,9 +140,9 @@ TEST(Goal, TheSettleHoldsARobotInWhateverTurnItIs) {
   s.goal.center_of_mass_m = middle, s.goal.radius_m = 0.1, s.max_force_n = 20, s.settle.max_duration_s = 8;
   for (const bool hold : {true, false}) {
     s.settle.hold = hold;
-    plan::Course course = arriving;
+    plan::ControlRollout course = arriving;
     plan::run(system, s, {&course, 1}, {.ask_acceptable = false});
-    EXPECT_EQ(course.result, plan::Course::rests_in_goal) << hold;
+    EXPECT_EQ(course.result, plan::ControlRollout::rests_in_goal) << hold;
     EXPECT_NEAR(fem::turn_from_goal_shape_deg(world, course.end), hold ? 60 : 0, 5) << hold;
   }
 }
@@ -222,7 +222,7 @@ TEST(Goal, ALookSeesThatTheGoalIsLost) {
   s.goal.center_of_mass_m = Vec3(0.3, 0.2, 7), s.goal.radius_m = 0.01;
   s.max_force_n = 1, s.max_iterations = 3, s.settle.max_duration_s = 0;
   s.min_duration_s = s.max_duration_s = double(state.step) * system.dt_s();
-  s.laws.look_s = 0.02;
+  s.search_options.look_s = 0.02;
   const plan::Plan p = plan::plan(system, s);
   EXPECT_EQ(p.statistics.rejected, 3);
   EXPECT_EQ(p.tree.size(), 1);

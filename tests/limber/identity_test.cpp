@@ -18,7 +18,7 @@ namespace limber::detail {
 namespace {
 
 constexpr int rollouts = 20;
-constexpr int least_contact_steps = 3000;
+constexpr int min_contact_steps = 3000;
 
 struct Cases {
   State start;  // robot against an obstacle
@@ -180,7 +180,7 @@ TEST_P(Identity, OfASceneIsTheSameBitsEverywhere) {
   const std::vector<State> alone = ends(world, cases, 0, rollouts, 1, fem::InstructionSet::automatic);
   EXPECT_NE(alone[0], alone[4]);
   const int contact_steps = count_contact_steps(world, cases, alone);
-  EXPECT_GE(contact_steps, least_contact_steps);
+  EXPECT_GE(contact_steps, min_contact_steps);
   fmt::print("{}: {} steps in contact\n", GetParam(), contact_steps);
   for (const int lanes : {1, 4, 8, 16}) {
     for (const auto& [set, name] : sets)

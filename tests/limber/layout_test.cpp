@@ -13,7 +13,7 @@ LaidBody cube(const Vec3& center, double edge = 1, bool held = false) {
   TetMesh cage = scenes::make_box_cage(Vec3::Constant(edge), {2, 2, 2});
   cage.positions.rowwise() += center.transpose();
   return {std::make_shared<const ContactShape>(meshing::make_contact_shape(
-              {cage.positions, boundary_triangles(cage.tets)}, cage, {.cells = 48, .most_cells = 48})),
+              {cage.positions, boundary_triangles(cage.tets)}, cage, {.cells = 48, .max_cells = 48})),
           held};
 }
 

@@ -87,20 +87,20 @@ TEST(ContactShape, TheSurfaceIsCoveredBySamplesThatKeepApart) {
     const double size = size_of(surface);
     const Points& samples = made.shape.samples.positions_m;
     EXPECT_GT(samples.rows(), 250);
-    EXPECT_LE(samples.rows(), ContactShapeSettings().most_samples);
+    EXPECT_LE(samples.rows(), ContactShapeSettings().max_samples);
     EXPECT_GT(made.shape.samples.area_m2.minCoeff(), 0);
     // No two closer than the least spacing, but for those on the two sides of an edge or a wall.
     int close = 0;
     for (Eigen::Index a = 0; a < samples.rows(); ++a)
       for (Eigen::Index b = 0; b < a; ++b)
-        close += (samples.row(a) - samples.row(b)).norm() < ContactShapeSettings().least_spacing * size;
+        close += (samples.row(a) - samples.row(b)).norm() < ContactShapeSettings().min_spacing * size;
     EXPECT_LT(close, 0.02 * double(samples.rows()));
     Rng rng(4, 0);
     for (int i = 0; i < 3000; ++i) {
       const Vec3 p = surface_point(surface, rng);
       if (made.shape.field.at(p) < -0.01 * size) continue;  // an inner wall
       EXPECT_LT((samples.rowwise() - p.transpose()).rowwise().norm().minCoeff(),
-                1.06 * ContactShapeSettings().most_flat_spacing * size)
+                1.06 * ContactShapeSettings().max_flat_spacing * size)
           << p.transpose();
     }
   }
@@ -161,7 +161,7 @@ TEST(ContactShape, ABallThatIsPressedInMeetsASample) {
         return (p.rowwise() - center.transpose()).rowwise().norm().minCoeff();
       };
       EXPECT_LT(nearest(made.shape.samples.positions_m) - nearest(surface.positions),
-                std::pow(1.06 * ContactShapeSettings().most_flat_spacing * size, 2) / (2 * radius));
+                std::pow(1.06 * ContactShapeSettings().max_flat_spacing * size, 2) / (2 * radius));
     }
   }
 }
@@ -200,7 +200,7 @@ TEST(ContactShape, NoPointInsideIsBelowTheLeastWeights) {
         lowest = std::min(lowest, made.shape.field.at(p));
         if (made.shape.field.at(p) <= 0) least = least.cwiseMin(w);
       }
-      const Eigen::RowVector4d bound = made.shape.least_weight.row(t);
+      const Eigen::RowVector4d bound = made.shape.min_weight.row(t);
       for (int k = 0; k < 4; ++k) EXPECT_LE(bound[k], least[k]) << "tet " << t;
       EXPECT_GE(bound.minCoeff(), 0);
       if (least[0] <= 1) gap += (least - bound).mean(), ++met;
@@ -224,7 +224,7 @@ TEST(ContactShape, SameBytesOnAnyNumberOfThreads) {
     EXPECT_EQ(one.shape.samples.positions_m, two.shape.samples.positions_m);
     EXPECT_EQ(one.shape.samples.area_m2, two.shape.samples.area_m2);
     EXPECT_EQ(one.shape.samples.weights, two.shape.samples.weights);
-    EXPECT_EQ(one.shape.least_weight, two.shape.least_weight);
+    EXPECT_EQ(one.shape.min_weight, two.shape.min_weight);
   }
 }
 
@@ -237,7 +237,7 @@ TEST(ContactShape, SizeAndPlaceOnlyScaleIt) {
       make_contact_shape({1024 * surface.positions, surface.triangles}, {1024 * cage.positions, cage.tets});
   EXPECT_EQ(shape.field.values, large.field.values);
   EXPECT_EQ(1024 * shape.samples.positions_m, large.samples.positions_m);
-  EXPECT_EQ(shape.least_weight, large.least_weight);
+  EXPECT_EQ(shape.min_weight, large.min_weight);
 }
 
 TEST(ContactShape, WhatHasNoInsideIsLeftToTheCage) {
@@ -251,7 +251,7 @@ TEST(ContactShape, WhatHasNoInsideIsLeftToTheCage) {
     const ContactShape shape = make_contact_shape(surface, cage, {}, &report);
     EXPECT_FALSE(shape.usable);
     EXPECT_EQ(shape.samples.tet_from_sample.size(), 0);
-    EXPECT_EQ(shape.least_weight, Weights::Constant(cage.tets.rows(), 4, 2));
+    EXPECT_EQ(shape.min_weight, Weights::Constant(cage.tets.rows(), 4, 2));
     ASSERT_EQ(report.warnings.size(), 1u);
     EXPECT_NE(report.warnings[0].find("contact goes by the cage"), std::string::npos);
     EXPECT_GT(shape.field.at(surface.positions.row(0)), 0);

@@ -62,7 +62,7 @@ TEST(SplitEdges, TakesWhatIsNoManifoldAndEnds) {
     on_edge += split.positions(i, 1) == 0 && split.positions(i, 2) == 0;
   EXPECT_EQ(on_edge, 17);
 
-  const SurfaceMesh bounded = split_long_edges(fins, 1e-7, {.most_new_vertices = 5'000});
+  const SurfaceMesh bounded = split_long_edges(fins, 1e-7, {.max_new_vertices = 5'000});
   EXPECT_LT(bounded.positions.rows(), 2 * 5'000);
   EXPECT_GT(bounded.positions.rows(), 500);
 }

@@ -20,14 +20,14 @@ void expect_share(std::int64_t count, std::int64_t of, double p, const char* wha
   EXPECT_NEAR(double(count), double(of) * p, 6 * std::sqrt(double(of) * p * (1 - p))) << what;
 }
 
-TEST(Draw, ManipulationsFollowTheirWeights) {
+TEST(Sample, ManipulationsFollowTheirWeights) {
   const Toy toy(5, false, false, 99);
   Settings s = toy_settings();
   s.goal_bias = 0.3;
   s.weights = {3, 1, 2};
   std::int64_t goal = 0, at_goal[4] = {}, elsewhere[4] = {};
   for (int i = 0; i < draws; ++i) {
-    const Draw d = draw(s, toy, i);
+    const Sample d = draw_sample(s, toy, i);
     goal += d.towards_goal;
     ++(d.towards_goal ? at_goal : elsewhere)[int(d.manipulation)];
   }
@@ -41,21 +41,21 @@ TEST(Draw, ManipulationsFollowTheirWeights) {
   EXPECT_EQ(at_goal[0] + elsewhere[0], 0);
 }
 
-TEST(Draw, AWeightOfZeroIsNever) {
+TEST(Sample, AWeightOfZeroIsNever) {
   const Toy toy(5, false, false, 99);
   Settings s = toy_settings();
   s.goal_bias = 0.5;
   for (const ManipulationWeights w : {ManipulationWeights{1, 0, 0}, ManipulationWeights{0, 1, 0}}) {
     s.weights = w;
     const Manipulation only = w.body > 0 ? Manipulation::body : Manipulation::control_point;
-    for (int i = 0; i < draws; ++i) ASSERT_EQ(draw(s, toy, i).manipulation, only);
+    for (int i = 0; i < draws; ++i) ASSERT_EQ(draw_sample(s, toy, i).manipulation, only);
   }
   s.weights = {0, 0, 1};
   s.goal_bias = 1;
-  for (int i = 0; i < draws; ++i) ASSERT_EQ(draw(s, toy, i).manipulation, Manipulation::interpolation);
+  for (int i = 0; i < draws; ++i) ASSERT_EQ(draw_sample(s, toy, i).manipulation, Manipulation::interpolation);
 }
 
-TEST(Draw, PointsDurationsForcesAndNodesFillTheirRanges) {
+TEST(Sample, PointsDurationsForcesAndNodesFillTheirRanges) {
   const Toy toy(5, false, false, 99);
   Settings s = toy_settings();
   s.min_force_share = 0.25;
@@ -63,40 +63,40 @@ TEST(Draw, PointsDurationsForcesAndNodesFillTheirRanges) {
   const Box bounds = toy.sample_bounds();
   Box points;
   int nodes[5] = {};
-  double least_force = 1e9, most_force = 0;
-  int least_steps = 1 << 30, most_steps = 0;
+  double min_force = 1e9, max_force = 0;
+  int min_steps = 1 << 30, max_steps = 0;
   for (int i = 0; i < draws; ++i) {
-    const Draw d = draw(s, toy, i);
+    const Sample d = draw_sample(s, toy, i);
     if (d.towards_goal) {
       ASSERT_EQ(d.point, s.goal.center_of_mass_m);
     } else {
       points.include(d.point);
     }
     ++nodes[d.robot_node];
-    least_force = std::min(least_force, d.force_n), most_force = std::max(most_force, d.force_n);
-    least_steps = std::min(least_steps, d.steps), most_steps = std::max(most_steps, d.steps);
+    min_force = std::min(min_force, d.force_n), max_force = std::max(max_force, d.force_n);
+    min_steps = std::min(min_steps, d.steps), max_steps = std::max(max_steps, d.steps);
   }
   EXPECT_TRUE((points.lower.array() >= bounds.lower.array()).all() &&
               (points.upper.array() <= bounds.upper.array()).all());
   EXPECT_GT((points.size().array() / bounds.size().array()).minCoeff(), 0.999);
   for (const int count : nodes) expect_share(count, draws, 0.2, "robot node");
-  EXPECT_GE(least_force, 2);
-  EXPECT_LE(most_force, 6);
-  EXPECT_GT(most_force - least_force, 3.99);
-  EXPECT_EQ(least_steps, 20);
-  EXPECT_EQ(most_steps, 100);
+  EXPECT_GE(min_force, 2);
+  EXPECT_LE(max_force, 6);
+  EXPECT_GT(max_force - min_force, 3.99);
+  EXPECT_EQ(min_steps, 20);
+  EXPECT_EQ(max_steps, 100);
 }
 
-TEST(Draw, DependsOnSeedAndIterationAlone) {
+TEST(Sample, DependsOnSeedAndIterationAlone) {
   const Toy toy(5, false, false, 99);
   Settings s = toy_settings();
-  const Draw a = draw(s, toy, 12);
-  draw(s, toy, 13);
-  const Draw again = draw(s, toy, 12);
+  const Sample a = draw_sample(s, toy, 12);
+  draw_sample(s, toy, 13);
+  const Sample again = draw_sample(s, toy, 12);
   EXPECT_TRUE(a.point == again.point && a.force_n == again.force_n && a.steps == again.steps);
-  EXPECT_NE(draw(s, toy, 13).force_n, a.force_n);
+  EXPECT_NE(draw_sample(s, toy, 13).force_n, a.force_n);
   ++s.seed;
-  EXPECT_NE(draw(s, toy, 12).force_n, a.force_n);
+  EXPECT_NE(draw_sample(s, toy, 12).force_n, a.force_n);
 }
 
 TEST(Control, PushesAlongTheWayAndNeverAboveTheMaximum) {
@@ -107,7 +107,7 @@ TEST(Control, PushesAlongTheWayAndNeverAboveTheMaximum) {
   s.max_force_n = 7.3;
   const Vec3 center(3, 2, 1);
   for (int i = 0; i < draws; ++i) {
-    const Draw d = draw(s, toy, i);
+    const Sample d = draw_sample(s, toy, i);
     const Control c = control_of(d, s, center);
     ASSERT_LE(largest_force(c), s.max_force_n);
     ASSERT_NEAR(largest_force(c), s.max_force_n, 1e-5 * s.max_force_n);
@@ -123,7 +123,7 @@ TEST(Control, PushesAlongTheWayAndNeverAboveTheMaximum) {
 }
 
 TEST(Control, AtThePointItselfThereIsNoDirectionAndNoForce) {
-  Draw d;
+  Sample d;
   d.manipulation = Manipulation::body;
   d.force_n = 5;
   d.point = Vec3(1, 2, 3);

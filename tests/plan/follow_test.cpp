@@ -13,15 +13,15 @@ namespace {
 using testing::Toy;
 using testing::toy_settings;
 
-Course followed(const Toy& toy, const Settings& s, const Follower& follower) {
-  Course course;
+ControlRollout followed(const Toy& toy, const Settings& s, const Follower& follower) {
+  ControlRollout course;
   course.from = toy.start();
   course.next = [&](const State& state) -> std::optional<Control> {
     if (follower.is_over(state)) return std::nullopt;
     return follower.next(state);
   };
   run(toy, s, {&course, 1},
-      {.settle = CourseOptions::anywhere, .keep_frames = true, .ask_acceptable = false});
+      {.settle = ControlRolloutOptions::anywhere, .keep_frames = true, .ask_acceptable = false});
   return course;
 }
 
@@ -33,8 +33,8 @@ TEST(Follow, ThePlanInItsOwnSystemIsThePlanBitForBit) {
     const Plan found = plan(toy, s);
     ASSERT_TRUE(found.solved());
     const Follower follower(toy, s, guide_of(toy, s, found.trajectory));
-    const Course course = followed(toy, s, follower);
-    EXPECT_EQ(course.result, Course::rests_in_goal);
+    const ControlRollout course = followed(toy, s, follower);
+    EXPECT_EQ(course.result, ControlRollout::rests_in_goal);
     EXPECT_TRUE(course.frames == found.trajectory.frames);
     EXPECT_EQ(limber::hash_of(course.end), limber::hash_of(found.trajectory.end));
     EXPECT_GT(course.controls.size(), found.trajectory.controls.size());
@@ -77,17 +77,17 @@ TEST(Follow, GetsThereWhereTheSameControlsMissByTheFormula) {
       Toy other(1, false, false, 99);
       other.damping_per_s = 0, other.mass_kg *= 1 + float(more);
 
-      Course blind;
+      ControlRollout blind;
       blind.from = other.start();
       blind.controls = guide.pieces;
       run(other, was.settings, {&blind, 1}, {});
       const double missed = was.way_m * (1 - 1 / (1 + more));
       EXPECT_NEAR(was.settings.goal.center_of_mass_m.x() - other.robot_center(blind.end).x(), missed, 1e-5);
-      EXPECT_EQ(blind.result, Course::ends_elsewhere);
+      EXPECT_EQ(blind.result, ControlRollout::ends_elsewhere);
 
       const Follower follower(other, was.settings, guide);
-      const Course seeing = followed(other, was.settings, follower);
-      EXPECT_EQ(seeing.result, Course::rests_in_goal);
+      const ControlRollout seeing = followed(other, was.settings, follower);
+      EXPECT_EQ(seeing.result, ControlRollout::rests_in_goal);
       const double holds_m =
           was.force_n * std::abs(more) / (was.toy.robot_mass_kg() * std::pow(guide.response_rad_s, 2));
       double farthest = 0;
@@ -126,7 +126,7 @@ TEST(Follow, IsTheSameForAnyNumberOfLanesAndThreads) {
     for (const int lanes : {1, 3, 16}) {
       set_thread_count(threads);
       other.lanes_wanted = lanes;
-      std::vector<Course> courses(7);
+      std::vector<ControlRollout> courses(7);
       for (std::size_t i = 0; i < courses.size(); ++i) {
         courses[i].from = other.start();
         courses[i].next = [&follower, i](const State& state) -> std::optional<Control> {
@@ -136,9 +136,9 @@ TEST(Follow, IsTheSameForAnyNumberOfLanesAndThreads) {
           return control;
         };
       }
-      run(other, s, courses, {.settle = CourseOptions::anywhere, .ask_acceptable = false});
+      run(other, s, courses, {.settle = ControlRolloutOptions::anywhere, .ask_acceptable = false});
       Hasher hasher;
-      for (const Course& course : courses) hasher.value(limber::hash_of(course.end));
+      for (const ControlRollout& course : courses) hasher.value(limber::hash_of(course.end));
       if (first == 0) first = hasher.digest();
       EXPECT_EQ(hasher.digest(), first) << threads << " " << lanes;
     }
@@ -157,7 +157,7 @@ TEST(Follow, IsOverInTheGoalOrWhenItIsTooLate) {
   EXPECT_EQ(follower.next(state).target_m, was.settings.goal.center_of_mass_m.cast<float>().eval());
   state.step += 1000;
   EXPECT_TRUE(follower.is_over(state));
-  Course there;
+  ControlRollout there;
   there.from = was.toy.start();
   there.controls = guide.pieces;
   run(was.toy, was.settings, {&there, 1}, {});

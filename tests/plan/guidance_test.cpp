@@ -123,7 +123,7 @@ TEST(Steering, PushedSoItArrivesInThatTime) {
     const double a = rng.uniform(0.1, 4), t = time_to_go(way, v, a);
     const Vec3 end = v * t + 0.5 * a * t * t * best_direction(way, v, a);
     ASSERT_LT((end - way).norm(), 1e-7) << i;
-    ASSERT_GE(t, least_time_to_go(way.norm(), v.norm(), a) - 1e-9) << i;
+    ASSERT_GE(t, min_time_to_go(way.norm(), v.norm(), a) - 1e-9) << i;
   }
 }
 

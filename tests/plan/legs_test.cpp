@@ -31,15 +31,15 @@ Settings three_legs(bool rest) {
 
 Settings lagged(Settings s) {
   s.min_force_share = 0.8, s.max_duration_s = 3;
-  s.laws = {.lag = 5,
-            .metric = Metric::time_to_go,
-            .guidance = 0.6,
-            .soft_price = 20,
-            .learn_prices = true,
-            .steer = true,
-            .look_s = 0.1,
-            .stop_in_goal = true,
-            .end_hopeless = true};
+  s.search_options = {.lag = 5,
+                      .metric = Metric::time_to_go,
+                      .guidance = 0.6,
+                      .soft_price = 20,
+                      .learn_prices = true,
+                      .steer = true,
+                      .look_s = 0.1,
+                      .stop_in_goal = true,
+                      .end_hopeless = true};
   return s;
 }
 
@@ -159,7 +159,7 @@ TEST(Legs, ASignalInTheSecondLegKeepsTheFirst) {
   const Settings s = three_legs(true);
   const Plan whole = plan(toy, s);
   ASSERT_TRUE(whole.solved());
-  const Plan stopped = plan(toy, s, std::nullopt, [&](const Moment& m) {
+  const Plan stopped = plan(toy, s, std::nullopt, [&](const SearchProgress& m) {
     if (m.leg == 1 && m.statistics.iterations == whole.legs[1].first_iteration + 10) request_stop(SIGINT);
   });
   request_stop(0);

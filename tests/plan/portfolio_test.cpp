@@ -27,7 +27,7 @@ Plan of_seed(const Toy& toy, std::uint64_t seed, std::int64_t most) {
 std::vector<Settings> both() {
   std::vector<Settings> all(2, toy_settings());
   for (Settings& s : all) s.max_iterations = 6000;
-  all[1].laws.lag = 7;
+  all[1].search_options.lag = 7;
   return all;
 }
 

@@ -105,7 +105,7 @@ TEST(Search, FollowsAGoalThatMoves) {
 TEST(Expansion, AimsAtTheGoalWhereItHasMovedTo) {
   const Settings s = toy_settings();
   const Vec3 center(1, 2, 1), shift(0.5, -3, 0.25);
-  Draw d;
+  Sample d;
   d.towards_goal = true;
   d.point = s.goal.center_of_mass_m;
   d.force_n = 1;
@@ -202,7 +202,7 @@ TEST(Search, FirstNodeOfAFreePointHasItsClosedForm) {
   const Vec3 moved = toy.robot_center(p.tree.states[1]) - start;
   EXPECT_LT((moved - h * h * a * n * (n + 1) / 2).norm(), 1e-5);
   EXPECT_NEAR(toy.mean_speed(p.tree.states[1]), n * h * a.norm(), 1e-5);
-  const Vec3 way = (draw(s, toy, 0).point - start).normalized();
+  const Vec3 way = (draw_sample(s, toy, 0).point - start).normalized();
   EXPECT_LT((c.force_n.cast<double>().normalized() - way).norm(), 1e-6);
 }
 

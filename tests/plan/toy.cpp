@@ -31,7 +31,7 @@ class ToyPropagator final : public Propagator {
   }
 
   // All that the supply gives side by side, a piece of each in turn.
-  void run(Supply& supply, int look_every) override {
+  void run(RolloutSource& supply, int look_every) override {
     struct Running {
       Rollout* rollout;
       State now;
@@ -55,8 +55,8 @@ class ToyPropagator final : public Propagator {
         rollout.ok = steps(rollout.control, piece, mine.now);
         mine.steps += piece;
         rollout.clear = toy_.is_clear(mine.now);
-        const Look look{mine.steps, toy_.robot_center(mine.now), toy_.robot_velocity(mine.now),
-                        toy_.goal_shift(mine.now)};
+        const Observation look{mine.steps, toy_.robot_center(mine.now), toy_.robot_velocity(mine.now),
+                               toy_.goal_shift(mine.now)};
         const bool whole = !rollout.ok || mine.steps == rollout.control.steps;
         if (!whole && (mine.steps % look_every || supply.goes_on(rollout, look)) &&
             (mine.now.step < shown || supply.goes_on(rollout, mine.now))) {
@@ -223,7 +223,7 @@ Tree sequential_tree(const System& system, const Settings& settings, std::int64_
   const State start = system.start();
   tree.add(start, -1, Control{}, -1, system.robot_center(start).cast<float>());
   for (std::int64_t i = first_iteration; i < settings.max_iterations; ++i) {
-    const Draw d = draw(settings, system, i);
+    const Sample d = draw_sample(settings, system, i);
     const auto shift = [&](int node) { return system.goal_shift(tree.states[std::size_t(node)]); };
     const auto distance2 = [&](int node) {
       const Vec3f from_goal = tree.centers[node] - shift(node).cast<float>();

@@ -36,8 +36,8 @@ Appearance of_quad(const Eigen::Vector2d& upper, SurfaceMaterial material, int i
   return a;
 }
 
-Look look_of_pictures() {
-  Look look;
+RenderSettings look_of_pictures() {
+  RenderSettings look;
   look.width = 240, look.height = 240;
   return look;
 }

@@ -19,7 +19,7 @@ Camera camera_from(const Vec3& eye) {
 }
 
 Passes passes_of(const std::vector<SurfaceMesh>& meshes, const Camera& camera, double crease_deg = 50) {
-  Look look;
+  RenderSettings look;
   look.width = width, look.height = height;
   Renderer renderer(look);
   for (const SurfaceMesh& mesh : meshes)

@@ -22,8 +22,8 @@
 namespace limber::render {
 namespace {
 
-Look small_look() {
-  Look look;
+RenderSettings small_look() {
+  RenderSettings look;
   look.width = 320, look.height = 240;
   return look;
 }
@@ -62,7 +62,7 @@ Difference difference(const Image& a, const Image& b) {
   return d;
 }
 
-Image picture_of(const SurfaceMesh& mesh, const Look& look, const Camera& camera,
+Image picture_of(const SurfaceMesh& mesh, const RenderSettings& look, const Camera& camera,
                  const MeshLook& mesh_look = {}) {
   Renderer renderer(look);
   renderer.add_mesh(mesh.triangles, mesh.positions, mesh_look);
@@ -72,7 +72,7 @@ Image picture_of(const SurfaceMesh& mesh, const Look& look, const Camera& camera
 // A sphere projects to an ellipse of area π f² r² √(l²−r²) / (z²−r²)^1.5: f the focal length, l the distance
 // to the middle, z the distance along the view (Quílez, "Sphere - projection").
 TEST(Renderer, ASpheresSilhouetteHasTheAreaOfPerspective) {
-  Look look = small_look();
+  RenderSettings look = small_look();
   for (const Vec3& center : {Vec3(0, 0, 0), Vec3(0.6, 0, 0.4), Vec3(-0.7, 1, -0.3)})
     for (const double radius : {0.25, 0.6}) {
       look.multisampling = !look.multisampling;
@@ -99,7 +99,7 @@ TEST(Renderer, TheNearerQuadHidesTheOtherInWhateverOrder) {
 }
 
 TEST(Renderer, WhereNothingIsTheBackgroundIsTheColourAskedFor) {
-  Look look = small_look();
+  RenderSettings look = small_look();
   look.background_top_srgb = Vec3(30, 60, 90) / 255;
   look.background_bottom_srgb = Vec3(250, 240, 230) / 255;
   const Image image =
@@ -151,7 +151,7 @@ TEST(Renderer, TheGrainGoesWithTheMesh) {
                                  Eigen::AngleAxisd(1.1, Vec3(0.3, -0.5, 0.8).normalized()) *
                                  Eigen::Isometry3d::Identity();
   const auto picture = [&](const Eigen::Isometry3d& moved, bool moves_body) {
-    Look light = small_look();
+    RenderSettings light = small_look();
     light.up = moved.linear() * light.up, light.toward_key = moved.linear() * light.toward_key;
     Camera camera = camera_from(moved * Vec3(0.5, -2, 0.8), moved * Vec3(0.1, 0.2, 0.3));
     camera.up = moved.linear() * camera.up;
@@ -174,7 +174,7 @@ TEST(Renderer, TheGrainGoesWithTheMesh) {
 // White stuff lit from behind: of the light, e to the thickness over the depth is left, by a stand-in, too.
 TEST(Renderer, ThinPartsLetLightThrough) {
   constexpr double scatter_m = 0.1;
-  Look light = small_look();
+  RenderSettings light = small_look();
   light.toward_key = {0, 1, 0.1};
   light.stage.include(Vec3(-1, -1, -1)), light.stage.include(Vec3(1, 1, 1));
   const auto seen_through = [&](double thickness, bool stand_in) {
@@ -212,7 +212,7 @@ TEST(Renderer, TheShadowFallsWhereTheLightLeads) {
   for (const bool on_body : {false, true})
     for (const Vec3& toward_key : {Vec3(-0.6, -0.3, 1), Vec3(0.7, -0.5, 1)}) {
       SCOPED_TRACE(fmt::format("on body {}, light from {}", on_body, toward_key.x()));
-      Look look = small_look();
+      RenderSettings look = small_look();
       look.toward_key = toward_key;
       look.key_size_deg = 1;
       if (!on_body) look.ground_height_m = 0;
@@ -259,7 +259,7 @@ TEST(Renderer, HalfShadeBetweenBodiesIsAsWideAsHeightAndLightMakeIt) {
     const SurfaceMesh roof = quad_mesh({-4, -4, height}, {0, -4, height}, {0, 4, height}, {-4, 4, height});
     Camera camera = camera_from({height, 0, 6}, {height, 0, 0});
     camera.up = {0, 1, 0};
-    Look look = small_look();
+    RenderSettings look = small_look();
     look.toward_key = {-1, 0, 1}, look.key_size_deg = angle_deg;
     look.stage.include(Vec3(-4, -4, 0)), look.stage.include(Vec3(4, 4, 2));
     Image images[2];
@@ -300,7 +300,7 @@ TEST(Renderer, NothingShadesItself) {
     const double slant = slant_deg * std::numbers::pi / 180;
     const Vec3 along = 2 * Vec3(std::cos(slant), 0, std::sin(slant)), across(0, 2, 0);
     const SurfaceMesh face = quad_mesh(-along - across, along - across, along + across, across - along);
-    Look look = small_look();
+    RenderSettings look = small_look();
     look.toward_key = {-0.3, 0.2, 1}, look.key_size_deg = 20;
     Image images[2];
     for (const bool casts : {false, true}) {
@@ -326,7 +326,7 @@ TEST(Renderer, TheOrderOfTrianglesAndVerticesChangesNoPixel) {
     for (int i = 0; i < 3; ++i) shuffled.triangles(t, i) = new_from_old[sphere.triangles(t, i)];
   for (int t = int(sphere.triangles.rows()) - 1; t > 0; --t)
     shuffled.triangles.row(t).swap(shuffled.triangles.row(rng.below(t + 1)));
-  Look look = small_look();
+  RenderSettings look = small_look();
   look.ground_height_m = 0;
   const Camera camera = camera_from({1, -3, 1.5}, {0, 0, 0.5});
   EXPECT_LE(difference(picture_of(sphere, look, camera), picture_of(shuffled, look, camera)).largest, 1);
@@ -335,7 +335,7 @@ TEST(Renderer, TheOrderOfTrianglesAndVerticesChangesNoPixel) {
 TEST(Renderer, AMeshTurnedInsideOutLooksTheSame) {
   SurfaceMesh sphere = sphere_mesh({0, 0, 0.5}, 0.5, 40), inside_out = sphere;
   inside_out.triangles.col(1).swap(inside_out.triangles.col(2));
-  Look look = small_look();
+  RenderSettings look = small_look();
   look.ground_height_m = 0;
   const Camera camera = camera_from({1, -3, 1.5}, {0, 0, 0.5});
   EXPECT_LT(difference(picture_of(sphere, look, camera), picture_of(inside_out, look, camera)).mean, 0.02);
@@ -346,7 +346,7 @@ TEST(Renderer, MovingAMeshIsTheSameAsMakingItThere) {
   SurfaceMesh moved = rest;
   for (int v = 0; v < 8; ++v)
     moved.positions(v, 0) += 0.4 * moved.positions(v, 2), moved.positions(v, 1) *= 1.3;
-  Look look = small_look();
+  RenderSettings look = small_look();
   look.ground_height_m = 0;
   const Camera camera = camera_from({1, -4, 2}, {0, 0, 0.5});
   Renderer renderer(look);
@@ -363,7 +363,7 @@ TEST(Renderer, MovingAMeshIsTheSameAsMakingItThere) {
 TEST(Renderer, ThePictureDoesNotDependOnTheAxes) {
   Eigen::Matrix3d turn;
   turn << 0, 0, 1, 1, 0, 0, 0, 1, 0;
-  Look look = small_look();
+  RenderSettings look = small_look();
   look.ground_height_m = 0.0;
   Camera camera = camera_from({1, -4, 2}, {0, 0, 0.5});
   SurfaceMesh mesh = sphere_mesh({0.1, 0, 0.7}, 0.5, 40);
@@ -375,7 +375,7 @@ TEST(Renderer, ThePictureDoesNotDependOnTheAxes) {
 }
 
 TEST(Renderer, ALineHasItsWidthAndIsHiddenByWhatIsBeforeIt) {
-  Look look = small_look();
+  RenderSettings look = small_look();
   for (const double width : {1.0, 1.5, 3.0, 8.0}) {
     Renderer renderer(look);
     Points ends(2, 3);
@@ -427,7 +427,7 @@ Eigen::Vector4d over(const Eigen::Vector4d& front, const Eigen::Vector4d& back) 
 TEST(Renderer, AVeilShowsItsFrontAndItsBackLayer) {
   const SurfaceMesh ball = sphere_mesh({0, 0, 0}, 0.5, 30);
   for (const bool multisampling : {false, true}) {
-    Look look = small_look();
+    RenderSettings look = small_look();
     look.multisampling = multisampling;
     const Image image = picture_of(ball, look, camera_from({0, -4, 0}), {"veil", {1, 1, 1}, 0.5, 0, 0.25});
     EXPECT_NEAR(alpha(image, 160, 120), 1 - 0.75 * 0.75, 1e-3);
@@ -447,7 +447,7 @@ TEST(Renderer, VeilsAreSortedWithinEachPixel) {
       {falling, red}, {rising, green}, {upright_quad(1), blue}, {upright_quad(2, 2), solid}};
   const Camera camera = camera_from({0, -5, 0});
   for (const bool multisampling : {false, true}) {
-    Look look = small_look();
+    RenderSettings look = small_look();
     look.multisampling = multisampling;
     look.transparent_background = true;
     for (const auto& [mesh, mesh_look] : all) look.stage.include(bounding_box(mesh.positions));
@@ -511,7 +511,7 @@ TEST(Renderer, ALineBetweenVeilsIsVeiledByThoseBeforeItAlone) {
     return ends;
   };
   for (const bool multisampling : {false, true}) {
-    Look look = small_look();
+    RenderSettings look = small_look();
     look.multisampling = multisampling;
     look.transparent_background = true;
     look.stage.include(Vec3(-2, -2, -2)), look.stage.include(Vec3(2, 4, 2));
@@ -550,7 +550,7 @@ TEST(Renderer, ALineBetweenVeilsIsVeiledByThoseBeforeItAlone) {
 }
 
 TEST(Renderer, ALineBehindAVeilIsVeiledAndOneBeforeItIsNot) {
-  Look look = small_look();
+  RenderSettings look = small_look();
   look.transparent_background = true;
   const MeshLook veil{"veil", {0, 0, 1}, 1, 0, 0.45};
   const Camera camera = camera_from({0, -5, 0});
@@ -598,7 +598,7 @@ TEST(Renderer, ColoursOfVerticesAreMixedInLinearLight) {
 TEST(Renderer, OcclusionTakesTheSkyAndLeavesTheKeyLight) {
   const SurfaceMesh quad = upright_quad(0);
   for (const bool lit : {false, true}) {
-    Look look = small_look();
+    RenderSettings look = small_look();
     look.toward_key = {0, lit ? -1.0 : 1.0, 0.2};
     Renderer renderer(look);
     const int mesh = renderer.add_mesh(quad.triangles, quad.positions, {"quad", {0.8, 0.8, 0.8}});
@@ -625,7 +625,7 @@ TEST(Renderer, AnUnseenCasterShadesAllButWhatItEncloses) {
   const SurfaceMesh ball = sphere_mesh({0, 0, 1}, 0.5, 60), shell = sphere_mesh({0, 0, 1}, 0.55, 12),
                     floor = quad_mesh({-4, -4, 0}, {4, -4, 0}, {4, 4, 0}, {-4, 4, 0});
   const Camera camera = camera_from({0, -5, 3}, {0, 0, 0.5});
-  Look look = small_look();
+  RenderSettings look = small_look();
   look.stage.include(Vec3(-2, -2, 0)), look.stage.include(Vec3(2, 2, 2));
   const auto picture = [&](bool with_shell, bool shell_seen, bool ball_casts, bool with_ball) {
     Renderer renderer(look);
@@ -667,7 +667,7 @@ TEST(Renderer, AnUnseenCasterShadesAllButWhatItEncloses) {
 
 // What is left of a box cut in half covers what half a box covers: its inside shows through the cut, flat.
 TEST(Renderer, ACutBoxCoversWhatIsLeftOfIt) {
-  const Look look = small_look();
+  const RenderSettings look = small_look();
   const Camera camera = camera_from({2, -4, 1.5});
   Renderer renderer(look);
   add(renderer, box_mesh({-0.5, -0.5, -0.5}, {0.5, 0.5, 0.5}), {"box", {0.9, 0.2, 0.1}});
@@ -687,13 +687,13 @@ TEST(Renderer, ACutBoxCoversWhatIsLeftOfIt) {
       renderer.draw(camera).rgba,
       picture_of(box_mesh({-0.5, -0.5, -0.5}, {0.5, 0.5, 0.5}), look, camera, {"box", {0.9, 0.2, 0.1}}).rgba);
   EXPECT_THROW(renderer.set_clip_planes({Plane(0, 0, 0, 1)}), InputError);
-  EXPECT_THROW(renderer.set_clip_planes(std::vector<Plane>(most_clip_planes + 1, Plane(1, 0, 0, 0))),
+  EXPECT_THROW(renderer.set_clip_planes(std::vector<Plane>(max_clip_planes + 1, Plane(1, 0, 0, 0))),
                InputError);
 }
 
 // An edge is seen when one of its two faces looks towards the eye.
 TEST(Renderer, EdgesAreDrawnOverTheSurfaceThatHidesTheOthers) {
-  const Look look = small_look();
+  const RenderSettings look = small_look();
   const Camera camera = camera_from({1.5, -4, 2});
   const SurfaceMesh box = box_mesh({-0.5, -0.5, -0.5}, {0.5, 0.5, 0.5});
   Renderer renderer(look);
@@ -726,7 +726,7 @@ TEST(Renderer, WhatIsCutOffCastsNothing) {
   const Camera camera = camera_from({0, -5, 3});
   const SurfaceMesh floor = quad_mesh({-4, -4, 0}, {4, -4, 0}, {4, 4, 0}, {-4, 4, 0});
   for (const bool on_body : {false, true}) {
-    Look look = small_look();
+    RenderSettings look = small_look();
     if (!on_body) look.ground_height_m = 0;
     look.stage.include(Vec3(-2, -2, 0)), look.stage.include(Vec3(2, 2, 2));
     Renderer renderer(look);
@@ -742,7 +742,7 @@ TEST(Renderer, WhatIsCutOffCastsNothing) {
 TEST(Renderer, ATransparentPictureOverABackgroundIsThePictureWithIt) {
   const SurfaceMesh ball = sphere_mesh({0, 0, 0.5}, 0.5, 30);
   const Camera camera = camera_from({1, -4, 2}, {0, 0, 0.5});
-  Look look = small_look();
+  RenderSettings look = small_look();
   look.stage = bounding_box(ball.positions);
   const Image whole = picture_of(ball, look, camera, {"ball", {0.8, 0.3, 0.2}}),
               background = Renderer(look).draw(camera);
@@ -771,7 +771,7 @@ TEST(Renderer, PassesTellDepthNormalObjectAndScalarOfASphere) {
   const Camera camera = camera_from({0, -4, 0.5});
   const Mat4 camera_from_world_m = camera_from_world(camera);
   for (const bool multisampling : {false, true}) {
-    Look look = small_look();
+    RenderSettings look = small_look();
     look.multisampling = multisampling;
     Renderer renderer(look);
     add(renderer, behind, {"behind"});
@@ -818,7 +818,7 @@ TEST(Renderer, PassesTellDepthNormalObjectAndScalarOfASphere) {
 
 TEST(Renderer, MultisamplingDrawsNearlyTheSamePicture) {
   const SurfaceMesh ball = sphere_mesh({0, 0, 0.5}, 0.5, 60);
-  Look look = small_look();
+  RenderSettings look = small_look();
   look.ground_height_m = 0;
   const Camera camera = camera_from({1, -4, 2}, {0, 0, 0.5});
   const Image slow = picture_of(ball, look, camera);
@@ -829,7 +829,7 @@ TEST(Renderer, MultisamplingDrawsNearlyTheSamePicture) {
 }
 
 TEST(Renderer, TheGroundHidesWhatIsBelowItFromAboveOnly) {
-  Look look = small_look();
+  RenderSettings look = small_look();
   look.ground_height_m = 0;
   const SurfaceMesh sphere = sphere_mesh({0, 0, 0}, 0.5, 40);
   const double above = covered_pixels(picture_of(sphere, look, camera_from({0, -4, 0.3})));
@@ -839,7 +839,7 @@ TEST(Renderer, TheGroundHidesWhatIsBelowItFromAboveOnly) {
 
 TEST(Renderer, SeveralThreadsDrawTheSameBytes) {
   const SurfaceMesh sphere = sphere_mesh({0, 0, 0.5}, 0.5, 30);
-  Look look = small_look();
+  RenderSettings look = small_look();
   look.ground_height_m = 0;
   const Camera camera = camera_from({1, -4, 2}, {0, 0, 0.5});
   const Image expected = picture_of(sphere, look, camera);
@@ -854,7 +854,7 @@ TEST(Renderer, SeveralThreadsDrawTheSameBytes) {
 std::string picture_hash() {
   const SurfaceMesh sphere = sphere_mesh({0, 0, 0.5}, 0.5, 60),
                     small = sphere_mesh({0.5, -0.3, 0.2}, 0.2, 30);
-  Look look = small_look();
+  RenderSettings look = small_look();
   look.ground_height_m = 0;
   Renderer renderer(look);
   const int mesh = renderer.add_mesh(sphere.triangles, sphere.positions, {"solid"});
@@ -883,17 +883,17 @@ TEST(Renderer, NeitherLlvmpipesThreadsNorItsVectorWidthNorADisplayMatter) {
 
 TEST(Renderer, BadLooksAreRefused) {
   const auto refused = [](auto change) {
-    Look look = small_look();
+    RenderSettings look = small_look();
     change(look);
     EXPECT_THROW(Renderer{look}, InputError);
   };
-  refused([](Look& l) { l.width = 0; });
-  refused([](Look& l) { l.height = 9000; });
-  refused([](Look& l) { l.supersampling = 5; });
-  refused([](Look& l) { l.width = 8192, l.supersampling = 3; });
-  refused([](Look& l) { l.toward_key = {1, 0, -1}; });
-  refused([](Look& l) { l.up = {0, 0, 0}; });
-  refused([](Look& l) { l.ground_height_m = NAN; });
+  refused([](RenderSettings& l) { l.width = 0; });
+  refused([](RenderSettings& l) { l.height = 9000; });
+  refused([](RenderSettings& l) { l.supersampling = 5; });
+  refused([](RenderSettings& l) { l.width = 8192, l.supersampling = 3; });
+  refused([](RenderSettings& l) { l.toward_key = {1, 0, -1}; });
+  refused([](RenderSettings& l) { l.up = {0, 0, 0}; });
+  refused([](RenderSettings& l) { l.ground_height_m = NAN; });
   Renderer renderer(small_look());
   SurfaceMesh box = box_mesh({0, 0, 0}, {1, 1, 1});
   EXPECT_THROW(renderer.add_mesh(box.triangles, box.positions, {"box", {2, 0, 0}}), InputError);
@@ -904,7 +904,7 @@ TEST(Renderer, BadLooksAreRefused) {
 
 // Through a veil its underside is seen: whole, not in flecks, where that dips in and out of the ground.
 TEST(Renderer, AVeilsUndersideStaysWholeWhereItSinksIntoTheGround) {
-  Look look = small_look();
+  RenderSettings look = small_look();
   look.ground_height_m = 0;
   look.stage = Box{Vec3(-2, -2, 0), Vec3(2, 2, 2)};
   const auto middle = [&](std::optional<double> height) {

@@ -45,7 +45,7 @@ Json json_of(const CageFacts& f) {
 Json json_of(const ShellFacts& f) {
   return {{"holds", f.holds()},
           {"shells", f.shells},
-          {"most_vertices", f.most_vertices},
+          {"most_vertices", f.max_vertices},
           {"shells_not_convex", f.shells_not_convex},
           {"vertices_uncovered", f.vertices_uncovered},
           {"triangles_uncovered", f.triangles_uncovered},

@@ -202,7 +202,7 @@ ShellFacts judge_shells(const Solid& solid, const std::vector<Surface>& surfaces
   for (const Surface& surface : surfaces) {
     shells.push_back(shell_of(surface));
     all.add(shells.back().box.lower), all.add(shells.back().box.upper);
-    facts.most_vertices = std::max(facts.most_vertices, surface.points.size());
+    facts.max_vertices = std::max(facts.max_vertices, surface.points.size());
     facts.shells_not_convex += !is_convex(surface, shells.back());
     for (const Face& f : shells.back().faces) {
       const Point o = shells.back().points[0];

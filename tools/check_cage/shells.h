@@ -6,7 +6,7 @@
 namespace check {
 
 struct ShellFacts {
-  std::size_t shells = 0, most_vertices = 0;
+  std::size_t shells = 0, max_vertices = 0;
   std::size_t shells_not_convex = 0;    // a corner in front of a face, or an edge without its twin; exact
   std::size_t vertices_uncovered = 0;   // of the surface, in no closed shell; exact
   std::size_t triangles_uncovered = 0;  // not within the union of the closed shells; exact

@@ -9,7 +9,7 @@ namespace limber::detail {
 
 namespace {
 
-constexpr int most_rounds = 200;
+constexpr int max_rounds = 200;
 // Parting goes by so much farther, of the size of all.
 constexpr double slack = 1e-4;
 
@@ -116,7 +116,7 @@ std::optional<std::vector<Vec3>> ways_apart(std::vector<LaidBody> bodies, double
   int round = 0;
   for (; !layout.part_all(); ++round) {
     throw_if_stopped();
-    if (round == most_rounds || layout.farthest() > 2 * reach_m) return std::nullopt;
+    if (round == max_rounds || layout.farthest() > 2 * reach_m) return std::nullopt;
   }
   while (round > 0 && layout.go_back()) throw_if_stopped();
   if (layout.farthest() > reach_m) return std::nullopt;

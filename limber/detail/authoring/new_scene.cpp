@@ -32,15 +32,15 @@ constexpr const char* endings[] = {".obj", ".off", ".ply", ".stl", ".glb", ".glt
 constexpr int bone_tets = 500;
 // What is thinner, of its diagonal, is a sheet, as a diaphragm: no coarse cage is near it, so it is only
 // seen.
-constexpr double least_thickness = 0.02;
+constexpr double min_thickness = 0.02;
 // The largest of these shares of its true size is taken at which the organs come apart within that reach, a
 // share of all organs' diagonal.
-constexpr double scale_step = 0.05, least_scale = 0.3;
+constexpr double scale_step = 0.05, min_scale = 0.3;
 constexpr double reach = 0.03;
 constexpr double room = 0.005;  // between two surfaces, as a share of the robot's size: so near they push
 // Good enough to part organs by; a plan takes the usual ones.
-constexpr meshing::ContactShapeSettings rough{.cells = 48, .most_cells = 64, .most_nodes = 300'000};
-constexpr int most_triangles_seen_through = 30'000;
+constexpr meshing::ContactShapeSettings rough{.cells = 48, .max_cells = 64, .max_nodes = 300'000};
+constexpr int max_triangles_seen_through = 30'000;
 constexpr int points_looked_at = 150;  // of the robot
 
 struct Organ {
@@ -203,7 +203,7 @@ double come_apart(const NewSceneOptions& options, std::vector<Organ>& organs) {
     if (!organs[i].bone) all.include(organs[i].box);
   for (int step = 0;; ++step) {
     const double scale = options.shrink - scale_step * step;
-    if (scale < least_scale)
+    if (scale < min_scale)
       throw InputError(
           fmt::format("{}: at {:g} of their size the organs still do not come apart; take fewer with "
                       "--only",
@@ -242,8 +242,8 @@ std::string body_text(const Organ& organ, const NewSceneOptions& options, double
                         organ.bone ? 0.35
                         : hull     ? 0.22
                                    : 0.15);
-    if (organ.surface.triangles.rows() > most_triangles_seen_through)
-      text += fmt::format("triangles = {}\n", most_triangles_seen_through);
+    if (organ.surface.triangles.rows() > max_triangles_seen_through)
+      text += fmt::format("triangles = {}\n", max_triangles_seen_through);
     return text;
   }
   text += fmt::format("cage = {{ tets = {} }}\n", organ.bone ? bone_tets : options.tets);
@@ -435,7 +435,7 @@ NewScene scene_of_folder(const NewSceneOptions& options, const std::string& wher
   std::vector<Organ> organs = read_organs(options);
   std::vector<std::string> deformable;
   for (Organ& organ : organs) {
-    if (organ.thickness_m < least_thickness * organ.box.diagonal() && !organ.see_through && !organ.bone) {
+    if (organ.thickness_m < min_thickness * organ.box.diagonal() && !organ.see_through && !organ.bone) {
       organ.see_through = true;
       notes.push_back(
           fmt::format("{} is only seen: it is a sheet, {:.2g} m thick", organ.name, organ.thickness_m));

@@ -23,7 +23,7 @@ namespace {
 
 constexpr double units_a_metre = 1000;
 constexpr const char* table_names[] = {"isa_element_parts.txt", "partof_element_parts.txt"};
-constexpr std::uintmax_t most_table_bytes = 64 << 20;
+constexpr std::uintmax_t max_table_bytes = 64 << 20;
 
 // Letters, digits, - and _ as they are, all else as _: what files and bodies can be called by.
 std::string file_name_of(const std::string& name) {
@@ -161,7 +161,7 @@ struct Concept {
 // Lines of a concept's id, its name, and an element file's id, between tabs, under a line of titles.
 void read_elements(const fs::path& file, std::map<std::string, Concept>& concepts) {
   if (!fs::exists(file)) return;
-  const std::string text = read_file(file, most_table_bytes);
+  const std::string text = read_file(file, max_table_bytes);
   int line = 0;
   for (std::size_t from = 0; from < text.size();) {
     std::size_t to = std::min(text.find('\n', from), text.size());

@@ -57,7 +57,7 @@ class Check {
     std::vector<std::string> sets = options_.scene.sets;
     if (!options_.preset.empty()) sets.push_back("planner.preset=" + options_.preset);
     found_.problems =
-        scenes::problems_of(read_file(found_.file, scenes::most_scene_bytes), found_.file.string(), sets);
+        scenes::problems_of(read_file(found_.file, scenes::max_scene_bytes), found_.file.string(), sets);
     if (!found_.problems.empty()) return found_;
     scene_ = scenes::read_scene_file(found_.file, sets);
     found_.lacks = scene_.lacks;

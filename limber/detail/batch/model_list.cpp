@@ -20,7 +20,7 @@ namespace limber::detail {
 namespace {
 
 constexpr std::size_t longest_name = 150;
-constexpr std::uintmax_t most_list_bytes = 1 << 30;
+constexpr std::uintmax_t max_list_bytes = 1 << 30;
 
 std::string lower_ascii(std::string text) {
   for (char& c : text)
@@ -103,7 +103,7 @@ std::vector<ListedModel> models_of_list(const std::string& list) {
   if (list == "-")
     text.assign(std::istreambuf_iterator<char>(std::cin), {}), throw_if_stopped();
   else
-    text = read_file(list, most_list_bytes);
+    text = read_file(list, max_list_bytes);
   const std::string what = list == "-" ? "the list on stdin" : list;
   const char end = text.find('\0') == text.npos ? '\n' : '\0';
   std::vector<ListedModel> models;

@@ -244,7 +244,7 @@ class Batch {
     if (o.threshold > 0) add({"--threshold", text_of_number(o.threshold)});
     if (!o.label.empty())
       add({"--label", o.label, "--label-gap", text_of_number(o.label_gap), "--label-smoothing",
-           std::to_string(o.label_rounds), "--least-island", text_of_number(o.least_island)});
+           std::to_string(o.label_rounds), "--least-island", text_of_number(o.min_island)});
     if (o.exact) add({"--exact"});
     if (o.y_up) add({"--y-up"});
     if (!o.only.empty()) add({"--only", o.only});

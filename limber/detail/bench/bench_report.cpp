@@ -64,13 +64,13 @@ Json report_of_group(const std::vector<const Json*>& runs) {
   const auto largest_share = [&](const char* key) { return 100 * largest(key); };
   // Of the runs' medians the median; null where nothing presses in any.
   std::vector<double> medians;
-  double gap_worst = 0, least_stretch = 1;
+  double gap_worst = 0, min_stretch = 1;
   for (const Json* run : solved) {
     const Json& gap = run->at("gap_at_contact");
     if (gap.at("pairs_and_frames").get<int>() > 0)
       medians.push_back(100 * gap.at("median_of_robot_size").get<double>());
     gap_worst = std::max(gap_worst, 100 * gap.at("worst_of_robot_size").get<double>());
-    least_stretch = std::min(least_stretch, run->at("least_stretch").get<double>());
+    min_stretch = std::min(min_stretch, run->at("least_stretch").get<double>());
   }
   const Json gap_median = medians.empty() ? Json() : Json(quartiles(medians).median);
   std::int64_t inverted = 0;
@@ -98,7 +98,7 @@ Json report_of_group(const std::vector<const Json*>& runs) {
           {"largest_self_overlap_percent", largest_share("deepest_self_overlap_of_robot_size")},
           {"median_gap_percent", gap_median},
           {"largest_gap_percent", gap_worst},
-          {"least_stretch", least_stretch},
+          {"least_stretch", min_stretch},
           {"largest_stretch", largest("largest_stretch")},
           {"inverted_tets", inverted},
           {"largest_force_n", largest("largest_force_n")},
@@ -215,8 +215,8 @@ std::string ompl_log(const RunRecords& records, const std::string& date) {
     planners[record.at("preset").get<std::string>()].push_back(&record);
     total_s += record.at("wall_s").get<double>();
   }
-  std::size_t most_runs = 0;
-  for (const auto& [name, runs] : planners) most_runs = std::max(most_runs, runs.size());
+  std::size_t max_runs = 0;
+  for (const auto& [name, runs] : planners) max_runs = std::max(max_runs, runs.size());
   const Json& first = records.front();
   const Json& limit = first.at("identity").at("settings").at("time_limit_s");
 
@@ -230,7 +230,7 @@ std::string ompl_log(const RunRecords& records, const std::string& date) {
   text += fmt::format("<<<|\n{} threads\n|>>>\n", first.at("threads").get<int>());
   text += fmt::format("{} is the random seed\n", first.at("seed").get<std::uint64_t>());
   text += fmt::format("{} seconds per run\n0 MB per run\n{} runs per planner\n",
-                      limit.is_null() ? 1e9 : limit.get<double>(), most_runs);
+                      limit.is_null() ? 1e9 : limit.get<double>(), max_runs);
   text += fmt::format("{} seconds spent to collect the data\n1 enum type\n", total_s);
   text +=
       "status|Unknown status|Invalid start|Invalid goal|Unrecognized goal type|Timeout|Approximate solution|"

@@ -168,19 +168,19 @@ Json input_of(const Json& identity, const PrepareSettings& settings) {
            {{"min_dihedral_deg", cage.min_dihedral_deg},
             {"max_dihedral_deg", cage.max_dihedral_deg},
             {"gap", cage.gap}}},
-          {"split", {{"share", split.share}, {"most_new_vertices", split.most_new_vertices}}},
+          {"split", {{"share", split.share}, {"most_new_vertices", split.max_new_vertices}}},
           {"contact",
            {{"cells", c.cells},
-            {"most_cells", c.most_cells},
-            {"most_nodes", c.most_nodes},
+            {"most_cells", c.max_cells},
+            {"most_nodes", c.max_nodes},
             {"field_error", c.field_error},
             {"missed_depth", c.missed_depth},
-            {"least_spacing", c.least_spacing},
-            {"most_spacing", c.most_spacing},
-            {"most_flat_spacing", c.most_flat_spacing},
+            {"least_spacing", c.min_spacing},
+            {"most_spacing", c.max_spacing},
+            {"most_flat_spacing", c.max_flat_spacing},
             {"samples_a_square", c.samples_a_square},
             {"fewest_most_samples", c.fewest_most_samples},
-            {"most_samples", c.most_samples}}}};
+            {"most_samples", c.max_samples}}}};
 }
 
 PrepareSettings settings_of_input(const Json& input) {
@@ -255,9 +255,9 @@ void look_into_images(Appearance& appearance, std::vector<std::string>& warnings
     const ImageFile& file = appearance.images[std::size_t(i)];
     try {
       const render::Image8 image = render::decoded_image(file.bytes, file.name);
-      if (pixels + std::int64_t(image.width) * image.height > render::most_image_pixels)
+      if (pixels + std::int64_t(image.width) * image.height > render::max_image_pixels)
         throw InputError(fmt::format("\"{}\": the images of the model have more than {} pixels together",
-                                     file.name, render::most_image_pixels));
+                                     file.name, render::max_image_pixels));
       pixels += std::int64_t(image.width) * image.height;
       bool has_heights = false;
       for (SurfaceMaterial& material : appearance.materials)

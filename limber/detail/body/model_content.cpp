@@ -12,9 +12,9 @@ namespace limber::detail {
 namespace {
 
 constexpr std::size_t longest_path = 300, longest_ending = 8;
-constexpr std::uintmax_t most_named_bytes = std::uintmax_t(2) << 30;
-constexpr std::uintmax_t most_mtl_bytes = 16 << 20;
-constexpr std::size_t most_names = 100'000;  // no model names so many
+constexpr std::uintmax_t max_named_bytes = std::uintmax_t(2) << 30;
+constexpr std::uintmax_t max_mtl_bytes = 16 << 20;
+constexpr std::size_t max_names = 100'000;  // no model names so many
 
 bool is_letter(char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z'); }
 bool is_digit(char c) { return c >= '0' && c <= '9'; }
@@ -38,7 +38,7 @@ std::string without_percents(const std::string& text) {
 // Words like "name.ending", with all that may be a path before them.
 std::set<std::string> paths_in(std::string_view bytes) {
   std::set<std::string> paths;
-  for (std::size_t dot = bytes.find('.'); dot != bytes.npos && paths.size() < most_names;
+  for (std::size_t dot = bytes.find('.'); dot != bytes.npos && paths.size() < max_names;
        dot = bytes.find('.', dot + 1)) {
     std::size_t end = dot + 1, begin = dot;
     if (end == bytes.size() || !is_letter(bytes[end])) continue;  // a number
@@ -63,7 +63,7 @@ std::vector<fs::path> companions_of(std::string_view bytes, const fs::path& mode
   std::vector<fs::path> files = files_named_in(bytes, model);
   for (const fs::path& materials : std::vector<fs::path>(files))
     if (ending_of(materials) == ".mtl") try {
-        for (const fs::path& image : files_named_in(read_file(materials, most_mtl_bytes), model))
+        for (const fs::path& image : files_named_in(read_file(materials, max_mtl_bytes), model))
           if (std::find(files.begin(), files.end(), image) == files.end()) files.push_back(image);
       } catch (const InputError&) {  // importing reads none either
       }
@@ -81,7 +81,7 @@ std::vector<fs::path> files_named_in(std::string_view bytes, const fs::path& mod
     for (std::size_t begin = 0; begin < path.size();
          begin = std::min(path.find_first_of(" /:=,", begin), path.size() - 1) + 1) {
       const std::string name = path.substr(begin);
-      if (name.empty() || tried.size() >= most_names || !tried.insert(name).second) continue;
+      if (name.empty() || tried.size() >= max_names || !tried.insert(name).second) continue;
       const fs::path file = model.parent_path() / name;
       if (fs::is_regular_file(file, none) && !fs::equivalent(file, model, none)) files.push_back(file);
     }
@@ -94,7 +94,7 @@ ModelContent content_of_model(const fs::path& model) {
   std::string all;
   for (const fs::path& file : companions_of(bytes, model)) {
     std::error_code none;
-    if (fs::file_size(file, none) > most_named_bytes) continue;  // no model's
+    if (fs::file_size(file, none) > max_named_bytes) continue;  // no model's
     try {
       all += fs::relative(file, model.parent_path(), none).string() + '\0' + content_hash(read_file(file)) +
              '\n';

@@ -45,14 +45,14 @@ meshing::ImportedModel import_label(const PrepareOptions& options, const fs::pat
   const std::string what = fmt::format("{}: label {}", file.string(), map.labels[std::size_t(row)]);
   const imaging::LabelSurface label = imaging::surfaces_of(
       map, {row},
-      {.gap = options.label_gap, .rounds = options.label_rounds, .least_island = options.least_island})[0];
+      {.gap = options.label_gap, .rounds = options.label_rounds, .min_island = options.min_island})[0];
   if (label.voxels == 0)
     throw InputError(fmt::format("{}: all of its {} pieces, {} voxels in all, are smaller than {:g} voxels",
-                                 what, label.islands_dropped, label.voxels_dropped, options.least_island));
+                                 what, label.islands_dropped, label.voxels_dropped, options.min_island));
   meshing::ImportedModel model = meshing::clean(label.surface, {.scale = options.scale}, what);
   if (label.islands_dropped > 0)
     model.mended.push_back(fmt::format("left out {} pieces of fewer than {:g} voxels, {} voxels in all",
-                                       label.islands_dropped, options.least_island, label.voxels_dropped));
+                                       label.islands_dropped, options.min_island, label.voxels_dropped));
   model.warnings.insert(model.warnings.end(), map.notes.begin(), map.notes.end());
   return model;
 }
@@ -84,7 +84,7 @@ BodySource source_of(const PrepareOptions& options, const fs::path& file) {
   source.identity["label"] = {{"name", options.label},
                               {"gap", options.label_gap},
                               {"rounds", options.label_rounds},
-                              {"least_island", options.least_island}};
+                              {"least_island", options.min_island}};
   source.load = [options, file] { return import_label(options, file); };
   return source;
 }

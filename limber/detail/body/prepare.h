@@ -26,7 +26,7 @@ struct PrepareOptions {
   std::string label;                 // of a label map: a number or a name
   double label_gap = 0.2;            // as imaging::SurfaceNetOptions
   int label_rounds = 10;
-  double least_island = 8;
+  double min_island = 8;
 };
 
 // Throws InputError where two of them exclude each other.

@@ -25,8 +25,8 @@ constexpr Size large{1600, 1000}, small{320, 240};
 const Vec3 toward_eye(0.55, -1, 0.42);
 const Vec3 model_srgb(0.80, 0.72, 0.62), line_srgb(0.10, 0.25, 0.45);
 
-render::Look look_for(const Box& box, bool ground, const Size& size) {
-  render::Look look;
+render::RenderSettings look_for(const Box& box, bool ground, const Size& size) {
+  render::RenderSettings look;
   look.width = size.width_px, look.height = size.height_px;
   look.stage = box;
   look.toward_key = {-0.25, -0.9, 1.25};

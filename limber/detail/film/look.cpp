@@ -77,7 +77,7 @@ Stuff stuff_of(scenes::BodyLook look) {
 
 }  // namespace
 
-void set_light(render::Look& look, const scenes::FilmSpec& film) {
+void set_light(render::RenderSettings& look, const scenes::FilmSpec& film) {
   const Light light = light_of(film.look);
   look.background_top_srgb = light.zenith, look.background_bottom_srgb = light.horizon;
   look.ground_srgb = light.ground, look.far_ground_srgb = light.far_ground;

@@ -6,8 +6,8 @@
 
 namespace limber::detail {
 
-// Light, ground and background; what else there is in a Look is left as it is.
-void set_light(render::Look&, const scenes::FilmSpec&);
+// Light, ground and background; what else there is in a RenderSettings is left as it is.
+void set_light(render::RenderSettings&, const scenes::FilmSpec&);
 
 // size_m: of the body's surface at rest, corner to corner of its box; reliefs and the depth to which light
 // gets are shares of it, so that a toy and an organ are seen to be of the same stuff.

@@ -25,7 +25,7 @@ const render::LineLook cage_lines{.color_srgb = {0.12, 0.14, 0.18}, .width_px = 
 const render::LineLook way_lines{.color_srgb = {0.85, 0.35, 0.05}, .width_px = 3, .opacity = 0.9};
 const render::LineLook tree_lines{.color_srgb = {0.25, 0.28, 0.36}, .width_px = 1, .opacity = 0.45};
 // Above the first, a coarse stand-in of the second casts the shadow of a surface.
-constexpr int most_triangles_that_cast = 60'000, triangles_of_caster = 20'000;
+constexpr int max_triangles_that_cast = 60'000, triangles_of_caster = 20'000;
 
 constexpr double outline_step = 0.004, outline_width = 1.6 / 1080;  // of the stage's diagonal, of the height
 const Vec3 outline_color(0.10, 0.11, 0.14);
@@ -165,7 +165,7 @@ struct Shot::Painter::View {
   }
 
   bool has_caster(std::size_t b) const {
-    return !cages && shot.bodies_[b].surface.triangles.rows() > most_triangles_that_cast;
+    return !cages && shot.bodies_[b].surface.triangles.rows() > max_triangles_that_cast;
   }
 
   void add_body(std::size_t b) {

@@ -26,7 +26,7 @@ namespace {
 constexpr int generation =
     4;  // of pictures: raised when the same film comes out otherwise, so that it is painted anew
 constexpr double longest_arrow = 2;  // times that of the strongest push, which is as long as the robot
-constexpr int most_edges_of_tree = 4000;
+constexpr int max_edges_of_tree = 4000;
 constexpr double at_rest = 0.003;     // of the robot's size: what moves no farther is not seen to move
 constexpr double after_rest_s = 0.5;  // of the film
 constexpr double ease_s = 0.5;        // of the film at its usual speed: so long before contact it slows down
@@ -438,7 +438,7 @@ double Shot::pixels_a_metre(const render::Camera& camera) const {
 }
 
 std::array<int, 4> Shot::hidden_by(const std::array<Eigen::Vector4d, 4>& boxes) const {
-  constexpr int most_frames = 24, across = 16, down = 4;
+  constexpr int max_frames = 24, across = 16, down = 4;
   std::array<std::vector<Eigen::Vector2d>, 4> places_of;
   for (std::size_t c = 0; c < boxes.size(); ++c)
     for (int x = 0; x < across; ++x)
@@ -450,7 +450,7 @@ std::array<int, 4> Shot::hidden_by(const std::array<Eigen::Vector4d, 4>& boxes) 
   Points outermost;
   for (std::size_t b = 0; b < bodies_.size(); ++b) {
     const ffd::Binding part = outermost_part(bodies_[b]);
-    for (const int frame : render::spread_over(frames(), most_frames)) {
+    for (const int frame : render::spread_over(frames(), max_frames)) {
       deform(bodies_[b], part, fem::body_positions(world_, state_at(frame), int(b)), outermost);
       const render::Camera camera = camera_of(frame);
       std::vector<Eigen::Vector2d> seen;
@@ -681,7 +681,7 @@ Points Shot::arrows_at_stored(int frame) const {
 
 void Shot::find_tree() {
   const plan::Tree& tree = plan_.tree;
-  const int every = (tree.size() + most_edges_of_tree - 1) / most_edges_of_tree;
+  const int every = (tree.size() + max_edges_of_tree - 1) / max_edges_of_tree;
   std::vector<Vec3> ends;
   for (int n = 1; n < tree.size(); n += every) {
     ends.push_back(tree.centers[tree.parents[std::size_t(n)]].cast<double>());

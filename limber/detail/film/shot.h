@@ -154,7 +154,7 @@ class Shot {
   Output output_;
   std::vector<std::vector<std::shared_ptr<const render::Image8>>>
       images_;                           // a body, where it shows its own colors
-  render::Look look_;                    // of one view
+  render::RenderSettings look_;          // of one view
   std::vector<render::CameraKey> path_;  // over the share of the film
   Points followed_m_;                    // (frames × 3) the way of the body that the camera follows, or none
   render::CaptionLook words_;            // where the words stand, and on what

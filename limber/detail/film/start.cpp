@@ -40,7 +40,7 @@ ContactShape shape_of_nothing(const TetMesh& cage) {
   ContactShape shape;
   shape.field = {cage.positions.row(0), 1, {2, 2, 2}, 1, std::vector<std::int16_t>(8, 1)};
   shape.samples = {Points(0, 3), Eigen::VectorXi(0), Weights(0, 4), Eigen::VectorXd(0)};
-  shape.least_weight = Weights::Constant(cage.tets.rows(), 4, 2);
+  shape.min_weight = Weights::Constant(cage.tets.rows(), 4, 2);
   return shape;
 }
 

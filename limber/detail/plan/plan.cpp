@@ -171,17 +171,17 @@ plan::Settings settings_of(const scenes::Scene& scene, const PlanOptions& option
               .mean_speed_m_s = p.settle_speed_m_s,
               .max_force_share = p.settle_force_share,
               .hold = p.settle_hold && !scene.goal.shape};  // which holding would leave alone
-  s.laws = {.lag = p.lag,
-            .metric = p.metric == "distance" ? plan::Metric::distance : plan::Metric::time_to_go,
-            .time_weight = p.time_weight,
-            .guidance = p.guidance,
-            .soft_price = p.soft_price,
-            .learn_prices = p.learn_prices,
-            .steer = p.steer,
-            .look_s = p.look_s,
-            .stop_in_goal = p.stop_in_goal,
-            .hold = p.hold && !scene.goal.shape,
-            .end_hopeless = p.end_hopeless};
+  s.search_options = {.lag = p.lag,
+                      .metric = p.metric == "distance" ? plan::Metric::distance : plan::Metric::time_to_go,
+                      .time_weight = p.time_weight,
+                      .guidance = p.guidance,
+                      .soft_price = p.soft_price,
+                      .learn_prices = p.learn_prices,
+                      .steer = p.steer,
+                      .look_s = p.look_s,
+                      .stop_in_goal = p.stop_in_goal,
+                      .hold = p.hold && !scene.goal.shape,
+                      .end_hopeless = p.end_hopeless};
   s.frames_per_second = scene.film.frames_per_second / scene.film.speed;
   s.in_flight = options.in_flight;
   s.time_limit_s = options.time_limit_s;
@@ -221,10 +221,11 @@ Found find_plan(const scenes::Scene& scene, const FemSystem& system, const PlanO
   std::optional<SearchLog> search_log;
   if (options.stats) search_log.emplace(*options.stats, earlier ? earlier->statistics.iterations : 0);
   plan::PortfolioReport searches;
-  found.plan = several ? plan::portfolio(system, settings, options.portfolio, &searches)
-                       : plan::plan(system, settings, std::move(earlier), [&](const plan::Moment& moment) {
-                           if (search_log) search_log->add(moment);
-                         });
+  found.plan =
+      several ? plan::portfolio(system, settings, options.portfolio, &searches)
+              : plan::plan(system, settings, std::move(earlier), [&](const plan::SearchProgress& progress) {
+                  if (search_log) search_log->add(progress);
+                });
   if (search_log) search_log->finish();
 
   plan::Plan& plan = found.plan;

@@ -11,7 +11,7 @@ namespace {
 constexpr std::int64_t iterations_a_line = 10;
 constexpr double seconds_between_writes = 0.5;
 
-std::string line_of(const plan::Moment& m) {
+std::string line_of(const plan::SearchProgress& m) {
   Json json{{"iteration", m.statistics.iterations},
             {"leg", m.leg},
             {"nodes", m.nodes},
@@ -34,13 +34,13 @@ SearchLog::SearchLog(fs::path path, std::int64_t keep_up_to) : path_(std::move(p
   write_file(path_, lines_);  // a place that cannot be written is told before the search
 }
 
-void SearchLog::add(const plan::Moment& moment) {
-  last_ = moment;
-  last_is_written_ = moment.statistics.iterations % iterations_a_line == 0;
+void SearchLog::add(const plan::SearchProgress& progress) {
+  last_ = progress;
+  last_is_written_ = progress.statistics.iterations % iterations_a_line == 0;
   if (!last_is_written_) return;
-  lines_ += line_of(moment);
-  if (moment.statistics.wall_s - written_at_wall_s_ < seconds_between_writes) return;
-  written_at_wall_s_ = moment.statistics.wall_s;
+  lines_ += line_of(progress);
+  if (progress.statistics.wall_s - written_at_wall_s_ < seconds_between_writes) return;
+  written_at_wall_s_ = progress.statistics.wall_s;
   write_file(path_, lines_);
 }
 

@@ -10,7 +10,7 @@ namespace limber::detail {
 
 namespace {
 
-constexpr int most_edges = 4000;
+constexpr int max_edges = 4000;
 constexpr double longer_side_px = 900, margin_px = 30;
 
 // One projection: two axes of the world, and where they go on the page.
@@ -69,7 +69,7 @@ void draw(const View& view, const scenes::Scene& scene, const fem::World& world,
       "<circle class=\"goal\" cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"{:.1f}\" fill=\"#2a2\" fill-opacity=\"0.3\" "
       "stroke=\"#2a2\"/>\n",
       view.x(goal), view.y(goal), view.scale * plan.settings.goal.radius_m);
-  const int every = (tree.size() + most_edges - 1) / most_edges;
+  const int every = (tree.size() + max_edges - 1) / max_edges;
   std::string edges, nodes;
   for (int n = 1; n < tree.size(); n += every) {
     edges += fmt::format("M{}L{}", view.at(center(tree.parents[std::size_t(n)])), view.at(center(n)));

@@ -153,7 +153,7 @@ void plots(const Findings& f, Page& page) {
     own.x.push_back(frame.time_s), own.y.push_back(percent * frame.seen.self_overlap_m);
     double least = 0, pressed = 0;
     for (const SeenFrame::Gap& g : frame.seen.gaps)
-      if (g.other >= 0) least = std::max(least, g.least_m), pressed = std::max(pressed, g.at_contact_m);
+      if (g.other >= 0) least = std::max(least, g.min_m), pressed = std::max(pressed, g.at_contact_m);
     gap.x.push_back(frame.time_s), gap.y.push_back(percent * least);
     at_contact.x.push_back(frame.time_s), at_contact.y.push_back(percent * pressed);
   }
@@ -163,7 +163,7 @@ void plots(const Findings& f, Page& page) {
   plot("Stretch of a tet, largest", "singular value",
        curves_of([](const BodyFigures& b) { return b.largest_stretch; }, true), {limits.largest_stretch});
   plot("Stretch of a tet, least", "singular value",
-       curves_of([](const BodyFigures& b) { return b.least_stretch; }, true), {limits.least_stretch});
+       curves_of([](const BodyFigures& b) { return b.min_stretch; }, true), {limits.min_stretch});
   page.add("</div>\n");
 }
 

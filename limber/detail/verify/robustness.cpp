@@ -13,7 +13,7 @@
 #include "limber/detail/world/analysis.h"
 #include "limber/detail/world/fem_system.h"
 #include "limber/detail/world/scene_world.h"
-#include "plan/course.h"
+#include "plan/control_rollout.h"
 #include "plan/follow.h"
 #include "plan/shortcut.h"
 
@@ -21,7 +21,7 @@ namespace limber::detail {
 
 namespace {
 
-constexpr int most_worlds = 4;
+constexpr int max_worlds = 4;
 // Streams of random numbers: worlds, and after them perturbations of forces.
 constexpr std::uint64_t first_world_stream = std::uint64_t(1) << 61;
 
@@ -73,11 +73,11 @@ Control with(const Error& error, Control control) {
 }
 
 // Without a settle nobody looks whether the robot rests.
-const char* name_of(plan::Course::Result result, bool settles) {
+const char* name_of(plan::ControlRollout::Result result, bool settles) {
   switch (result) {
-    case plan::Course::rests_in_goal:
+    case plan::ControlRollout::rests_in_goal:
       return settles ? "at rest in the goal" : "in the goal";
-    case plan::Course::diverged:
+    case plan::ControlRollout::diverged:
       return "the dynamics diverged";
     default:
       return settles ? "not at rest in the goal" : "not in the goal";
@@ -85,7 +85,7 @@ const char* name_of(plan::Course::Result result, bool settles) {
 }
 
 // Whether each leg ended in its goal; how fast the robot was there is not asked.
-bool reaches_all_via(const plan::Plan& plan, const FemSystem& system, const plan::Course& course,
+bool reaches_all_via(const plan::Plan& plan, const FemSystem& system, const plan::ControlRollout& course,
                      const plan::Guide& guide, const std::vector<int>& before_legs) {
   for (std::size_t leg = 1; leg < before_legs.size(); ++leg) {
     const auto count =
@@ -114,12 +114,12 @@ std::vector<Fate> replay(const Planned& planned, const RobustOptions& options, b
   const FemSystem system(world, goal_rules_of(scene));
   const plan::Follower follower(system, plan.settings, planned.guide);
   const plan::Guide& guide = follower.guide();
-  std::vector<plan::Course> courses;
+  std::vector<plan::ControlRollout> courses;
   std::vector<double> asked(std::size_t(last - first));
   for (int i = first; i < last; ++i) {
     const std::size_t controls = guide.control.empty() ? 0 : std::size_t(guide.control.back()) + 1;
     const std::vector<Error> of_control = errors(controls, options, Rng(options.seed, std::uint64_t(i)));
-    plan::Course& course = courses.emplace_back();
+    plan::ControlRollout& course = courses.emplace_back();
     course.from = system.start();
     double& most = asked[std::size_t(i - first)];
     const auto acting = [&guide, of_control, &most](std::size_t piece, const Control& control) {
@@ -138,18 +138,18 @@ std::vector<Fate> replay(const Planned& planned, const RobustOptions& options, b
         course.controls.push_back(acting(piece, guide.pieces[piece]));
   }
   plan::run(system, plan.settings, courses,
-            {.settle = plan::CourseOptions::anywhere, .keep_frames = true, .ask_acceptable = false});
+            {.settle = plan::ControlRolloutOptions::anywhere, .keep_frames = true, .ask_acceptable = false});
   const std::vector<int> before_legs = plan::controls_before_legs(plan);
   std::vector<Fate> fates;
   for (std::size_t i = 0; i < courses.size(); ++i) {
-    plan::Course& course = courses[i];
+    plan::ControlRollout& course = courses[i];
     const bool goes_by = reaches_all_via(plan, system, course, guide, before_legs);
     const plan::Trajectory path{course.controls, 0, plan.settings.frames_per_second, std::move(course.frames),
                                 course.end};
     const MotionFigures figures = measure_motion(world, planned.bodies, path);
     Fate& fate = fates.emplace_back();
     fate.world = world_number;
-    fate.reaches = course.result == plan::Course::rests_in_goal && goes_by;
+    fate.reaches = course.result == plan::ControlRollout::rests_in_goal && goes_by;
     fate.end = goes_by ? name_of(course.result, plan.settings.settle.max_duration_s > 0) : "a via is missed";
     fate.end_center_m = system.robot_center(course.end);
     fate.distance_m =
@@ -159,7 +159,7 @@ std::vector<Fate> replay(const Planned& planned, const RobustOptions& options, b
     fate.volume_change =
         *std::max_element(figures.largest_volume_change.begin(), figures.largest_volume_change.end());
     fate.penetration_m = figures.deepest_penetration_m;
-    fate.least_stretch = figures.least_stretch, fate.largest_stretch = figures.largest_stretch;
+    fate.min_stretch = figures.min_stretch, fate.largest_stretch = figures.largest_stretch;
     fate.overlap_m = figures.deepest_overlap_m, fate.self_overlap_m = figures.deepest_self_overlap_m;
     fate.asked_n = asked[i], fate.force_n = figures.largest_force_n;
     Promises table;
@@ -180,7 +180,7 @@ Tally tally_of(std::vector<Fate> fates, const Vec3& planned_end) {
     tally.farthest_m = std::max(tally.farthest_m, apart);
     worst.volume_change = std::max(worst.volume_change, f.volume_change);
     worst.penetration_m = std::max(worst.penetration_m, f.penetration_m);
-    worst.least_stretch = std::min(worst.least_stretch, f.least_stretch);
+    worst.min_stretch = std::min(worst.min_stretch, f.min_stretch);
     worst.largest_stretch = std::max(worst.largest_stretch, f.largest_stretch);
     worst.overlap_m = std::max(worst.overlap_m, f.overlap_m);
     worst.self_overlap_m = std::max(worst.self_overlap_m, f.self_overlap_m);
@@ -208,7 +208,7 @@ Robustness robust(const RobustOptions& options) {
   const Planned own{planned, bodies, plan::guide_of(system, planned.plan.settings, path)};
   const Vec3 planned_end = system.robot_center(path.end);
 
-  const int n = options.perturbations, worlds = std::min(n, most_worlds);
+  const int n = options.perturbations, worlds = std::min(n, max_worlds);
   const auto tally = [&](bool follows) {
     std::vector<Fate> fates;
     for (int w = 0; w < worlds; ++w) {

@@ -29,7 +29,7 @@ struct Fate {
   double distance_m = 0, speed_m_s = 0, duration_s = 0;
   Vec3 end_center_m = Vec3::Zero();
   double volume_change = 0, penetration_m = 0;
-  double least_stretch = 1, largest_stretch = 1, overlap_m = 0, self_overlap_m = 0;
+  double min_stretch = 1, largest_stretch = 1, overlap_m = 0, self_overlap_m = 0;
   double asked_n = 0, force_n = 0;  // the largest that a control asked for, and that acted
   std::vector<std::string> broken;  // of the promises that `limber verify` looks at
 };

@@ -14,7 +14,7 @@
 #include "limber/detail/world/fem_system.h"
 #include "limber/detail/world/goal_terms.h"
 #include "limber/detail/world/scene_world.h"
-#include "plan/course.h"
+#include "plan/control_rollout.h"
 #include "plan/shortcut.h"
 #include "plan/simulation.h"
 
@@ -59,13 +59,13 @@ class Replay {
     course_.from = system.start();
     course_.controls = plan.trajectory.controls;
     plan::run(system, settings, {&course_, 1},
-              {.settle = plan::CourseOptions::never,
+              {.settle = plan::ControlRolloutOptions::never,
                .keep_frames = true,
                .ask_acceptable = false,
                .stoppable = true});
   }
   bool whole() const { return course_.states.size() == course_.controls.size(); }
-  const plan::Course& course() const { return course_; }
+  const plan::ControlRollout& course() const { return course_; }
   // After so many controls; the last good state where the dynamics diverged before.
   const State& after(std::size_t controls) const {
     const std::size_t there = std::min(controls, course_.states.size());
@@ -73,7 +73,7 @@ class Replay {
   }
 
  private:
-  plan::Course course_;
+  plan::ControlRollout course_;
 };
 
 void add_terms(const std::string& goal, const std::vector<GoalTerm>& terms, Promises& table) {
@@ -149,7 +149,7 @@ void check_start(const plan::Plan& plan, const fem::World& world, Promises& tabl
 void check_path(const plan::Plan& plan, const plan::Settings& settings, const Replay& replay,
                 Promises& table) {
   const plan::Trajectory& path = plan.trajectory;
-  const plan::Course& course = replay.course();
+  const plan::ControlRollout& course = replay.course();
   table.row("replay gives the same bits",
             replay.whole() && same_bits(course.end, path.end) &&
                 std::equal(course.frames.begin(), course.frames.end(), path.frames.begin(), path.frames.end(),
@@ -208,7 +208,7 @@ struct GoneAstray {};
 plan::Plan searched_again(const FemSystem& system, plan::Settings settings, const plan::Plan& then) {
   settings.max_iterations = then.statistics.iterations;
   settings.time_limit_s = std::numeric_limits<double>::infinity();
-  const plan::Plan found = plan::plan(system, settings, std::nullopt, [&](const plan::Moment& now) {
+  const plan::Plan found = plan::plan(system, settings, std::nullopt, [&](const plan::SearchProgress& now) {
     if (now.nodes > then.tree.size() || now.statistics.diverged > then.statistics.diverged ||
         now.statistics.rejected > then.statistics.rejected ||
         now.statistics.refused > then.statistics.refused)
@@ -240,7 +240,7 @@ void check_search(const PlanFolder& planned, const FemSystem& system, const plan
                          now.rejected == then.rejected && now.refused == then.refused &&
                          now.rollout_steps == then.rollout_steps && then.rollouts >= then.iterations &&
                          then.rollouts_wrong <= then.rollouts &&
-                         (settings.laws.lag == 0 || then.rollouts_wrong == 0);
+                         (settings.search_options.lag == 0 || then.rollouts_wrong == 0);
     searched = found.tree.size();  // none where it went astray
     const bool later = planned.summary.contains("shortcut") || planned.summary.contains("improve");
     same = searched > 0 && searched <= tree.size() && same_nodes(found.tree, tree, searched) &&
@@ -442,7 +442,7 @@ void check_seen(const MotionFigures& figures, bool promised, Promises& table) {
                  fmt::format("{:.4f} m, {} ({})", figures.deepest_wall_overlap_m,
                              of_size(figures.deepest_wall_overlap_m), figures.wall_overlap_of));
   table.measured("least and largest stretch of a tet",
-                 fmt::format("{:.3f} ({}), {:.3f} ({})", figures.least_stretch, figures.least_stretch_of,
+                 fmt::format("{:.3f} ({}), {:.3f} ({})", figures.min_stretch, figures.min_stretch_of,
                              figures.largest_stretch, figures.largest_stretch_of));
 }
 
@@ -453,7 +453,7 @@ void check_stretch(const MotionFigures& figures, const fem::World& world, Promis
     if (!world.bodies[b].moving || !std::isfinite(most)) continue;
     double least = 1, largest = 1;
     for (const FrameFigures& frame : figures.frames)
-      least = std::min(least, frame.bodies[b].least_stretch),
+      least = std::min(least, frame.bodies[b].min_stretch),
       largest = std::max(largest, frame.bodies[b].largest_stretch);
     table.row(
         fmt::format("{}: tets are stretched within {:.3g} and {:.3g}", world.bodies[b].name, 1 / most, most),
@@ -590,7 +590,7 @@ void check_simulation(const fs::path& folder, const PlanFolder& planned,
   check_beginning(folder, planned, world, table);
 
   const Replay replay(system, plan, settings);
-  const plan::Course& course = replay.course();
+  const plan::ControlRollout& course = replay.course();
   check_path(plan, settings, replay, table);
   Control nothing;
   nothing.steps = std::int32_t(plan.trajectory.end.step - system.start().step);
@@ -631,7 +631,7 @@ void check_plan(const fs::path& folder, const PlanFolder& planned, const std::ve
     check_start(plan, world, table);
 
   const Replay replay(system, plan, settings);
-  const plan::Course& course = replay.course();
+  const plan::ControlRollout& course = replay.course();
   check_path(plan, settings, replay, table);
   figures = measure_motion(world, bodies,
                            {plan.trajectory.controls, plan.trajectory.settle_steps,

@@ -39,7 +39,7 @@ FrameFigures measure_frame(const fem::World& world, const State& state) {
     const fem::Strains strains = fem::strains(world, state, b);
     body.volume_change = fem::volume_m3(world, state, b) / world.bodies[std::size_t(b)].rest_volume_m3 - 1;
     body.largest_strain = *std::max_element(strains.largest.begin(), strains.largest.end());
-    body.least_stretch = *std::min_element(strains.shortest.begin(), strains.shortest.end());
+    body.min_stretch = *std::min_element(strains.shortest.begin(), strains.shortest.end());
     body.largest_stretch = *std::max_element(strains.longest.begin(), strains.longest.end());
     body.elastic_energy_j = fem::elastic_energy_j(world, state, b);
     body.kinetic_energy_j = fem::kinetic_energy_j(world, state, b);
@@ -68,8 +68,8 @@ MotionFigures measure_motion(const fem::World& world, const plan::Trajectory& pa
           std::max(figures.largest_volume_change[b], std::abs(body.volume_change));
       if (body.largest_strain > figures.largest_strain)
         figures.largest_strain = body.largest_strain, figures.largest_strain_of = world.bodies[b].name;
-      if (body.least_stretch < figures.least_stretch)
-        figures.least_stretch = body.least_stretch, figures.least_stretch_of = world.bodies[b].name;
+      if (body.min_stretch < figures.min_stretch)
+        figures.min_stretch = body.min_stretch, figures.min_stretch_of = world.bodies[b].name;
       if (body.largest_stretch > figures.largest_stretch)
         figures.largest_stretch = body.largest_stretch, figures.largest_stretch_of = world.bodies[b].name;
     }
@@ -148,7 +148,7 @@ MotionFigures measure_motion(const fem::World& world, const std::vector<Prepared
       figures.self_overlap_of = world.bodies[std::size_t(frame.self_overlap_body)].name;
     }
   }
-  figures.gap = gaps_of(world, seen, false, &SeenFrame::Gap::least_m);
+  figures.gap = gaps_of(world, seen, false, &SeenFrame::Gap::min_m);
   figures.gap_at_contact = gaps_of(world, seen, false, &SeenFrame::Gap::at_contact_m);
   figures.gap_to_wall = gaps_of(world, seen, true, &SeenFrame::Gap::at_contact_m);
   for (std::size_t f = 0; f < seen.size(); ++f) figures.frames[f].seen = std::move(seen[f]);
@@ -167,8 +167,8 @@ Json json_of(const MotionFigures& figures) {
           {"deepest_penetration_of_robot_size", figures.deepest_penetration_m / figures.robot_size_m},
           {"penetration_between", figures.penetration_between},
           {"inverted_tets", figures.inverted_tets},
-          {"least_stretch", figures.least_stretch},
-          {"least_stretch_of", figures.least_stretch_of},
+          {"least_stretch", figures.min_stretch},
+          {"least_stretch_of", figures.min_stretch_of},
           {"largest_stretch", figures.largest_stretch},
           {"largest_stretch_of", figures.largest_stretch_of},
           {"robot_surface_size_m", size},
@@ -198,7 +198,7 @@ void write_observables(const fs::path& csv, const fem::World& world, const Motio
   for (const FrameFigures& frame : figures.frames) {
     text += fmt::format("{}", frame.time_s);
     for (const BodyFigures& b : frame.bodies)
-      text += fmt::format(",{},{},{},{},{},{},{}", b.volume_change, b.largest_strain, b.least_stretch,
+      text += fmt::format(",{},{},{},{},{},{},{}", b.volume_change, b.largest_strain, b.min_stretch,
                           b.largest_stretch, b.elastic_energy_j, b.kinetic_energy_j, b.contact_force_n);
     text += fmt::format(",{},{},{},{},{}", frame.contact_force_n, frame.contact_between,
                         frame.penetration.depth_m, frame.penetration_between, frame.inverted_tets);
@@ -213,9 +213,9 @@ void write_observables(const fs::path& csv, const fem::World& world, const Motio
                            [&](const SeenFrame::Gap& gap) { return (gap.other < 0) == walls; });
     };
     const SeenFrame::Gap* const pair = widest(seen, false, &SeenFrame::Gap::at_contact_m);
-    const SeenFrame::Gap* const least = widest(seen, false, &SeenFrame::Gap::least_m);
+    const SeenFrame::Gap* const least = widest(seen, false, &SeenFrame::Gap::min_m);
     const SeenFrame::Gap* const wall = widest(seen, true, &SeenFrame::Gap::at_contact_m);
-    text += fmt::format(",{},{},{},{},{},{}\n", pressing(false), least ? least->least_m : 0.0,
+    text += fmt::format(",{},{},{},{},{},{}\n", pressing(false), least ? least->min_m : 0.0,
                         pair ? pair->at_contact_m : 0.0,
                         pair ? between(world, pair->body, pair->other) : "nothing presses", pressing(true),
                         wall ? wall->at_contact_m : 0.0);

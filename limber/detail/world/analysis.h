@@ -17,7 +17,7 @@ namespace limber::detail {
 struct BodyFigures {          // of one frame; all 0 for a body that does not move, but for contact_force_n
   double volume_change = 0;   // V/V₀ − 1
   double largest_strain = 0;  // of its tets, Green's, absolute and principal
-  double least_stretch = 1, largest_stretch = 1;  // of its tets: singular values of the deformation gradient
+  double min_stretch = 1, largest_stretch = 1;  // of its tets: singular values of the deformation gradient
   double elastic_energy_j = 0, kinetic_energy_j = 0;
   double contact_force_n = 0;  // of the sum of all contacts and walls on it
 };
@@ -49,8 +49,8 @@ struct MotionFigures {
   int inverted_tets = 0;       // over all frames
   double largest_force_n = 0;  // of any control
   double mean_speed_at_end_m_s = 0;
-  double least_stretch = 1, largest_stretch = 1;
-  std::string least_stretch_of = "no body", largest_stretch_of = "no body";
+  double min_stretch = 1, largest_stretch = 1;
+  std::string min_stretch_of = "no body", largest_stretch_of = "no body";
 
   // Of what is seen.
   double robot_surface_size_m = 0;  // largest edge of the bounding box of its fine surface at rest

@@ -95,7 +95,7 @@ class FemSystem::Propagator final : public plan::Propagator {
     }
   }
 
-  void run(plan::Supply& supply, int look_every) override {
+  void run(plan::RolloutSource& supply, int look_every) override {
     while (true) {
       std::vector<plan::Rollout*> first;
       const int lanes = std::min(supply.at_once(), preferred_lanes);
@@ -110,7 +110,8 @@ class FemSystem::Propagator final : public plan::Propagator {
   }
 
  private:
-  void run(fem::Batch& batch, std::vector<plan::Rollout*> in_lane, plan::Supply& supply, int look_every) {
+  void run(fem::Batch& batch, std::vector<plan::Rollout*> in_lane, plan::RolloutSource& supply,
+           int look_every) {
     const auto load = [&](std::size_t lane) {
       batch.load(int(lane), *in_lane[lane]->from, in_lane[lane]->control);
     };
@@ -158,7 +159,8 @@ class FemSystem::Propagator final : public plan::Propagator {
     }
   }
 
-  static void give_back(fem::Batch& batch, const std::vector<plan::Rollout*>& in_lane, plan::Supply& supply) {
+  static void give_back(fem::Batch& batch, const std::vector<plan::Rollout*>& in_lane,
+                        plan::RolloutSource& supply) {
     for (std::size_t lane = 0; lane < in_lane.size(); ++lane) {
       if (!in_lane[lane]) continue;
       batch.stop(int(lane));
@@ -167,10 +169,10 @@ class FemSystem::Propagator final : public plan::Propagator {
     }
   }
 
-  bool goes_on(fem::Batch& batch, int lane, plan::Rollout& rollout, plan::Supply& supply, bool look_due,
-               bool state_due) {
+  bool goes_on(fem::Batch& batch, int lane, plan::Rollout& rollout, plan::RolloutSource& supply,
+               bool look_due, bool state_due) {
     if (look_due) {
-      const plan::Look seen = look(batch, lane, rollout.control.steps - batch.steps_left(lane));
+      const plan::Observation seen = look(batch, lane, rollout.control.steps - batch.steps_left(lane));
       // Numbers that are none stay so: it has diverged, and nobody need look.
       const bool finite = seen.center.allFinite() && seen.velocity.allFinite() && seen.goal_shift.allFinite();
       if (!finite || !supply.goes_on(rollout, seen)) return false;
@@ -193,9 +195,9 @@ class FemSystem::Propagator final : public plan::Propagator {
     return rollout.control.steps - batch.steps_left(int(lane));
   }
 
-  plan::Look look(const fem::Batch& batch, int lane, int steps) const {
+  plan::Observation look(const fem::Batch& batch, int lane, int steps) const {
     const fem::Batch::Motion robot = batch.motion(lane, system_.world_.robot);
-    plan::Look look{steps, robot.center_m, robot.velocity_m_s};
+    plan::Observation look{steps, robot.center_m, robot.velocity_m_s};
     if (system_.goal_.body >= 0)
       look.goal_shift = batch.motion(lane, system_.goal_.body).center_m - system_.goal_body_start_m_;
     if (const GoalRules& last = system_.last_->goal_; last.lost_below_m)

@@ -20,7 +20,7 @@ namespace limber::detail {
 struct SeenLimits {
   double overlap = 0.005, self_overlap = 0.005;
   double median_gap = 0.01, worst_gap = 0.02;
-  double least_stretch = 0.5, largest_stretch = 2;
+  double min_stretch = 0.5, largest_stretch = 2;
 };
 
 struct SeenFrame {
@@ -32,7 +32,7 @@ struct SeenFrame {
   // Of each pair of bodies, or body and wall (other −1), that press one another.
   struct Gap {
     int body, other;
-    double least_m;       // distance of their surfaces, 0 where they overlap
+    double min_m;         // distance of their surfaces, 0 where they overlap
     double at_contact_m;  // where the strongest single force of contact acts
     double force_n;       // the lengths of all forces, summed
   };

@@ -10,7 +10,7 @@ namespace limber::detail {
 namespace {
 
 constexpr double cells_a_radius = 4;
-constexpr int most_cells = 200000;
+constexpr int max_cells = 200000;
 
 // The cells whose middles are in the tet; where a field is given, only those that were inside its surface
 // while the tet was at rest.
@@ -65,7 +65,7 @@ plan::Workspace workspace_of(const fem::World& world, const std::optional<State>
   w.robot_radius_m = fem::inner_radius_m(world, world.robot);
   w.box = world.bounds_m, w.walls = world.walls;
   const Vec3 size = w.box.size();
-  w.cell_m = std::max(w.robot_radius_m / cells_a_radius, std::cbrt(size.prod() / most_cells));
+  w.cell_m = std::max(w.robot_radius_m / cells_a_radius, std::cbrt(size.prod() / max_cells));
   for (int i = 0; i < 3; ++i) w.cells[i] = std::max(1, int(std::ceil(size[i] / w.cell_m - 1e-9)));
   w.what.assign(std::size_t(w.cells.prod()), plan::Workspace::open);
   const State start = given.value_or(fem::start_state(world));

@@ -1,5 +1,5 @@
 // From samples to pixels, against what IEEE 754 and the geometry of a camera say.
-#include "render/detail/finish.h"
+#include "render/detail/compositor.h"
 
 #include <gtest/gtest.h>
 
@@ -57,7 +57,7 @@ class FinishTest : public testing::Test {
   std::vector<float> row(const std::vector<std::uint16_t>& samples, int width, int height, int per_side,
                          int y) const {
     std::vector<float> rgba(4 * std::size_t(width));
-    Finish(backdrop, camera, width, height).row(y, samples.data(), per_side, rgba.data());
+    Compositor(backdrop, camera, width, height).row(y, samples.data(), per_side, rgba.data());
     return rgba;
   }
 };

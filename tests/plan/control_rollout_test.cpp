@@ -1,4 +1,4 @@
-#include "plan/course.h"
+#include "plan/control_rollout.h"
 
 #include <gtest/gtest.h>
 
@@ -17,20 +17,20 @@ using testing::Toy;
 using testing::toy_settings;
 
 // Pushes of many lengths and directions; the toy's seed 7 decides which.
-std::vector<Course> some_courses(const System& system, const Settings& settings, int count) {
-  std::vector<Course> courses;
+std::vector<ControlRollout> some_courses(const System& system, const Settings& settings, int count) {
+  std::vector<ControlRollout> courses;
   for (int i = 0; i < count; ++i) {
-    Course& c = courses.emplace_back();
+    ControlRollout& c = courses.emplace_back();
     c.from = system.start();
     for (int k = 0; k <= i % 4; ++k)
-      c.controls.push_back(control_of(draw(settings, system, 10 * i + k), settings, Vec3(1, 1.5, 1)));
+      c.controls.push_back(control_of(draw_sample(settings, system, 10 * i + k), settings, Vec3(1, 1.5, 1)));
     c.reach_force_n = i % 2 == 0 ? settings.max_force_n : 0;
     c.last_step = 1500;
   }
   return courses;
 }
 
-void expect_same(const Course& a, const Course& b) {
+void expect_same(const ControlRollout& a, const ControlRollout& b) {
   EXPECT_EQ(a.result, b.result);
   EXPECT_EQ(a.controls, b.controls);
   EXPECT_TRUE(a.states == b.states);
@@ -40,19 +40,20 @@ void expect_same(const Course& a, const Course& b) {
   EXPECT_EQ(json_of(a.costs), json_of(b.costs));
 }
 
-TEST(Course, OfWhoeverHasNothingToKeepEndsAtASignalAndIsElseTheSame) {
+TEST(ControlRollout, OfWhoeverHasNothingToKeepEndsAtASignalAndIsElseTheSame) {
   const Toy toy(5, true, true, 1.1f);
   const Settings s = toy_settings();
-  const CourseOptions kept{.settle = CourseOptions::anywhere, .keep_frames = true, .measure = true};
-  CourseOptions stoppable = kept;
+  const ControlRolloutOptions kept{
+      .settle = ControlRolloutOptions::anywhere, .keep_frames = true, .measure = true};
+  ControlRolloutOptions stoppable = kept;
   stoppable.stoppable = true;
-  const auto courses = [&](const CourseOptions& options) {
-    std::vector<Course> all = some_courses(toy, s, 12);
+  const auto courses = [&](const ControlRolloutOptions& options) {
+    std::vector<ControlRollout> all = some_courses(toy, s, 12);
     run(toy, s, all, options);
     return all;
   };
-  const std::vector<Course> whole = courses(kept);
-  const auto expect_whole = [&](const std::vector<Course>& all) {
+  const std::vector<ControlRollout> whole = courses(kept);
+  const auto expect_whole = [&](const std::vector<ControlRollout>& all) {
     for (std::size_t i = 0; i < whole.size(); ++i) expect_same(all[i], whole[i]);
   };
   expect_whole(courses(stoppable));
@@ -71,21 +72,22 @@ TEST(Course, OfWhoeverHasNothingToKeepEndsAtASignalAndIsElseTheSame) {
   request_stop(0);
 }
 
-TEST(Course, DoesNotDependOnItsNeighboursLanesOrThreads) {
+TEST(ControlRollout, DoesNotDependOnItsNeighboursLanesOrThreads) {
   Toy toy(5, true, true, 1.1f);
   const Settings s = toy_settings();
-  const CourseOptions options{.settle = CourseOptions::anywhere, .keep_frames = true, .measure = true};
-  std::vector<Course> alone = some_courses(toy, s, 12);
-  for (Course& c : alone) run(toy, s, {&c, 1}, options);
+  const ControlRolloutOptions options{
+      .settle = ControlRolloutOptions::anywhere, .keep_frames = true, .measure = true};
+  std::vector<ControlRollout> alone = some_courses(toy, s, 12);
+  for (ControlRollout& c : alone) run(toy, s, {&c, 1}, options);
   int results[5] = {};
-  for (const Course& c : alone) ++results[c.result];
-  ASSERT_GT(results[Course::rests_in_goal], 0);
-  ASSERT_GT(results[Course::diverged] + results[Course::not_acceptable], 0);
+  for (const ControlRollout& c : alone) ++results[c.result];
+  ASSERT_GT(results[ControlRollout::rests_in_goal], 0);
+  ASSERT_GT(results[ControlRollout::diverged] + results[ControlRollout::not_acceptable], 0);
   for (const int threads : {1, 2})
     for (const int lanes : {1, 5, 16}) {
       set_thread_count(threads);
       toy.lanes_wanted = lanes;
-      std::vector<Course> together = some_courses(toy, s, 12);
+      std::vector<ControlRollout> together = some_courses(toy, s, 12);
       run(toy, s, together, options);
       for (std::size_t i = 0; i < alone.size(); ++i) expect_same(together[i], alone[i]);
     }
@@ -93,15 +95,15 @@ TEST(Course, DoesNotDependOnItsNeighboursLanesOrThreads) {
 }
 
 // A settle that is too short for a step is asked for all the same: who moves does not rest.
-TEST(Course, WhoMovesDoesNotRestHoweverShortTheSettle) {
+TEST(ControlRollout, WhoMovesDoesNotRestHoweverShortTheSettle) {
   const Toy toy(5, false, false, 99);
   Settings s = toy_settings();
-  Course course;
+  ControlRollout course;
   course.from = toy.start();
   std::fill(course.from.velocities.begin(), course.from.velocities.end(), 1.f);
   s.goal.center_of_mass_m = toy.robot_center(course.from), s.goal.radius_m = 1;
   for (const auto& [duration_s, result] :
-       {std::pair(0.0, Course::rests_in_goal), std::pair(0.001, Course::ends_elsewhere)}) {
+       {std::pair(0.0, ControlRollout::rests_in_goal), std::pair(0.001, ControlRollout::ends_elsewhere)}) {
     s.settle.max_duration_s = duration_s;
     run(toy, s, {&course, 1}, {});
     EXPECT_EQ(course.result, result) << duration_s;
@@ -109,14 +111,14 @@ TEST(Course, WhoMovesDoesNotRestHoweverShortTheSettle) {
 }
 
 // What a course says it ran is what gives its end, step by step.
-TEST(Course, ItsControlsAreWhatWasRun) {
+TEST(ControlRollout, ItsControlsAreWhatWasRun) {
   const Toy toy(5, true, false, 99);
   const Settings s = toy_settings();
-  std::vector<Course> courses = some_courses(toy, s, 12);
-  run(toy, s, courses, {.settle = CourseOptions::anywhere, .keep_frames = true});
+  std::vector<ControlRollout> courses = some_courses(toy, s, 12);
+  run(toy, s, courses, {.settle = ControlRolloutOptions::anywhere, .keep_frames = true});
   int compared = 0;
-  for (const Course& c : courses) {
-    if (c.result == Course::too_costly) continue;  // its last control was cut
+  for (const ControlRollout& c : courses) {
+    if (c.result == ControlRollout::too_costly) continue;  // its last control was cut
     ++compared;
     std::vector<Control> controls = c.controls;
     ASSERT_EQ(c.states.size(), controls.size());
@@ -132,12 +134,12 @@ TEST(Course, ItsControlsAreWhatWasRun) {
   EXPECT_GT(compared, 6);
 }
 
-TEST(Course, MeasuresAreTheLargestOfItsFrames) {
+TEST(ControlRollout, MeasuresAreTheLargestOfItsFrames) {
   const Toy toy(5, true, false, 99);
   const Settings s = toy_settings();
-  std::vector<Course> courses = some_courses(toy, s, 6);
+  std::vector<ControlRollout> courses = some_courses(toy, s, 6);
   run(toy, s, courses, {.keep_frames = true, .measure = true});
-  for (const Course& c : courses) {
+  for (const ControlRollout& c : courses) {
     double energy = 0, change = 0;
     for (const State& frame : c.frames) {
       energy = std::max(energy, toy.measures(frame).strain_energy_j);
@@ -150,16 +152,16 @@ TEST(Course, MeasuresAreTheLargestOfItsFrames) {
 }
 
 // The cheapest wins a race for any lanes, and nothing dearer than the bound comes through.
-TEST(Course, ARaceEndsLosersOnly) {
+TEST(ControlRollout, ARaceEndsLosersOnly) {
   Toy toy(1, false, false, 99);
   const Settings s = toy_settings();
-  std::vector<Course> free = some_courses(toy, s, 12);
+  std::vector<ControlRollout> free = some_courses(toy, s, 12);
   run(toy, s, free, {});
-  const auto winner = [&](const std::vector<Course>& courses) {
+  const auto winner = [&](const std::vector<ControlRollout>& courses) {
     int best = -1;
     for (int i = 0; i < int(courses.size()); ++i) {
-      const Course& c = courses[std::size_t(i)];
-      if (c.result != Course::rests_in_goal) continue;
+      const ControlRollout& c = courses[std::size_t(i)];
+      if (c.result != ControlRollout::rests_in_goal) continue;
       if (best < 0 || c.costs.duration_s < courses[std::size_t(best)].costs.duration_s) best = i;
     }
     return best;
@@ -168,17 +170,17 @@ TEST(Course, ARaceEndsLosersOnly) {
   const double shortest = free[std::size_t(winner(free))].costs.duration_s;
   for (const int lanes : {1, 16}) {
     toy.lanes_wanted = lanes;
-    std::vector<Course> raced = some_courses(toy, s, 12);
+    std::vector<ControlRollout> raced = some_courses(toy, s, 12);
     run(toy, s, raced, {.race = true});
     EXPECT_EQ(winner(raced), winner(free));
-    std::vector<Course> bounded = some_courses(toy, s, 12);
+    std::vector<ControlRollout> bounded = some_courses(toy, s, 12);
     run(toy, s, bounded, {.most = 0.999 * shortest});
     EXPECT_EQ(winner(bounded), -1);
-    for (const Course& c : bounded) EXPECT_LT(c.costs.duration_s, shortest + 0.05);
+    for (const ControlRollout& c : bounded) EXPECT_LT(c.costs.duration_s, shortest + 0.05);
   }
 }
 
-TEST(Course, CostsHaveNames) {
+TEST(ControlRollout, CostsHaveNames) {
   const Costs costs{1, 2, 3, 4};
   EXPECT_EQ(cost_in(costs, cost_kind_from("duration")), 1);
   EXPECT_EQ(cost_in(costs, cost_kind_from("effort")), 2);

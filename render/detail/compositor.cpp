@@ -1,4 +1,4 @@
-#include "render/detail/finish.h"
+#include "render/detail/compositor.h"
 
 #include <Eigen/Geometry>
 #include <algorithm>
@@ -100,10 +100,10 @@ class Lookup {
 
 }  // namespace
 
-Finish::Finish(const Backdrop& backdrop, const Camera& camera, int width, int height)
+Compositor::Compositor(const Backdrop& backdrop, const Camera& camera, int width, int height)
     : backdrop_(backdrop), camera_(camera), width_(width), height_(height) {}
 
-void Finish::row(int y, const std::uint16_t* samples, int per_side, float* rgba) const {
+void Compositor::row(int y, const std::uint16_t* samples, int per_side, float* rgba) const {
   const std::size_t texels = std::size_t(width_) * std::size_t(per_side);
   const std::uint16_t* lowest = samples + 4 * texels * std::size_t(height_ - 1 - y) * std::size_t(per_side);
   const float share = 1 / float(per_side * per_side);
@@ -121,7 +121,7 @@ void Finish::row(int y, const std::uint16_t* samples, int per_side, float* rgba)
   put_over_ground(y, rgba);
 }
 
-void Finish::put_over_ground(int y, float* rgba) const {
+void Compositor::put_over_ground(int y, float* rgba) const {
   const Backdrop& b = backdrop_;
   const double tangent = std::tan(0.5 * camera_.fov_deg * std::numbers::pi / 180);
   const Eigen::Matrix3d axes = camera_from_world(camera_).topLeftCorner<3, 3>().transpose();

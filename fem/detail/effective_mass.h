@@ -8,7 +8,7 @@
 namespace limber::fem::detail {
 
 // One body in one lane and step; a function of the present positions.
-class Bearing {
+class EffectiveMass {
  public:
   double depths = 0;  // the sum over all points of contact in which the body takes part now, walls among them
 

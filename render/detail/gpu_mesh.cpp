@@ -1,4 +1,4 @@
-#include "render/detail/mesh_on_card.h"
+#include "render/detail/gpu_mesh.h"
 
 #define GL_GLEXT_PROTOTYPES
 #include <GL/glcorearb.h>
@@ -29,8 +29,8 @@ void upload(GLuint buffer, const Values& values) {
 
 }  // namespace
 
-MeshOnCard::MeshOnCard(const Triangles& triangles, const Points& rest_positions, double crease_angle_deg,
-                       const Appearance& appearance)
+GpuMesh::GpuMesh(const Triangles& triangles, const Points& rest_positions, double crease_angle_deg,
+                 const Appearance& appearance)
     : drawn_(order_for_drawing(triangles, rest_positions, crease_angle_deg, appearance)),
       vertices_(rest_positions.rows()) {
   glGenVertexArrays(1, &array_);
@@ -46,14 +46,14 @@ MeshOnCard::MeshOnCard(const Triangles& triangles, const Points& rest_positions,
   set_positions(rest_positions, {});
 }
 
-void MeshOnCard::set_positions(const Points& positions, const Points& normals) {
+void GpuMesh::set_positions(const Points& positions, const Points& normals) {
   deform(drawn_, positions, normals);
   box_ = bounding_box(positions);
   upload(position_buffer_, drawn_.positions);
   upload(normal_buffer_, drawn_.normals);
 }
 
-void MeshOnCard::set_tints(const Eigen::Matrix<float, Eigen::Dynamic, 4, Eigen::RowMajor>& tints) {
+void GpuMesh::set_tints(const Eigen::Matrix<float, Eigen::Dynamic, 4, Eigen::RowMajor>& tints) {
   std::vector<std::uint16_t> levels;
   levels.reserve(4 * drawn_.vertex_from_drawn.size());
   for (const int vertex : drawn_.vertex_from_drawn)
@@ -63,7 +63,7 @@ void MeshOnCard::set_tints(const Eigen::Matrix<float, Eigen::Dynamic, 4, Eigen::
   upload(tint_buffer_, levels);
 }
 
-void MeshOnCard::set_scalars(const Eigen::VectorXd& values) {
+void GpuMesh::set_scalars(const Eigen::VectorXd& values) {
   std::vector<float> drawn;
   drawn.reserve(drawn_.vertex_from_drawn.size());
   for (const int vertex : drawn_.vertex_from_drawn) drawn.push_back(float(values[vertex]));
@@ -71,7 +71,7 @@ void MeshOnCard::set_scalars(const Eigen::VectorXd& values) {
   upload(scalar_buffer_, drawn);
 }
 
-void MeshOnCard::set_rest(const Points& rest_positions) {
+void GpuMesh::set_rest(const Points& rest_positions) {
   std::vector<float> drawn;
   drawn.reserve(3 * drawn_.vertex_from_drawn.size());
   for (const int vertex : drawn_.vertex_from_drawn)
@@ -80,14 +80,14 @@ void MeshOnCard::set_rest(const Points& rest_positions) {
   upload(rest_buffer_, drawn);
 }
 
-void MeshOnCard::draw(std::size_t first_corner, std::size_t corners) const {
+void GpuMesh::draw(std::size_t first_corner, std::size_t corners) const {
   glBindVertexArray(array_);
   if (scalar_buffer_ == 0) glVertexAttrib1f(at_scalar, 0);
   glDrawElements(GL_TRIANGLES, GLsizei(corners), GL_UNSIGNED_INT,
                  reinterpret_cast<void*>(first_corner * sizeof(std::uint32_t)));
 }
 
-Points MeshOnCard::edge_ends() {
+Points GpuMesh::edge_ends() {
   if (edges_.empty()) {
     // Vertices that a crease parts are one to an edge: the first of them stands for all.
     std::vector<int> first(std::size_t(vertices_), -1);

@@ -1,4 +1,4 @@
-#include "fem/detail/bearing.h"
+#include "fem/detail/effective_mass.h"
 
 namespace limber::fem::detail {
 
@@ -6,8 +6,8 @@ namespace limber::fem::detail {
 constexpr double slack = 2;
 
 template <class Real>
-void Bearing::measure(const LaneView<Real>& view, const Topology::Body& body,
-                      const std::vector<Real>& node_mass) {
+void EffectiveMass::measure(const LaneView<Real>& view, const Topology::Body& body,
+                            const std::vector<Real>& node_mass) {
   double mass = 0, sum[3] = {0, 0, 0};
   for (int n = body.first_node; n < body.last_node; ++n) {
     mass += double(node_mass[n]);
@@ -31,7 +31,7 @@ void Bearing::measure(const LaneView<Real>& view, const Topology::Body& body,
 }
 
 template <class Real>
-double Bearing::inverse_mass(const Real at[3], const Real along[3], Real depth) const {
+double EffectiveMass::inverse_mass(const Real at[3], const Real along[3], Real depth) const {
   double r[3], t[3];
   for (int c = 0; c < 3; ++c) r[c] = double(at[c]) - center_[c];
   for (int c = 0; c < 3; ++c) {
@@ -45,9 +45,11 @@ double Bearing::inverse_mass(const Real at[3], const Real along[3], Real depth) 
   return depths / double(depth) / slack * (inverse_mass_ + turning);
 }
 
-template void Bearing::measure(const LaneView<float>&, const Topology::Body&, const std::vector<float>&);
-template void Bearing::measure(const LaneView<double>&, const Topology::Body&, const std::vector<double>&);
-template double Bearing::inverse_mass(const float at[3], const float along[3], float depth) const;
-template double Bearing::inverse_mass(const double at[3], const double along[3], double depth) const;
+template void EffectiveMass::measure(const LaneView<float>&, const Topology::Body&,
+                                     const std::vector<float>&);
+template void EffectiveMass::measure(const LaneView<double>&, const Topology::Body&,
+                                     const std::vector<double>&);
+template double EffectiveMass::inverse_mass(const float at[3], const float along[3], float depth) const;
+template double EffectiveMass::inverse_mass(const double at[3], const double along[3], double depth) const;
 
 }  // namespace limber::fem::detail

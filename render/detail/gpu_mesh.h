@@ -10,9 +10,9 @@
 
 namespace limber::render::detail {
 
-class MeshOnCard {
+class GpuMesh {
  public:
-  MeshOnCard(const Triangles&, const Points& rest_positions, double crease_angle_deg, const Appearance& = {});
+  GpuMesh(const Triangles&, const Points& rest_positions, double crease_angle_deg, const Appearance& = {});
 
   void set_positions(const Points& positions, const Points& normals);
   // Linear colour and the share of the sky that is open, per row of the positions, (V × 4).

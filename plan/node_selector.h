@@ -10,31 +10,31 @@
 
 namespace limber::plan {
 
-struct Aim {
+struct Selection {
   int node = 0;
   double cost = 0;  // of the node for this draw, by the metric; 0 where guidance chose
   Control control;
 };
 
-class Chooser {
+class NodeSelector {
  public:
   // All must outlive it; guidance as the search begins, nullptr where the laws want none. Nodes of the tree
   // before `root` do not count.
-  Chooser(const System&, const Settings&, const Guidance*, int root);
+  NodeSelector(const System&, const Settings&, const Guidance*, int root);
 
   void add(const Tree&, int node);  // nodes in order, the root first
   void refuse(int node);            // not the root; no expansion starts there any more
   bool refused(int node) const { return refused_[std::size_t(node - root_)]; }
-  Aim choose(const Draw&) const;  // there is a node
-  Aim aim(const Draw&, int node) const;
-  double cost(const Draw&, int node) const;
+  Selection choose(const Sample&) const;  // there is a node
+  Selection aim(const Sample&, int node) const;
+  double cost(const Sample&, int node) const;
 
  private:
   // Below, nodes are counted from the root.
-  double cost_of(const Draw&, int node) const;
-  int nearest_in_time(const Draw&) const;
-  Control control(const Draw&, int node) const;
-  double promise(int node) const;  // seconds to the goal; less is better
+  double cost_of(const Sample&, int node) const;
+  int nearest_in_time(const Sample&) const;
+  Control control(const Sample&, int node) const;
+  double heuristic(int node) const;  // seconds to the goal; less is better
   void rank(int node);
   void unrank(int node);
   void rank_all();
@@ -46,7 +46,7 @@ class Chooser {
   const int root_;
   std::optional<Guidance> guidance_;
   Centers centers_, centers_from_goal_;
-  std::vector<Departure> departures_;
+  std::vector<NodeMotion> motions_;
   std::vector<double> times_s_;                  // of the nodes
   std::vector<int> children_;                    // of a node
   std::vector<bool> refused_;                    // is a node

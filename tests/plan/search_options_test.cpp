@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "core/threads.h"
-#include "plan/chooser.h"
+#include "plan/node_selector.h"
 #include "plan/search.h"
 #include "tests/plan/toy.h"
 
@@ -18,16 +18,16 @@ using testing::toy_settings;
 Settings fast_settings() {
   Settings s = toy_settings();
   s.min_force_share = 0.8, s.max_duration_s = 3;
-  s.laws = {.lag = 5,
-            .metric = Metric::time_to_go,
-            .guidance = 0.7,
-            .soft_price = 10,
-            .learn_prices = true,
-            .steer = true,
-            .look_s = 0.1,
-            .stop_in_goal = true,
-            .hold = true,
-            .end_hopeless = true};
+  s.search_options = {.lag = 5,
+                      .metric = Metric::time_to_go,
+                      .guidance = 0.7,
+                      .soft_price = 10,
+                      .learn_prices = true,
+                      .steer = true,
+                      .look_s = 0.1,
+                      .stop_in_goal = true,
+                      .hold = true,
+                      .end_hopeless = true};
   s.settle.max_duration_s = 10, s.settle.hold = true;
   return s;
 }
@@ -46,13 +46,13 @@ Tree lagged_tree(const System& system, const Settings& s, std::int64_t iteration
   Tree all;
   const State start = system.start();
   all.add(start, -1, Control{}, -1, system.robot_center(start).cast<float>());
-  const Guidance guidance(system.workspace(), s.goal.center_of_mass_m, s.laws.soft_price);
+  const Guidance guidance(system.workspace(), s.goal.center_of_mass_m, s.search_options.soft_price);
   const auto propagator = system.make_propagator();
   for (std::int64_t i = 0; i < iterations; ++i) {
-    Chooser chooser(system, s, s.laws.guidance > 0 ? &guidance : nullptr, 0);
+    NodeSelector selector(system, s, s.search_options.guidance > 0 ? &guidance : nullptr, 0);
     for (int node = 0; node < all.size(); ++node)
-      if (node == 0 || all.iterations[std::size_t(node)] < i - s.laws.lag) chooser.add(all, node);
-    const Aim aim = chooser.choose(draw(s, system, i));
+      if (node == 0 || all.iterations[std::size_t(node)] < i - s.search_options.lag) selector.add(all, node);
+    const Selection aim = selector.choose(draw_sample(s, system, i));
     const State from = all.states[std::size_t(aim.node)];
     Rollout r{&from, aim.control, {}, false};
     if (passes(system, s, *propagator, r))
@@ -61,13 +61,14 @@ Tree lagged_tree(const System& system, const Settings& s, std::int64_t iteration
   return all;
 }
 
-TEST(Laws, ALaggingTreeIsTheSequentialOneOfItsRule) {
+TEST(SearchOptions, ALaggingTreeIsTheSequentialOneOfItsRule) {
   for_point_and_chain([](Toy& toy) {
     for (const int lag : {1, 5, 31}) {
       Settings s = fast_settings();
-      s.laws.lag = lag;
-      s.laws.look_s = 0, s.laws.stop_in_goal = s.laws.end_hopeless = false;  // rollouts are whole
-      s.goal.radius_m = 1e-6;                                                // never reached
+      s.search_options.lag = lag;
+      s.search_options.look_s = 0,
+      s.search_options.stop_in_goal = s.search_options.end_hopeless = false;  // rollouts are whole
+      s.goal.radius_m = 1e-6;                                                 // never reached
       s.max_iterations = 60;
       EXPECT_EQ(hash_of(plan(toy, s).tree), hash_of(lagged_tree(toy, s, 60))) << lag;
     }
@@ -86,11 +87,11 @@ std::vector<Settings> refusing_settings() {
 // Of each node, in the order in which they came, found once more by what is simulated: where it ends a way to
 // the goal that goes too high, nothing grows from the edge that does so first; where it does not, it is the
 // solution.
-TEST(Laws, NothingGrowsFromARefusedEdge) {
+TEST(SearchOptions, NothingGrowsFromARefusedEdge) {
   Toy toy(1, true, false, 99);
   toy.refused_above_z = low;
   for (Settings s : refusing_settings()) {
-    SCOPED_TRACE(s.laws.lag);
+    SCOPED_TRACE(s.search_options.lag);
     std::int64_t refused = 0, solved = 0;
     for (s.seed = 1; s.seed <= 12; ++s.seed) {
       const Plan p = plan(toy, s);
@@ -117,15 +118,15 @@ TEST(Laws, NothingGrowsFromARefusedEdge) {
       refused += p.statistics.refused, solved += p.solved();
     }
     EXPECT_GT(refused, 4);
-    EXPECT_TRUE(s.laws.lag > 0 || solved > 6) << solved;
+    EXPECT_TRUE(s.search_options.lag > 0 || solved > 6) << solved;
   }
 }
 
-TEST(Laws, RefusingGivesTheSameBytesForAnyThreadsAndLanesAndInParts) {
+TEST(SearchOptions, RefusingGivesTheSameBytesForAnyThreadsAndLanesAndInParts) {
   Toy toy(1, true, false, 99);
   toy.refused_above_z = low;
   for (Settings s : refusing_settings()) {
-    SCOPED_TRACE(s.laws.lag);
+    SCOPED_TRACE(s.search_options.lag);
     int refusing = 0;
     for (s.seed = 1; s.seed <= 12 && refusing < 2; ++s.seed) {
       const Plan whole = plan(toy, s);
@@ -156,7 +157,7 @@ TEST(Laws, RefusingGivesTheSameBytesForAnyThreadsAndLanesAndInParts) {
   }
 }
 
-TEST(Laws, SameBytesForAnyThreadsAndLanes) {
+TEST(SearchOptions, SameBytesForAnyThreadsAndLanes) {
   for_point_and_chain([](Toy& toy) {
     const Settings s = fast_settings();
     std::optional<Plan> first;
@@ -176,7 +177,7 @@ TEST(Laws, SameBytesForAnyThreadsAndLanes) {
   });
 }
 
-TEST(Laws, CutAndResumedAnywhereEqualsUninterrupted) {
+TEST(SearchOptions, CutAndResumedAnywhereEqualsUninterrupted) {
   for_point_and_chain([](Toy& toy) {
     const Settings s = fast_settings();
     const Plan whole = plan(toy, s);
@@ -192,7 +193,7 @@ TEST(Laws, CutAndResumedAnywhereEqualsUninterrupted) {
 }
 
 // Seen at its looks, no push but its last state is in the goal; and it is as its stored control says.
-TEST(Laws, APushEndsWhereItIsSeenInTheGoal) {
+TEST(SearchOptions, APushEndsWhereItIsSeenInTheGoal) {
   Toy toy;
   Settings s = fast_settings();
   s.settle.mean_speed_m_s = 1e-9;  // nothing is at rest: many arrive
@@ -215,20 +216,20 @@ TEST(Laws, APushEndsWhereItIsSeenInTheGoal) {
     return count;
   };
   EXPECT_GT(arrivals(plan(toy, s)), 5);
-  s.laws.stop_in_goal = false;
+  s.search_options.stop_in_goal = false;
   EXPECT_EQ(arrivals(plan(toy, s)), -1) << "the law makes no difference";
 }
 
 // A push into the wall that holds it is given up; without the law it lasts.
-TEST(Laws, AHopelessPushIsShorter) {
+TEST(SearchOptions, AHopelessPushIsShorter) {
   Toy toy(1, true, false, 99);
   Settings s = fast_settings();
-  s.laws.guidance = 0, s.goal_bias = 1, s.weights = {1, 0, 0};
-  s.laws.steer = false, s.min_duration_s = s.max_duration_s = 8;
+  s.search_options.guidance = 0, s.goal_bias = 1, s.weights = {1, 0, 0};
+  s.search_options.steer = false, s.min_duration_s = s.max_duration_s = 8;
   s.max_iterations = 1;
-  const int patient = (s.laws.end_hopeless = false, plan(toy, s).tree.controls.at(1).steps);
+  const int patient = (s.search_options.end_hopeless = false, plan(toy, s).tree.controls.at(1).steps);
   EXPECT_EQ(patient, 800);
-  s.laws.end_hopeless = true;
+  s.search_options.end_hopeless = true;
   const Plan p = plan(toy, s);
   EXPECT_LT(p.tree.controls.at(1).steps, patient);
   EXPECT_GT(p.tree.controls.at(1).steps, 100);  // it flew to the wall first
@@ -243,7 +244,7 @@ TEST(Laws_slow, GuidanceFindsTheGapSooner) {
     Settings s = fast_settings();
     s.seed = seed;
     with += plan(toy, s).statistics.iterations;
-    s.laws.guidance = 0;
+    s.search_options.guidance = 0;
     without += plan(toy, s).statistics.iterations;
   }
   EXPECT_LT(2 * with, without);

@@ -23,14 +23,14 @@ struct Backdrop {
   Vec3 fade_middle;                         // round it the ground becomes the far ground,
   double fade_begin_m = 0, fade_end_m = 1;  // between these,
   double haze_m = 1;                        // and the horizon: half so at this distance
-  // Pixels hold what meshes and lines add, and the ground's shadows as alpha; see Look.
+  // Pixels hold what meshes and lines add, and the ground's shadows as alpha; see RenderSettings.
   bool transparent = false;
 };
 
-class Finish {
+class Compositor {
  public:
   // Shade maps must outlive it.
-  Finish(const Backdrop&, const Camera&, int width, int height);
+  Compositor(const Backdrop&, const Camera&, int width, int height);
 
   // Row y, 0 at the top, of pixels of `per_side`² samples each. `samples` is the lower left corner of the
   // whole picture: rows upward, four half floats a sample, premultiplied. Writes width × 4 floats.

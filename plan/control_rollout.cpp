@@ -1,4 +1,4 @@
-#include "plan/course.h"
+#include "plan/control_rollout.h"
 
 #include <algorithm>
 #include <chrono>
@@ -17,8 +17,8 @@ namespace {
 constexpr double settle_check_s = 0.05;  // rest is looked for this often
 
 // Who can be stopped runs pieces of about so long, of so many steps at most.
-constexpr double least_piece_s = 0.05, most_piece_s = 0.1;
-constexpr int first_piece = 16, most_steps_a_piece = 1000;
+constexpr double min_piece_s = 0.05, max_piece_s = 0.1;
+constexpr int first_piece = 16, max_steps_a_piece = 1000;
 
 constexpr std::pair<const char*, CostKind> cost_kinds[] = {{"duration", CostKind::duration},
                                                            {"effort", CostKind::effort},
@@ -29,7 +29,8 @@ constexpr std::pair<const char*, CostKind> cost_kinds[] = {{"duration", CostKind
 // frame is due or rest is looked for; the cuts do not change the states.
 class Runner {
  public:
-  Runner(const System& system, const Settings& settings, const CourseOptions& options, Course& course)
+  Runner(const System& system, const Settings& settings, const ControlRolloutOptions& options,
+         ControlRollout& course)
       : system_(system),
         settings_(settings),
         options_(options),
@@ -47,17 +48,17 @@ class Runner {
 
   bool ended() const { return phase_ == Phase::ended; }
   double cost() const { return cost_in(course_.costs, options_.cost); }
-  bool rests_in_goal() const { return ended() && course_.result == Course::rests_in_goal; }
+  bool rests_in_goal() const { return ended() && course_.result == ControlRollout::rests_in_goal; }
 
-  void next(Rollout& rollout, int most_steps) const {
+  void next(Rollout& rollout, int max_steps) const {
     rollout.from = &state_;
     rollout.control = control_;
     rollout.control.steps =
-        int(std::min<std::int64_t>({steps_left_, step_of_next_frame() - state_.step, most_steps}));
+        int(std::min<std::int64_t>({steps_left_, step_of_next_frame() - state_.step, max_steps}));
   }
 
   void take(Rollout& rollout) {
-    if (!rollout.ok) return end(Course::diverged);
+    if (!rollout.ok) return end(ControlRollout::diverged);
     const int steps = rollout.control.steps;
     LIMBER_CHECK(rollout.to.step == state_.step + steps, rollout.to.step, state_.step, steps);
     std::swap(state_, rollout.to);
@@ -67,15 +68,15 @@ class Runner {
     course_.costs.effort_n_s += double(largest_force(control_)) * steps * system_.dt_s();
     const bool frame = state_.step == step_of_next_frame();
     take_due_frames();
-    if (cost() > options_.most || state_.step > course_.last_step) return end(Course::too_costly);
+    if (cost() > options_.most || state_.step > course_.last_step) return end(ControlRollout::too_costly);
     if (options_.ask_acceptable && (frame || steps_left_ == 0) &&
         !(rollout.clear && system_.acceptable(state_)))
-      return end(Course::not_acceptable);
+      return end(ControlRollout::not_acceptable);
     if (phase_ == Phase::reach && !in_goal()) return;
     if (steps_left_ == 0 || phase_ == Phase::reach) end_of_piece();
   }
 
-  void end(Course::Result result) {
+  void end(ControlRollout::Result result) {
     course_.result = result;
     course_.end = state_;
     phase_ = Phase::ended;
@@ -119,8 +120,9 @@ class Runner {
   }
 
   void begin_settle() {
-    if (options_.settle == CourseOptions::never || (options_.settle == CourseOptions::in_goal && !in_goal()))
-      return end(Course::ends_elsewhere);
+    if (options_.settle == ControlRolloutOptions::never ||
+        (options_.settle == ControlRolloutOptions::in_goal && !in_goal()))
+      return end(ControlRollout::ends_elsewhere);
     phase_ = Phase::settle;
     control_ = settle_control(settings_, 0);
     settle_on();
@@ -131,8 +133,8 @@ class Runner {
                holds = system_.goal_holds(state_);
     if ((rests && holds) || course_.settle_steps >= settle_limit_)
       return end((rests || settings_.settle.max_duration_s == 0) && holds && in_goal()
-                     ? Course::rests_in_goal
-                     : Course::ends_elsewhere);
+                     ? ControlRollout::rests_in_goal
+                     : ControlRollout::ends_elsewhere);
     steps_left_ = std::min(steps_of(settle_check_s, system_.dt_s()), settle_limit_ - course_.settle_steps);
   }
 
@@ -140,7 +142,7 @@ class Runner {
     if (step_of_next_frame() > state_.step) return;
     for (; step_of_next_frame() <= state_.step; ++next_frame_)  // several where a step lasts longer
       if (options_.keep_frames) course_.frames.push_back(state_);
-    if (options_.keep_frames && options_.watch) options_.watch(state_);
+    if (options_.keep_frames && options_.on_progress) options_.on_progress(state_);
     if (!options_.measure) return;
     const Measures now = system_.measures(state_);
     Costs& costs = course_.costs;
@@ -156,8 +158,8 @@ class Runner {
 
   const System& system_;
   const Settings& settings_;
-  const CourseOptions& options_;
-  Course& course_;
+  const ControlRolloutOptions& options_;
+  ControlRollout& course_;
   State state_;
   FrameTimes times_;
   std::int64_t next_frame_;
@@ -168,42 +170,42 @@ class Runner {
 };
 
 // In lanes: all take a piece, and then the next.
-void run_batch(const System& system, const Settings& settings, std::span<Course> courses,
-               const CourseOptions& options) {
+void run_batch(const System& system, const Settings& settings, std::span<ControlRollout> courses,
+               const ControlRolloutOptions& options) {
   const std::unique_ptr<Propagator> propagator = system.make_propagator();
   std::vector<Runner> runners;
   runners.reserve(courses.size());
-  for (Course& course : courses) runners.emplace_back(system, settings, options, course);
+  for (ControlRollout& course : courses) runners.emplace_back(system, settings, options, course);
   std::vector<Runner*> going;
   std::vector<Rollout> rollouts;
   double cheapest = std::numeric_limits<double>::infinity();  // in the race so far
   const bool stoppable = options.stoppable || nothing_to_keep();
-  int most_steps = stoppable ? first_piece : std::numeric_limits<int>::max();
+  int max_steps = stoppable ? first_piece : std::numeric_limits<int>::max();
   while (true) {
     if (stoppable) throw_if_stopped();
     for (const Runner& runner : runners)
       if (options.race && runner.rests_in_goal()) cheapest = std::min(cheapest, runner.cost());
     going.clear();
     for (Runner& runner : runners) {
-      if (!runner.ended() && runner.cost() > cheapest) runner.end(Course::too_costly);
+      if (!runner.ended() && runner.cost() > cheapest) runner.end(ControlRollout::too_costly);
       if (!runner.ended()) going.push_back(&runner);
     }
     if (going.empty()) return;
     rollouts.resize(going.size());
-    for (std::size_t i = 0; i < going.size(); ++i) going[i]->next(rollouts[i], most_steps);
+    for (std::size_t i = 0; i < going.size(); ++i) going[i]->next(rollouts[i], max_steps);
     const auto began = std::chrono::steady_clock::now();
     propagator->propagate(rollouts);
     const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count();
-    if (stoppable && seconds < least_piece_s) most_steps = std::min(2 * most_steps, most_steps_a_piece);
-    if (stoppable && seconds > most_piece_s) most_steps = std::max(1, most_steps / 2);
+    if (stoppable && seconds < min_piece_s) max_steps = std::min(2 * max_steps, max_steps_a_piece);
+    if (stoppable && seconds > max_piece_s) max_steps = std::max(1, max_steps / 2);
     for (std::size_t i = 0; i < going.size(); ++i) going[i]->take(rollouts[i]);
   }
 }
 
 }  // namespace
 
-bool may_be_shown(const System& system, const Settings& settings, const Course& course) {
-  Course shown;
+bool may_be_shown(const System& system, const Settings& settings, const ControlRollout& course) {
+  ControlRollout shown;
   shown.from = course.from, shown.controls = course.controls;
   run(system, settings, {&shown, 1}, {.keep_frames = true, .ask_acceptable = false, .stoppable = true});
   return system.first_refused(shown.frames) == shown.frames.size();
@@ -243,8 +245,8 @@ Json json_of(const Costs& costs) {
           {"volume_change", costs.volume_change}};
 }
 
-void run(const System& system, const Settings& settings, std::span<Course> courses,
-         const CourseOptions& options) {
+void run(const System& system, const Settings& settings, std::span<ControlRollout> courses,
+         const ControlRolloutOptions& options) {
   const std::size_t lanes = std::size_t(std::max(1, system.lanes()));
   const std::size_t batches = (courses.size() + lanes - 1) / lanes;
   const auto run_one = [&](int b) {

@@ -1,4 +1,4 @@
-#include "plan/chooser.h"
+#include "plan/node_selector.h"
 
 #include <algorithm>
 #include <cmath>
@@ -20,22 +20,22 @@ constexpr int raises_a_renewal = 4;
 
 }  // namespace
 
-Chooser::Chooser(const System& system, const Settings& settings, const Guidance* guidance, int root)
+NodeSelector::NodeSelector(const System& system, const Settings& settings, const Guidance* guidance, int root)
     : system_(system), settings_(settings), root_(root) {
   if (guidance) guidance_ = *guidance;
 }
 
-double Chooser::strongest() const {
+double NodeSelector::strongest() const {
   return std::max(1e-9, settings_.max_force_n * settings_.max_force_share / system_.robot_mass_kg());
 }
 
-void Chooser::add(const Tree& tree, int of_tree) {
+void NodeSelector::add(const Tree& tree, int of_tree) {
   const int node = of_tree - root_;
   LIMBER_CHECK(node == centers_.size(), node, centers_.size());
   const State state = tree.states[std::size_t(of_tree)];
   const Vec3f center = tree.centers[of_tree];
   const Vec3 shift = system_.goal_shift(state);
-  departures_.push_back(
+  motions_.push_back(
       {center.cast<double>(), system_.robot_velocity(state), shift, system_.goal_velocity(state)});
   centers_.push_back(center);
   centers_from_goal_.push_back(center - shift.cast<float>());
@@ -49,10 +49,11 @@ void Chooser::add(const Tree& tree, int of_tree) {
     rank(parent);
   }
   rank(node);
-  if (parent >= 0 && settings_.laws.learn_prices) learn(tree.controls[std::size_t(of_tree)], parent, node);
+  if (parent >= 0 && settings_.search_options.learn_prices)
+    learn(tree.controls[std::size_t(of_tree)], parent, node);
 }
 
-void Chooser::refuse(int of_tree) {
+void NodeSelector::refuse(int of_tree) {
   const int node = of_tree - root_;
   LIMBER_CHECK(node > 0 && !refused_[std::size_t(node)], node);
   refused_[std::size_t(node)] = true;
@@ -61,39 +62,39 @@ void Chooser::refuse(int of_tree) {
   if (guidance_) unrank(node);
 }
 
-void Chooser::unrank(int node) {
-  ranking_.erase(std::lower_bound(ranking_.begin(), ranking_.end(), std::pair(promise(node), node)));
+void NodeSelector::unrank(int node) {
+  ranking_.erase(std::lower_bound(ranking_.begin(), ranking_.end(), std::pair(heuristic(node), node)));
 }
 
-void Chooser::rank(int node) {
-  const std::pair entry(promise(node), node);
+void NodeSelector::rank(int node) {
+  const std::pair entry(heuristic(node), node);
   ranking_.insert(std::lower_bound(ranking_.begin(), ranking_.end(), entry), entry);
 }
 
-void Chooser::rank_all() {
+void NodeSelector::rank_all() {
   ranking_.clear();
   for (int node = 0; node < centers_.size(); ++node)
-    if (!refused_[std::size_t(node)]) ranking_.emplace_back(promise(node), node);
+    if (!refused_[std::size_t(node)]) ranking_.emplace_back(heuristic(node), node);
   std::sort(ranking_.begin(), ranking_.end());
 }
 
-double Chooser::promise(int node) const {
-  const Departure& at = departures_[std::size_t(node)];
+double NodeSelector::heuristic(int node) const {
+  const NodeMotion& at = motions_[std::size_t(node)];
   const Vec3 place = at.center - at.goal_shift, velocity = at.velocity - at.goal_velocity;
   const double radius = guidance_->workspace().robot_radius_m, a = strongest();
   const Vec3 way = guidance_->ahead(place, 2 * radius) - place;
   const Vec3 direction = way.norm() > 0 ? Vec3(way.normalized()) : Vec3::Zero();
   const double along = velocity.dot(direction), across = (velocity - along * direction).norm();
-  return least_time_to_go(guidance_->to_go(place), along, a) + across / a +
-         settings_.laws.time_weight * times_s_[std::size_t(node)] +
+  return min_time_to_go(guidance_->to_go(place), along, a) + across / a +
+         settings_.search_options.time_weight * times_s_[std::size_t(node)] +
          child_price * std::sqrt(2 * radius / a) * children_[std::size_t(node)];
 }
 
 // Where a strong push from parent to node got less far than it should have, going on that way gets dearer.
-void Chooser::learn(const Control& control, int parent, int node) {
+void NodeSelector::learn(const Control& control, int parent, int node) {
   if (control.manipulation != Manipulation::body) return;
-  const Departure& from = departures_[std::size_t(parent)];
-  const Departure& to = departures_[std::size_t(node)];
+  const NodeMotion& from = motions_[std::size_t(parent)];
+  const NodeMotion& to = motions_[std::size_t(node)];
   const double t = control.steps * system_.dt_s(), radius = guidance_->workspace().robot_radius_m;
   const Vec3 push = control.force_n.cast<double>() / system_.robot_mass_kg();
   const Vec3 open_way = (from.velocity - from.goal_velocity) * t + 0.5 * push * t * t;
@@ -107,33 +108,34 @@ void Chooser::learn(const Control& control, int parent, int node) {
   rank_all();
 }
 
-double Chooser::cost(const Draw& d, int of_tree) const { return cost_of(d, of_tree - root_); }
+double NodeSelector::cost(const Sample& d, int of_tree) const { return cost_of(d, of_tree - root_); }
 
-double Chooser::cost_of(const Draw& d, int node) const {
+double NodeSelector::cost_of(const Sample& d, int node) const {
   if (refused_[std::size_t(node)]) return std::numeric_limits<double>::infinity();
-  if (settings_.laws.metric == Metric::distance)
+  if (settings_.search_options.metric == Metric::distance)
     return double(
         squared_distance(d.towards_goal ? centers_from_goal_[node] : centers_[node], d.point.cast<float>()));
-  const Departure& at = departures_[std::size_t(node)];
+  const NodeMotion& at = motions_[std::size_t(node)];
   const Vec3 way = d.point + (d.towards_goal ? at.goal_shift : Vec3::Zero()) - at.center;
   const Vec3 velocity = at.velocity - (d.towards_goal ? at.goal_velocity : Vec3::Zero());
-  return time_to_go(way, velocity, strongest()) + settings_.laws.time_weight * times_s_[std::size_t(node)];
+  return time_to_go(way, velocity, strongest()) +
+         settings_.search_options.time_weight * times_s_[std::size_t(node)];
 }
 
-int Chooser::nearest_in_time(const Draw& d) const {
+int NodeSelector::nearest_in_time(const Sample& d) const {
   int best = 0;
   double least = cost_of(d, 0);
   for (int node = 1; node < centers_.size(); ++node) {
-    const Departure& at = departures_[std::size_t(node)];
+    const NodeMotion& at = motions_[std::size_t(node)];
     const Vec3 way = d.point + (d.towards_goal ? at.goal_shift : Vec3::Zero()) - at.center;
     const Vec3 velocity = at.velocity - (d.towards_goal ? at.goal_velocity : Vec3::Zero());
-    if (least_time_to_go(way.norm(), velocity.norm(), strongest()) >= least) continue;
+    if (min_time_to_go(way.norm(), velocity.norm(), strongest()) >= least) continue;
     if (const double c = cost_of(d, node); c < least) best = node, least = c;
   }
   return best;
 }
 
-Aim Chooser::choose(const Draw& d) const {
+Selection NodeSelector::choose(const Sample& d) const {
   if (d.guided) {
     // Evenly in the logarithm of the rank: as often among the best two as among the next two to four, and so
     // on.
@@ -142,29 +144,29 @@ Aim Chooser::choose(const Draw& d) const {
     const int node = ranking_[rank].second;
     return {root_ + node, 0, control(d, node)};
   }
-  return aim(d, root_ + (settings_.laws.metric == Metric::distance
+  return aim(d, root_ + (settings_.search_options.metric == Metric::distance
                              ? nearest(d.towards_goal ? centers_from_goal_ : centers_, d.point.cast<float>())
                              : nearest_in_time(d)));
 }
 
-Aim Chooser::aim(const Draw& d, int of_tree) const {
+Selection NodeSelector::aim(const Sample& d, int of_tree) const {
   return {of_tree, cost(d, of_tree), control(d, of_tree - root_)};
 }
 
-Control Chooser::control(const Draw& d, int node) const {
-  const Departure& at = departures_[std::size_t(node)];
+Control NodeSelector::control(const Sample& d, int node) const {
+  const NodeMotion& at = motions_[std::size_t(node)];
   if (d.guided) {
     const double radius = guidance_->workspace().robot_radius_m;
     const double way = radius * (nearest_ahead + (farthest_ahead - nearest_ahead) * d.ahead);
     const Vec3 target = guidance_->ahead(at.center - at.goal_shift, way) + at.goal_shift;
     if (settings_.weights.interpolation > 0 && target == settings_.goal.center_of_mass_m + at.goal_shift) {
-      Draw arriving = d;
+      Sample arriving = d;
       arriving.manipulation = Manipulation::interpolation;
       return control_of(arriving, settings_, at.center, at.goal_shift);
     }
     return steered_control(d, settings_, system_, at, target + aside_share * way * d.aside, at.goal_velocity);
   }
-  if (!settings_.laws.steer || d.manipulation == Manipulation::interpolation)
+  if (!settings_.search_options.steer || d.manipulation == Manipulation::interpolation)
     return control_of(d, settings_, at.center, at.goal_shift);
   return d.towards_goal
              ? steered_control(d, settings_, system_, at, d.point + at.goal_shift, at.goal_velocity)

@@ -26,7 +26,7 @@ const char* name_of(CostKind);
 CostKind cost_kind_from(const std::string& name);  // throws InputError naming those that there are
 Json json_of(const Costs&);
 
-struct Course {
+struct ControlRollout {
   State from;
   std::vector<Control> controls;  // in; out: those that were run, with the one that reaches for the goal
   // Instead: asked at the start and at each control's end for the next, from the state reached; nothing: they
@@ -46,7 +46,7 @@ struct Course {
   State end;                           // out: the last state
 };
 
-struct CourseOptions {
+struct ControlRolloutOptions {
   enum Settle { never, in_goal, anywhere } settle = in_goal;  // where the controls may end for it to begin
   bool keep_frames = false;
   // At frame times, and at the ends of controls.
@@ -59,15 +59,15 @@ struct CourseOptions {
   // Throws Interrupted soon after a stop signal, as where there is nothing_to_keep(); else whoever calls has
   // something to keep.
   bool stoppable = false;
-  std::function<void(const State&)> watch = {};  // called with every frame that is kept
+  std::function<void(const State&)> on_progress = {};  // called with every frame that is kept
 };
 
 // Fills what is out. A course depends on itself and the options alone, save that `race` ends losers sooner or
 // later: the cheapest of them, and the first of equals, is the same for any number of lanes and threads.
-void run(const System&, const Settings&, std::span<Course>, const CourseOptions&);
+void run(const System&, const Settings&, std::span<ControlRollout>, const ControlRolloutOptions&);
 
 // Whether System::first_refused lets all frames of a course that was run and rests in the goal pass. Runs it
 // again. Throws Interrupted.
-bool may_be_shown(const System&, const Settings&, const Course&);
+bool may_be_shown(const System&, const Settings&, const ControlRollout&);
 
 }  // namespace limber::plan
