@@ -2,7 +2,7 @@
 add_compile_options(-ffp-contract=off -Wall -Wextra -Wpedantic -Wshadow -Wnon-virtual-dtor -Werror)
 # Eigen's inlined loads trip GCC 12's false positives; GCC bugs 105562 and 106199 are of this family.
 add_compile_options(-Wno-maybe-uninitialized -Wno-array-bounds -Wno-stringop-overflow -Wno-stringop-overread)
-if(LIMBER_UNITY AND NOT LIMBER_FUZZ)
+if(LIMBER_UNITY)
   set(CMAKE_UNITY_BUILD ON)
   set(CMAKE_UNITY_BUILD_BATCH_SIZE 8)
   # A name of one file is not hidden by a local one of another in its batch; a file in a batch is no header, and its
@@ -16,6 +16,8 @@ endif()
 set(CMAKE_POSITION_INDEPENDENT_CODE ON)
 add_compile_options(-fno-semantic-interposition)
 include_directories(${PROJECT_SOURCE_DIR})
+# A file's name in a message is the same wherever the clone lies; so are the objects, which a compiler cache may then share.
+add_compile_options(-fmacro-prefix-map=${PROJECT_SOURCE_DIR}/=)
 if(LIMBER_SANITIZE)
   add_compile_options(-fsanitize=${LIMBER_SANITIZE} -fno-omit-frame-pointer -fno-sanitize-recover=all)
   if(LIMBER_SANITIZE MATCHES "undefined")
