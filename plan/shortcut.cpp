@@ -207,7 +207,7 @@ ControlRollout shortcut(const System& system, const Settings& settings, const Sh
     std::vector<ControlRollout> courses(changes_a_round);
     std::vector<int> first(courses.size());
     for (std::size_t i = 0; i < courses.size(); ++i) {
-      const Change change = changes.sample(round, int(i));
+      const Change change = changes.draw_change(round, int(i));
       const auto n = std::size_t(change.first);
       first[i] = change.first;
       courses[i].from = n == 0 ? path.from : path.states[n - 1];
