@@ -1,0 +1,142 @@
+// Veils (bodies of opacity below 1) and lines, laid over what is opaque.
+//
+// All that a sample shows half transparent goes into a list of its own, with its depth: Carpenter's A-buffer
+// (1984), as linked lists on the card (Yang et al. 2010; detail/layer_lists.h). Each list is then laid over
+// its sample front to back. So any number of veils, inside or through one another, is in order in each
+// sample, and triangles are drawn once. (Depth peeling, which draws all of them twice a layer, took twice as
+// long.) Lines are quads of constant width on the screen with a soft edge (detail/line_quads.h). Where there
+// are veils, what of a line lies before one is put into the list just before the nearest veil behind it.
+// Method: docs/rendering.md, 7 and 9.
+//
+// Colours are premultiplied, so what lies in front is added as color + (1 − alpha) · what is behind.
+#define GL_GLEXT_PROTOTYPES
+#include <GL/glcorearb.h>
+
+#include <algorithm>
+
+#include "render/detail/line_quads.h"
+#include "render/detail/renderer_impl.h"
+
+namespace limber::render {
+
+using detail::layer_lists;
+using detail::line_corner_floats;
+using detail::line_quads;
+using detail::Screen;
+
+// All samples that veils may cover: the rectangle round their boxes on the screen; all of the picture where a
+// box reaches behind the eye, whose corners there have no place on the screen.
+Renderer::Impl::Rectangle Renderer::Impl::place_of_veils() const {
+  const SampleGrid grid = sample_grid(settings);
+  Eigen::Array2d lower(1, 1), upper(-1, -1);  // of the screen, −1 … 1
+  for (const Mesh& mesh : meshes)
+    if (mesh.drawn() && mesh.transparent())
+      for_corners(mesh.card.box(), [&](const Vec3& corner) {
+        const Eigen::Vector4d clip = clip_from_world * corner.homogeneous();
+        if (clip.w() > 0) {
+          lower = lower.min(clip.head<2>().array() / clip.w());
+          upper = upper.max(clip.head<2>().array() / clip.w());
+        } else {  // behind the eye
+          lower.setConstant(-1), upper.setConstant(1);
+        }
+      });
+  const auto sample = [](double screen, int side) {
+    return int(std::clamp(0.5 + 0.5 * screen, 0.0, 1.0) * side);
+  };
+  return {sample(lower.x(), grid.width), sample(lower.y(), grid.height),
+          std::min(sample(upper.x(), grid.width) + 1, grid.width),
+          std::min(sample(upper.y(), grid.height) + 1, grid.height)};
+}
+
+// Veils, and the lines before some of them, by lists of layers: whatever is not hidden by the opaque is
+// shaded once, and each sample's list is put over the sample front to back.
+//
+// Lists are made for a band of rows at a time, for OpenGL allows no buffer as large as many layers of a large
+// picture need (128 MB here: 8 million layers of samples). How many layers a band has is known only after
+// they were put. Where they found no room, the buffer is made larger and the band drawn again; where it
+// cannot be larger, the band is halved.
+void Renderer::Impl::draw_veils() {
+  const SampleGrid grid = sample_grid(settings);
+  const Rectangle place = place_of_veils();
+  glBindFramebuffer(GL_FRAMEBUFFER, targets.samples_frame);
+  glEnable(GL_SCISSOR_TEST);
+  int rows = lists.max_rows();
+  for (int row = 0; row < grid.height;) {
+    rows = std::min(rows, grid.height - row);
+    glScissor(0, row, grid.width, rows);
+    lists.clear(row, rows);
+    glDepthMask(GL_FALSE);
+    glColorMask(GL_FALSE, GL_FALSE, GL_FALSE, GL_FALSE);
+    for (const Mesh& mesh : meshes) {
+      if (!mesh.drawn() || !mesh.transparent()) continue;
+      stand_back_for_edges(mesh, settings.multisampling ? 1 : settings.supersampling);
+      draw_mesh(mesh, samples + veiled, [&](const Program& program) { lists.set_uniforms(program); });
+    }
+    glDisable(GL_POLYGON_OFFSET_FILL);
+    plane_defines({});
+    glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT);
+    draw_lines(LinePass::put);
+    glColorMask(GL_TRUE, GL_TRUE, GL_TRUE, GL_TRUE);
+    if (lists.wanted() > lists.room()) {
+      if (lists.make_room(lists.wanted())) continue;
+      if (rows > 1) {
+        rows = (rows + 1) / 2;
+        continue;
+      }
+    }  // hundreds of layers all along one row: what has no room is left out
+    draw_lines(LinePass::draw_rest);
+
+    const int first = std::max(row, place.top), last = std::min(row + rows, place.bottom);
+    glScissor(place.left, first, std::max(place.right - place.left, 0), std::max(last - first, 0));
+    glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT);
+    glDisable(GL_DEPTH_TEST);
+    glEnable(GL_BLEND);
+    glBlendFunc(GL_ONE, GL_ONE_MINUS_SRC_ALPHA);
+    const Program& p = layers_programs.with(samples + layer_lists);
+    p.use();
+    lists.set_uniforms(p);
+    glBindVertexArray(empty_array);
+    glDrawArrays(GL_TRIANGLES, 0, 3);
+    glDisable(GL_BLEND);
+    glEnable(GL_DEPTH_TEST);
+    row += rows;
+  }
+  glDisable(GL_SCISSOR_TEST);
+}
+
+// Lines test their depth against the opaque and leave it as it is. `corners` is one buffer for all of them,
+// filled anew for each.
+void Renderer::Impl::draw_lines(LinePass pass) {
+  const double per_pixel = settings.multisampling ? 1 : settings.supersampling;
+  const SampleGrid grid = sample_grid(settings);
+  const Screen screen{clip_from_world, Eigen::Vector2d(grid.width, grid.height)};
+  glBindFramebuffer(GL_FRAMEBUFFER, targets.samples_frame);
+  glEnable(GL_BLEND);
+  glBlendFunc(GL_ONE, GL_ONE_MINUS_SRC_ALPHA);
+  glDepthMask(GL_FALSE);
+  const Program& p = line_programs.with(pass == LinePass::draw_all ? "" : samples + veiled);
+  p.use();
+  if (pass != LinePass::draw_all) {
+    lists.set_uniforms(p);
+    p.set("putting", pass == LinePass::put ? 1 : 0);
+  }
+  glBindVertexArray(line_array);
+  std::vector<float> corners;
+  const auto draw = [&](const Points& ends, const LineLook& line, const std::vector<Plane>& planes) {
+    line_quads(ends, screen, line.width_px * per_pixel, planes, corners);
+    if (corners.empty()) return;
+    const Vec3 color = linear_from_srgb(line.color_srgb);
+    p.set("line_color", Eigen::Vector4d(color.x(), color.y(), color.z(), line.opacity));
+    p.set("half_width", 0.5 * line.width_px * per_pixel);
+    glBindBuffer(GL_ARRAY_BUFFER, line_buffer);
+    glBufferData(GL_ARRAY_BUFFER, GLsizeiptr(corners.size() * sizeof(float)), corners.data(), GL_STREAM_DRAW);
+    glDrawArrays(GL_TRIANGLES, 0, GLsizei(corners.size() / line_corner_floats));
+  };
+  for (const Lines& l : lines) draw(l.ends, l.look, {});
+  for (Mesh& mesh : meshes)
+    if (mesh.drawn() && mesh.look.edges) draw(mesh.card.edge_ends(), *mesh.look.edges, planes_of(mesh));
+  glDisable(GL_BLEND);
+  glDepthMask(GL_TRUE);
+}
+
+}  // namespace limber::render

@@ -1,0 +1,64 @@
+// What happens by itself, whatever the planner does: [[forces]] on bodies that can be pushed, [[motions]] of
+// rigid obstacles. Meaning: docs/simulation.md, "What happens by itself".
+#include "scenes/detail/scene_parts.h"
+#include "scenes/detail/typed_reads.h"
+
+namespace limber::scenes {
+
+void read_force(const Node& table, Scene& scene) {
+  ForceSpec force;
+  const std::string what = fmt::format("forces[{}]", scene.forces.size());
+  force.where = table.where.text();
+  force.body = body_called(child(table, "body"), scene, what + ".body");
+  if (const BodySpec& body = scene.bodies[std::size_t(force.body)]; is_rigid_obstacle(body))
+    complain(child(table, "body"),
+             fmt::format("{}: {} is a rigid obstacle, which no force moves; choose another body, or make it "
+                         "soft or free",
+                         what, body.name));
+  force.from_s = number(table, "from_s"), force.to_s = number(table, "to_s");
+  if (!(force.to_s > force.from_s))
+    complain(child(table, "to_s"),
+             fmt::format("{}.to_s is {}, not after from_s, {}; write the later one there", what, force.to_s,
+                         force.from_s));
+  force.force_n = vector(table, "force_n");
+  if (table.find("box_m")) force.box_m = box(table, "box_m");
+  scene.forces.push_back(std::move(force));
+}
+
+// Of one body there is one motion, so that it is never asked to be in two places. A keyframe without
+// position_m has that of the pose.
+void read_motion(const Node& table, Scene& scene) {
+  MotionSpec motion;
+  const std::string what = fmt::format("motions[{}]", scene.motions.size());
+  motion.where = table.where.text();
+  const Node& name = child(table, "body");
+  motion.body = body_called(name, scene, what + ".body");
+  const BodySpec& body = scene.bodies[std::size_t(motion.body)];
+  if (!is_rigid_obstacle(body))
+    complain(name, fmt::format("{}: {} is no rigid obstacle, and goes where it is pushed; write role = "
+                               "\"obstacle\" and kind = \"rigid\" for it, or [[forces]]",
+                               what, body.name));
+  for (const MotionSpec& other : scene.motions)
+    if (other.body == motion.body)
+      complain(name, fmt::format("{}: {} has a motion already; put all keyframes into one", what, body.name));
+  for (const Node& node : list(table, "keyframes")) {
+    MotionSpec::Keyframe frame{number(node, "at_s"), body.pose.position_m,
+                               direction(node, "axis", (what + ".keyframes.axis").c_str()),
+                               number(node, "angle_deg")};
+    if (node.find("position_m")) frame.position_m = vector(node, "position_m");
+    if (!motion.keyframes.empty() && !(frame.at_s > motion.keyframes.back().at_s))
+      complain(child(node, "at_s"),
+               fmt::format("keyframe at {} s does not come after the one at {} s; put them in order",
+                           frame.at_s, motion.keyframes.back().at_s));
+    motion.keyframes.push_back(frame);
+  }
+  if (motion.keyframes.empty())
+    complain(
+        child(table, "keyframes"),
+        fmt::format("{}.keyframes is empty; write for example keyframes = [{{ at_s = 1, position_m = [0, "
+                    "0, 1] }}]",
+                    what));
+  scene.motions.push_back(std::move(motion));
+}
+
+}  // namespace limber::scenes
