@@ -50,7 +50,8 @@ struct MeshLook {
   Vec3 color_srgb = {0.75, 0.75, 0.75};
   double roughness = 0.45;  // 0.05 … 1
   double metallic = 0;      // 0 … 1
-  double opacity = 1;       // of each layer that a ray of sight meets; below 0.5 it casts no shadow
+  // Of each layer that a ray meets. Shadows on the ground are as faint; below 0.5 it casts none on bodies.
+  double opacity = 1;
   // Opacity is that of a thin sheet seen face on; slanting, a ray stays in it longer: 1 − (1 − opacity)^(1 /
   // cos).
   bool sheet = false;

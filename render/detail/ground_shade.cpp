@@ -25,12 +25,12 @@ struct Raster {
   std::array<Plane, bands> cover;
   std::array<Rectangle, bands> covered;
 
-  void mark(int column, int row, double height) {  // height: in units of band 0
+  void mark(int column, int row, double height, float blocks) {  // height: in units of band 0
     const double place = std::clamp(std::log2(std::max(height, 1e-6)), 0.0, bands - 1.0);
     const int band = std::min(int(place), bands - 2);
     const float share = float(place - band);
-    raise(band, column, row, 1 - share);
-    raise(band + 1, column, row, share);
+    raise(band, column, row, (1 - share) * blocks);
+    raise(band + 1, column, row, share * blocks);
   }
   void raise(int band, int column, int row, float share) {
     if (share <= 0) return;
@@ -49,7 +49,7 @@ struct Corner {
 };
 
 // Cells whose centre the triangle covers, either way round.
-void rasterize(const std::array<Corner, 3>& c, Raster& raster) {
+void rasterize(const std::array<Corner, 3>& c, float blocks, Raster& raster) {
   const auto [u0, u1] = std::minmax({c[0].u, c[1].u, c[2].u});
   const auto [v0, v1] = std::minmax({c[0].v, c[1].v, c[2].v});
   const int left = std::max(0, int(std::ceil(u0 - 0.5))),
@@ -66,7 +66,7 @@ void rasterize(const std::array<Corner, 3>& c, Raster& raster) {
       const double w2 = ((c[1].u - c[0].u) * (v - c[0].v) - (u - c[0].u) * (c[1].v - c[0].v)) / area;
       if (w1 < 0 || w2 < 0 || w1 + w2 > 1) continue;
       raster.mark(column, row,
-                  c[0].height + w1 * (c[1].height - c[0].height) + w2 * (c[2].height - c[0].height));
+                  c[0].height + w1 * (c[1].height - c[0].height) + w2 * (c[2].height - c[0].height), blocks);
     }
 }
 
@@ -137,7 +137,7 @@ GroundFrame ground_frame(const Vec3& up, double height_m) {
   return frame;
 }
 
-ShadeMap shade_ground(std::span<const DrawnMesh* const> casters, const GroundFrame& frame,
+ShadeMap shade_ground(std::span<const GroundCaster> casters, const GroundFrame& frame,
                       const Vec3& toward_light, std::span<const double> spreads, const Box& stage, int cells,
                       std::span<const Eigen::Vector4d> planes) {
   const Vec3 light = toward_light / frame.up.dot(toward_light);
@@ -164,14 +164,14 @@ ShadeMap shade_ground(std::span<const DrawnMesh* const> casters, const GroundFra
 
   Raster raster{map.columns, map.rows, {}, {}};
   std::vector<Corner> corners;
-  for (const DrawnMesh* mesh : casters) {
+  for (const auto& [mesh, blocks] : casters) {
     corners.resize(mesh->vertex_from_drawn.size());
     for (std::size_t v = 0; v < corners.size(); ++v) {
       const Vec3 p(mesh->positions[3 * v], mesh->positions[3 * v + 1], mesh->positions[3 * v + 2]);
       const Eigen::Vector2d at = (onto_ground(p) - map.lower) / map.cell_m;
       corners[v] = {at.x(), at.y(), height(p) / band_0_m};
     }
-    const auto is_cut = [&](std::size_t c) {
+    const auto is_cut = [&, mesh = mesh](std::size_t c) {
       Vec3 middle = Vec3::Zero();
       for (std::size_t i = 0; i < 3; ++i)
         for (std::size_t k = 0; k < 3; ++k)
@@ -182,7 +182,7 @@ ShadeMap shade_ground(std::span<const DrawnMesh* const> casters, const GroundFra
     for (std::size_t c = 0; c < mesh->corners.size(); c += 3)
       if (planes.empty() || !is_cut(c))
         rasterize({corners[mesh->corners[c]], corners[mesh->corners[c + 1]], corners[mesh->corners[c + 2]]},
-                  raster);
+                  blocks, raster);
   }
 
   map.blocked.assign(std::size_t(map.columns) * map.rows, 0.0f);

@@ -26,11 +26,18 @@ struct ShadeMap {
   std::vector<float> blocked;  // (rows × columns) 0: all light arrives, 1: none
 };
 
+// A mesh, and how much of a ray of light it holds back: 1 all.
+struct GroundCaster {
+  const DrawnMesh* mesh;
+  float blocks = 1;
+};
+
 // Rays arrive from `toward_light` (above the horizon). What is at height h is blurred by the average of
 // Gaussians with the deviations spreads[i] × h metres. The map is large enough for `stage` and its longer
-// side has about `cells` cells; at its border it fades out. Triangles whose middle has n·p + d < 0 for a
+// side has about `cells` cells; at its border it fades out. Of two casters that cover a cell at a height, the
+// darker counts. Triangles whose middle has n·p + d < 0 for a
 // plane (n, d) cast nothing.
-ShadeMap shade_ground(std::span<const DrawnMesh* const> casters, const GroundFrame&, const Vec3& toward_light,
+ShadeMap shade_ground(std::span<const GroundCaster> casters, const GroundFrame&, const Vec3& toward_light,
                       std::span<const double> spreads, const Box& stage, int cells,
                       std::span<const Eigen::Vector4d> planes = {});
 

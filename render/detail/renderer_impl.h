@@ -49,9 +49,11 @@ struct Mesh {
   bool drawn() const { return look.seen && look.opacity > 0; }
   bool grained() const { return look.grain > 0 && !transparent(); }
   bool translucent() const { return look.translucency > 0 && !transparent(); }
-  // A caster that is not seen (render/caster.h) casts for the fine mesh within it. What lets more than half
-  // of the light through casts nothing.
-  bool casts() const { return look.casts_shadow && (!look.seen || look.opacity >= 0.5); }
+  // Into the shadow map, which knows only all or nothing: what lets more than half of the light through does
+  // not, nor does its stand-in (render/caster.h).
+  bool casts() const { return look.casts_shadow && look.opacity >= 0.5; }
+  // On the ground: the share of a ray of light that its two layers hold back.
+  double blocks() const { return look.casts_shadow ? 1 - (1 - look.opacity) * (1 - look.opacity) : 0; }
 };
 
 struct Lines {

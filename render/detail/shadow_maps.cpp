@@ -145,11 +145,12 @@ void Renderer::Impl::draw_shadow_map() {
 // A light that is a disc of radius tan(key_size_deg) at a distance of 1 is replaced by a Gaussian of the same
 // variance: along any axis its deviation is half of that radius.
 void Renderer::Impl::shade_ground_maps() {
-  std::vector<const DrawnMesh*> casters;
+  std::vector<detail::GroundCaster> casters;
   Box box = stage_box;
   if (settings.ground_height_m)
     for (const Mesh& mesh : meshes)
-      if (mesh.casts()) casters.push_back(&mesh.card.drawn()), box.include(mesh.card.box());
+      if (mesh.blocks() > 0)
+        casters.push_back({&mesh.card.drawn(), float(mesh.blocks())}), box.include(mesh.card.box());
   const double key_spreads[] = {0.5 * std::tan(settings.key_size_deg * std::numbers::pi / 180)};
   key_shade =
       shade_ground(casters, ground, settings.toward_key, key_spreads, box, ground_key_cells, clip_planes);

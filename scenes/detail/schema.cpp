@@ -168,9 +168,8 @@ constexpr Key all_keys[] = {
      {0, 1, true, false},
      0,
      "1.0",
-     "below 1 it is seen through: of a thin sheet seen face on, denser where it slants; below 0.5 it casts "
-     "no "
-     "shadow",
+     "below 1 it is seen through: of a thin sheet seen face on, denser where it slants; its shadow on "
+     "the ground is as faint, and below 0.5 it casts none on bodies",
      "",
      ""},
     {"bodies[].look",

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <numeric>
 
@@ -19,8 +20,8 @@ DrawnMesh drawn(const SurfaceMesh& mesh) {
 }
 
 ShadeMap shade(const DrawnMesh& mesh, const Vec3& toward_light, std::vector<double> spreads, const Box& stage,
-               int cells) {
-  const DrawnMesh* casters[] = {&mesh};
+               int cells, float blocks = 1) {
+  const GroundCaster casters[] = {{&mesh, blocks}};
   return shade_ground(casters, ground_frame({0, 0, 1}, 0), toward_light, spreads, stage, cells);
 }
 
@@ -87,6 +88,17 @@ TEST(GroundShade, ATiltedPlateHasNoGapsBetweenTheBands) {
     const Eigen::Vector2d cell = (Eigen::Vector2d(x, 0.5) - map.lower) / map.cell_m;
     EXPECT_GT(map.blocked[std::size_t(cell.y()) * map.columns + std::size_t(cell.x())], 0.93) << x;
   }
+}
+
+// What lets through a part of each ray has a shadow fainter by just that part, everywhere.
+TEST(GroundShade, ASeeThroughPlatesShadowIsFainter) {
+  const SurfaceMesh plate = quad_mesh({0, 0, 0.1}, {1, 0, 1}, {1, 1, 1}, {0, 1, 0.1});
+  const auto blocked = [&](float blocks) {
+    return shade(drawn(plate), {0, 0, 1}, {0.1}, bounding_box(plate.positions), 128, blocks).blocked;
+  };
+  const std::vector<float> whole = blocked(1), part = blocked(0.3f);
+  ASSERT_GT(*std::max_element(whole.begin(), whole.end()), 0.9f);
+  for (std::size_t i = 0; i < whole.size(); ++i) ASSERT_NEAR(part[i], 0.3f * whole[i], 1e-5f) << i;
 }
 
 TEST(GroundShade, WithoutCastersAllIsLit) {

@@ -15,8 +15,8 @@ namespace limber::detail {
 
 namespace {
 
-constexpr int generation =
-    4;  // of pictures: raised when the same film comes out otherwise, so that it is painted anew
+// Of pictures: raised when the same film comes out otherwise, so that it is painted anew.
+constexpr int generation = 5;
 
 }  // namespace
 
