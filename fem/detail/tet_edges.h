@@ -1,0 +1,8 @@
+// The six edges of a tet, by its own node numbers.
+#pragma once
+
+namespace limber::fem::detail {
+
+inline constexpr int tet_edges[6][2] = {{0, 1}, {0, 2}, {0, 3}, {1, 2}, {1, 3}, {2, 3}};
+
+}  // namespace limber::fem::detail
