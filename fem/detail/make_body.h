@@ -1,4 +1,7 @@
-// From what was asked for to a Body: its rest cage, masses, and what kind it is.
+// From what was asked for to a Body: its rest cage in float32, its masses, what kind it is, and what
+// follows from the mesh alone. Nothing here knows of other bodies, of the step or of contact; those parts
+// of a Body are set by build_world, when all bodies are there. Also two measures of a body that several
+// others ask for. Metres and kilograms.
 #pragma once
 
 #include "fem/world.h"

@@ -1,5 +1,7 @@
-// From a body's material to the elements of its cage, whose forces the kernels compute. Formulas and sources:
-// docs/dynamics.md.
+// From a body's material to the elements of its cage, whose forces the kernels compute (kernels.h has the
+// laws). The order in build_world: bodies, then their shares of stiffness, which are found from elements of
+// share 1, then elements with that share, then the largest step that these allow. Only deformable bodies
+// that move have elements. Formulas and sources: make_elements.cpp and docs/dynamics.md.
 #pragma once
 
 #include <vector>

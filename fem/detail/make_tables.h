@@ -1,4 +1,7 @@
-// From bodies to the flat arrays of the world that steppers read.
+// From bodies to the flat arrays of the world that steppers read (tables.h). They are made in double, body
+// after body, moving bodies first; the float ones are their roundings, made once at the end. A rigid body
+// has a table of its own in double alone, since its steps are computed in double whatever its nodes are in.
+// Tables of fine surfaces are made elsewhere (make_surface_tables.h).
 #pragma once
 
 #include "fem/detail/tables.h"

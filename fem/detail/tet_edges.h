@@ -1,4 +1,5 @@
-// The six edges of a tet, by its own node numbers.
+// The six edges of a tet, by its own node numbers. Sums over edges go in this order, and so do the bits of
+// their results.
 #pragma once
 
 namespace limber::fem::detail {
