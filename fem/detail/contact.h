@@ -100,21 +100,27 @@ class Contacts {
   struct Cell;
 
   void place_of(int point, const Real share[2], Real out[3]) const;  // from packed_
+
+  // contact_candidates.cpp
   void refresh(const LaneView<Real>&, int a, int b, Real reach, Real travel, List&);
   bool may_touch(const TetAndEdge&, int body) const;
-  void leave_nearest_face(const LaneView<Real>&, int body, Contact<Real>&) const;
   void build_direction(const LaneView<Real>&, int from, int into, Real reach, List&, int direction);
   void fetch_and_mark(const LaneView<Real>&, int body, const Real lower[3], const Real upper[3], Real reach);
   bool apart(int node, int other) const;
   bool sort_near(int from, bool edges, Real reach, Slabs&);
   void collect_near(const TetAndEdge& tet, const TetPlanes<Real>&, int column, Real reach);
   void list_found(const Slabs&, int from, Real reach, List&, Near&);
+
+  // contact_touches.cpp
   int wake(const Near&, Real travel);
   void find_points(const BodyBox<Real>& box, Real reach, Real travel, Near&);
   void find_edges(const BodyBox<Real>& box, Real reach, Real travel, bool itself, Near&);
   bool find_inside(const BodyBox<Real>& box, const TetAndEdge&);
   void cut_edge(const Real* p, const Real* q, int tet);
   void touch_of_stretches(int point);
+
+  // contact_depth.cpp
+  void leave_nearest_face(const LaneView<Real>&, int body, Contact<Real>&) const;
   bool leave_over_ridge(const Stretch& first, const Stretch& last, const Real way[3], Contact<Real>&) const;
   void measure_depths(const LaneView<Real>&, int from, int into, std::size_t first, std::size_t last);
   void leave_along_centers(const LaneView<Real>&, int from, int into, std::size_t first, std::size_t last);
@@ -122,6 +128,8 @@ class Contacts {
   Contact<Real> leave_along_edges(const LaneView<Real>&, Contact<Real>);
   bool walk_out(const LaneView<Real>&, int tet, int before, const Real p[3], const Real q[3], Real way[3],
                 Real normal[3]) const;
+
+  // contact_response.cpp
   void add_forces_with_rigid(int lane, const LaneView<Real>&, Friction<Real>*);
   void respond(const LaneView<Real>&, int a, int b, const Contact<Real>&, Friction<Real>*) const;
   template <class Each>
@@ -169,7 +177,11 @@ class Contacts {
 template <class Real>
 const Tables<Real>& tables_of(const World&);
 
-extern template class Contacts<float>;
-extern template class Contacts<double>;
+// The place of a contact point, where the nodes of the list at hand are now.
+template <class Real>
+void Contacts<Real>::place_of(int point, const Real share[2], Real out[3]) const {
+  const int* node = topology_.points[point].node;
+  for (int c = 0; c < 3; ++c) out[c] = share[0] * packed_[node[0]].at[c] + share[1] * packed_[node[1]].at[c];
+}
 
 }  // namespace limber::fem::detail

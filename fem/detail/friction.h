@@ -27,7 +27,7 @@ class Friction {
   void begin();
   // Some place of `body` presses one of `against`, or a wall (−1), whose normal is along an axis: `most` is μ
   // times the normal force, in newtons. Shares: those of the first place, then, from `second` on, minus those
-  // of the other. `told` is where among what is told the force is to be added, times `told_share`; −1:
+  // of the other. `records` is where among what is told the force is to be added, times `told_share`; −1:
   // nowhere.
   void add(int body, int against, const Real place[3], const Real normal[3], Real most,
            const Share<Real>* first, const Share<Real>* second, const Share<Real>* last, int records = -1,

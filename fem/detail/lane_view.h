@@ -19,4 +19,10 @@ struct LaneView {
   bool sleeps(int body) const { return asleep && asleep[body * stride] > 0; }
 };
 
+// The place of a node, metres.
+template <class Real>
+void fetch(const LaneView<Real>& view, int node, Real out[3]) {
+  for (int c = 0; c < 3; ++c) out[c] = view.x[view.state.at(node, c)];
+}
+
 }  // namespace limber::fem::detail

@@ -1,3 +1,20 @@
+// One step of a world, over lanes: kick-drift, v += h (f/m + g + push), x += h v, with one evaluation of
+// forces. The velocity belongs to the middle of a step (docs/dynamics.md, "Integration"). In a step come,
+// in this order,
+//
+//     who sleeps, contact, controls, limits of stretch, elastic forces, friction, integration.
+//
+// Friction is last, because it is chosen against the velocities with which the step would end. The order is
+// fixed, since the last bits of a sum of forces depend on it.
+//
+// What always holds: a lane's result is a function of its state, control and step number alone. It is the
+// same, bit for bit, in any lane, beside any others, with any instruction set, and 100 steps are 40 and
+// then 60. Sleep is no exception: a body is passed over only where a step would not change it (test
+// Sleep_slow.ChangesNothing). Boxes and ways travelled are derived from the state.
+//
+// Tried and not kept (docs/dynamics.md): Verlet on positions alone, which is useless in float32; one
+// threshold for coming to rest and for leaving it, with which bodies creep; reading the boxes of a lane
+// from its state.
 #include "fem/detail/stepper.h"
 
 #include <algorithm>
@@ -20,8 +37,9 @@ constexpr double goal_frequency = 6;  // rad/s
 // A control point pushes at least so much of its robot, or a strong push would tear out a single node.
 constexpr double min_share = 0.1;
 
-// Mass that a control pushes, by node of the robot; 0: not pushed. Round a control point that is all within
-// its radius and, where that is less than min_share, what is nearest to it.
+// Mass that a control pushes, kg, by node of the robot; 0: not pushed. Round a control point that is all
+// within its radius and, where that is less than min_share, what is nearest to it at rest. Equal distances
+// go by node number.
 std::vector<double> pushed_masses_kg(const World& world, const Control& control) {
   const Body& robot = world.bodies[world.robot];
   std::vector<double> masses(std::size_t(robot.node_count()), 0);
@@ -45,6 +63,10 @@ std::vector<double> pushed_masses_kg(const World& world, const Control& control)
 
 }  // namespace
 
+// All lanes begin at rest, idle. Limits of rest are squares of speeds or of gains in one step: max_gain2 is
+// a gain of rest_speed_m_s within a second, the "of still" within a tenth of a second. Where something
+// touches, contact's rounding shakes single nodes: there each may gain a quarter of the rest speed in the
+// step, and their mean four times it within a second (docs/dynamics.md, "Rest and sleep").
 template <class Real>
 Stepper<Real>::Stepper(const World& world, int lanes, Isa isa)
     : world_(world),
@@ -100,6 +122,10 @@ Stepper<Real>::Stepper(const World& world, int lanes, Isa isa)
     load(lane, 0, tables_.rest_positions.data(), still.data(), {}, false);
 }
 
+// Puts a state into a lane: places, velocities, boxes and largest speeds, and the accelerations that a
+// constant control gives to the robot's nodes, F/m of what it pushes. Ways travelled begin at 0 and lists
+// are forgotten. Bodies that never move are unchanged from the start; all others are awake for one step at
+// least. An idle lane's way travelled against the mean is −∞, so that nothing in it ever wakes.
 template <class Real>
 void Stepper<Real>::load(int lane, std::int64_t step, const Real* positions, const Real* velocities,
                          const Control& control, bool contact) {
@@ -110,7 +136,7 @@ void Stepper<Real>::load(int lane, std::int64_t step, const Real* positions, con
     }
   for (std::size_t b = 0; b < world_.bodies.size(); ++b) {
     const Topology::Body& body = world_.topology.bodies[b];
-    // Not from the lane, whose numbers lie a cache line apart.
+    // Boxes come from the state given, not from the lane, whose numbers lie a cache line apart.
     const Real* place = body.moving ? positions : tables_.rest_positions.data();
     constexpr Real huge = std::numeric_limits<Real>::max();
     Real lower[3] = {huge, huge, huge}, upper[3] = {-huge, -huge, -huge};
@@ -152,6 +178,7 @@ void Stepper<Real>::load(int lane, std::int64_t step, const Real* positions, con
           pushed[std::size_t(n)] > 0 ? Real(control.force_n[c]) / Real(mass) : Real(0);
 }
 
+// Place and velocity of a node, whatever the layout of lanes.
 template <class Real>
 auto Stepper<Real>::node(int lane, int node) const -> Node {
   Node result;
@@ -173,6 +200,7 @@ void Stepper<Real>::store(int lane, Real* positions, Real* velocities) const {
     }
 }
 
+// The arrays of one lane: the same as those of all, from another first number.
 template <class Real>
 LaneView<Real> Stepper<Real>::view(int lane) {
   return {&state_[lane],  &state_[first_velocity_ + lane],
@@ -183,6 +211,14 @@ LaneView<Real> Stepper<Real>::view(int lane) {
           &asleep_[lane]};
 }
 
+// Interpolation draws each node to its place in the goal shape as a critically damped oscillator of
+// frequency ω would, with w the way that is left,
+//
+//     a = 2ω (ω/2 w − v),
+//
+// and no node gets more than its mass share of the force allowed, |a| ≤ F/M. Far away a node goes no faster
+// than half of that can stop within the way left: ω/2 becomes √(F/M / |w|). `hold` draws all nodes alike,
+// by the way of the centre of mass.
 template <class Real>
 void Stepper<Real>::pull_towards_goal(int lane) {
   const Control& control = controls_[lane];
@@ -216,6 +252,8 @@ void Stepper<Real>::pull_towards_goal(int lane) {
   }
 }
 
+// Every Cost::sampled-th step is timed, and counts for all of them. The pieces are the same in both
+// branches.
 template <class Real>
 void Stepper<Real>::step() {
   for (int lane = 0; lane < lanes_; ++lane)
@@ -234,7 +272,9 @@ void Stepper<Real>::step() {
   integrate(), cost_.integration_s += spent();
 }
 
-// Where one of the world's forces begins or ends, the bodies that have any are awake.
+// Finds the accelerations by the world's forces that act at the lane's step, and when the next of them
+// begins or ends. A change wakes the bodies that have forces: it is no part of State that they did not
+// change.
 template <class Real>
 void Stepper<Real>::follow_forces(int lane) {
   const std::int64_t step = step_[lane];
@@ -264,9 +304,15 @@ bool Stepper<Real>::goes_on(int lane, int body) const {
            pose_at(track, double(step_[lane] + 1) * world_.dt_s));
 }
 
-// A body that did not change in the last step, and whose boxes met only such bodies' then and now, will not
-// change in this one either: every force is what it was. Friction goes on from body to body, so those that
-// rub one another sleep together. Lanes without contact are idle, and may sleep altogether.
+// A body that did not change in the last step, and whose box met only such bodies' boxes then and now, will
+// not change in this one either: every force is what it was. So it sleeps, and nothing of it is computed
+// where all lanes sleep. Friction is solved from body to body, so those that meet and rub one another sleep
+// and wake together; leader_ joins them (union by the lowest number). Lanes without contact are idle, and
+// sleep altogether.
+//
+// touches_ tells the kernels where a box meets another's or a wall: there rest is judged by the mean of
+// nodes, too. pushed_asleep_: bodies that sleep in all lanes, but touch one that does not; forces that fell
+// on them must be cleared.
 template <class Real>
 void Stepper<Real>::find_sleepers() {
   const int bodies = int(world_.bodies.size());
@@ -331,6 +377,7 @@ void Stepper<Real>::find_sleepers() {
   }
 }
 
+// Contact between cages or on fine surfaces, whichever the world has.
 template <class Real>
 void Stepper<Real>::add_contact_forces() {
   for (int lane = 0; lane < lanes_; ++lane)
@@ -340,7 +387,8 @@ void Stepper<Real>::add_contact_forces() {
                                    : contacts_->add_forces(lane, view(lane), &friction_[lane]);
 }
 
-// What sleeps is looked at, too: whether it sleeps is no part of the state.
+// Whether no fine surface is deeper in another than the world allows. What sleeps is looked at, too:
+// whether it sleeps is no part of the state.
 template <class Real>
 bool Stepper<Real>::is_clear(int lane) {
   if (!surface_contacts_ || !std::isfinite(world_.max_overlap_m)) return true;
@@ -349,6 +397,7 @@ bool Stepper<Real>::is_clear(int lane) {
   return surface_contacts_->deepest_overlap(lane, all) <= Real(world_.max_overlap_m);
 }
 
+// One kernel asks the tets of all lanes; the forces of those that are stretched go lane by lane.
 template <class Real>
 void Stepper<Real>::add_stretch_limits() {
   stretch_limits_.find(state_.data(), inner_travel_.data(), all_asleep_);
@@ -356,6 +405,7 @@ void Stepper<Real>::add_stretch_limits() {
     if (contact_[lane]) stretch_limits_.add_forces(lane, view(lane));
 }
 
+// Pushes that depend on the state; constant ones were set when the lane was loaded.
 template <class Real>
 void Stepper<Real>::find_pushes() {
   for (int lane = 0; lane < lanes_; ++lane)
@@ -364,6 +414,7 @@ void Stepper<Real>::find_pushes() {
       pull_towards_goal(lane);
 }
 
+// The same as numbers for those who look on, m/s².
 template <class Real>
 std::vector<Vec3> Stepper<Real>::pushes_m_s2(int lane) {
   find_pushes();
@@ -375,6 +426,7 @@ std::vector<Vec3> Stepper<Real>::pushes_m_s2(int lane) {
   return pushes;
 }
 
+// Body by body, those that move and are awake in some lane.
 template <class Real>
 void Stepper<Real>::add_elastic_forces() {
   for (std::size_t b = 0; b < world_.bodies.size(); ++b)
@@ -383,6 +435,8 @@ void Stepper<Real>::add_elastic_forces() {
                        f_.data());
 }
 
+// Friction needs all other forces, pushes among them. pushes_on_lane_ points into the arrays of lane 0 and
+// goes on by one number a lane.
 template <class Real>
 void Stepper<Real>::add_friction(std::vector<ContactRecord<Real>>* records) {
   for (std::size_t b = 0; b < forced_.size(); ++b) pushes_on_lane_[b] = pushes_on(b);
@@ -393,6 +447,8 @@ void Stepper<Real>::add_friction(std::vector<ContactRecord<Real>>* records) {
   }
 }
 
+// Runs the forces of a step without its integration, and tells those of contact, walls and friction. One
+// lane; it has forces in it afterwards and is to be loaded anew.
 template <class Real>
 std::vector<ContactRecord<Real>> Stepper<Real>::contact_records(int lane) {
   LIMBER_CHECK(lanes_ == 1 && lane == 0, lanes_, lane);
@@ -406,7 +462,7 @@ std::vector<ContactRecord<Real>> Stepper<Real>::contact_records(int lane) {
   return records;
 }
 
-// As Motion has them; null: none.
+// Accelerations of a body's nodes by controls and forces, as Motion has them; null: none.
 template <class Real>
 const Real* Stepper<Real>::pushes_on(std::size_t body) {
   const Numbers& forced = forced_[body];
@@ -416,7 +472,9 @@ const Real* Stepper<Real>::pushes_on(std::size_t body) {
   return all_pushes_.data();
 }
 
-// Velocities are those of the way in the step, from the poses and not from rounded places.
+// Puts the nodes of a kinematic body where its keyframes have them at the end of the step, in awake lanes.
+// Velocities are those of the way in the step that follows from the poses, (x(t + h) − x(t))/h, and not
+// from rounded places. A body that neither moved nor changed its velocities is unchanged.
 template <class Real>
 void Stepper<Real>::move_by_keyframes(std::size_t b) {
   const Body& body = world_.bodies[b];
@@ -451,6 +509,10 @@ void Stepper<Real>::move_by_keyframes(std::size_t b) {
   }
 }
 
+// Moves body after body by the kernel of its kind, and keeps the books: who did not change, and how far the
+// fastest node has gone, against the mean too where something asks for it. Bodies that sleep in all lanes
+// are passed over; in some lanes they are held by the kernel. A soft body that may come to a stand takes
+// the kernel that knows of rest, which gives the same bits where nothing rests.
 template <class Real>
 void Stepper<Real>::integrate() {
   for (std::size_t b = 0; b < world_.bodies.size(); ++b) {
@@ -495,6 +557,8 @@ void Stepper<Real>::integrate() {
   for (std::int64_t& step : step_) ++step;
 }
 
+// Whether the body is slow enough to come to a stand in some lane; most are not, and take the faster
+// kernel.
 template <class Real>
 bool Stepper<Real>::may_stand(std::size_t body) const {
   for (int lane = 0; lane < lanes_; ++lane)

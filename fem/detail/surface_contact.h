@@ -87,9 +87,6 @@ class SurfaceContacts {
     Place of_edge[6];  // 01 02 03 12 13 23
     Real most;
   };
-  const Bends& bends_of(const LaneView<Real>&, int tet);
-  static Place bend(const Bends&, const Real weight[4]);
-  const Slopes& slopes_at(const LaneView<Real>&, int node);
   // How far a surface is, negative below it, along its unit normal.
   struct Surface {
     Real distance, normal[3];
@@ -100,14 +97,23 @@ class SurfaceContacts {
       return steepness > Real(1e-3);
     }
   };
-  bool find_surface(const LaneView<Real>&, int body, int tet, const Real weight[4], Surface&);
-  bool find_bent_surface(const LaneView<Real>&, int body, int tet, const Place&, Real weight[4], Surface&);
+
+  // surface_places.h
   const Place& node_place(const LaneView<Real>&, int node);
   const Place& sample_place(const LaneView<Real>&, int sample);
+  const Slopes& slopes_at(const LaneView<Real>&, int node);
+  const Bends& bends_of(const LaneView<Real>&, int tet);
+  Real bulge_of(const LaneView<Real>&, int body, int tet);
+  Real sample_bulge(const LaneView<Real>&, int body, int sample);
+  static Place bend(const Bends&, const Real weight[4]);
   void find_core(const LaneView<Real>&, int tet);
   int row_of_core(int tet) const { return world_nodes_ + 4 * tet; }
   int row_of_sample(int sample) const { return first_sample_row_ + sample; }
+  void share_sample(int body, int sample, SurfaceContact<Real>&);
+
+  // surface_candidates.cpp
   Real travel_of(const LaneView<Real>&, int a, int b);
+  void find_pair(int lane, const LaneView<Real>&, std::size_t pair);
   void build(const LaneView<Real>&, int from, int into, Real reach, Near&);
   void collect_groups(const LaneView<Real>&, int from, const Real lower[3], const Real upper[3], Real reach);
   void sort_groups(const Real lower[3], const Real upper[3]);
@@ -115,16 +121,20 @@ class SurfaceContacts {
     const Real slab = (x - slab_lower_) * slabs_a_metre_;
     return slab > 0 ? (slab < Real(slabs) ? int(slab) : slabs - 1) : 0;
   }
-  void find_pair(int lane, const LaneView<Real>&, std::size_t pair);
+
+  // surface_depth.cpp
   void find_in(const LaneView<Real>&, int from, int into, Real reach, Real travel, Near&);
   bool measure(const LaneView<Real>&, int from, int into, int sample, int tet, const Real weight[4]);
-  Real bulge_of(const LaneView<Real>&, int body, int tet);
-  Real sample_bulge(const LaneView<Real>&, int body, int sample);
   bool near_core(const LaneView<Real>&, int tet, const Real place[3], const Real weight[4], Real out);
   bool is_beside(int tet, const Real weight[4], Real slack) const;
   bool barycentric(const LaneView<Real>&, int tet, const Real place[3], Real weight[4]);
+  bool find_surface(const LaneView<Real>&, int body, int tet, const Real weight[4], Surface&);
+  bool find_bent_surface(const LaneView<Real>&, int body, int tet, const Place&, Real weight[4], Surface&);
+
+  // surface_walls.cpp
   void find_walls(int lane, const LaneView<Real>&, int body);
-  void share_sample(int body, int sample, SurfaceContact<Real>&);
+
+  // surface_response.cpp
   void share_loads(const LaneView<Real>&);
   void respond(const SurfaceContact<Real>&, Friction<Real>*);
   Real load_of(const SurfaceContact<Real>&) const;
@@ -175,8 +185,5 @@ class SurfaceContacts {
   std::vector<int> beyond_tets_;
   std::vector<unsigned char> sides_;  // a tet: of walls that some node of it is beyond, bits; else 0
 };
-
-extern template class SurfaceContacts<float>;
-extern template class SurfaceContacts<double>;
 
 }  // namespace limber::fem::detail
