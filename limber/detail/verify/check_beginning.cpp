@@ -1,5 +1,5 @@
 // Where a motion begins: at the scene's start, or as a frame of another motion (--from). All that follows
-// hangs on that state; so every number of it is compared.
+// hangs on that state; so every number of it is compared. Rows: docs/verify.md, "Of the plan".
 #include <algorithm>
 #include <limits>
 
