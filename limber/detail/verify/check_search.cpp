@@ -2,9 +2,9 @@
 //
 // A search is a function of scene, bodies, settings and seed, so it is done again, and its tree must come out
 // the same, node by node. That proves more than checking each node by itself: a tree whose nodes all follow
-// from their parents may still not be the one that was searched. Nodes that came after the search (shortcuts,
-// better paths, a plan that was carried to finer cages) hang on it with the iteration −1; they are replayed
-// one by one.
+// from their parents may still not be the one that was searched. Nodes that came after the search (shortcuts
+// and better paths, of the iteration −1), and all nodes of a plan that was carried to finer cages, are
+// replayed one by one.
 #include "core/error.h"
 #include "core/hash.h"
 #include "core/progress.h"
