@@ -1,3 +1,11 @@
+// The steps that mend a triangle soup, in the order of docs/import.md, "Mending, in this order": weld, drop
+// faces that say nothing, orient, remove flat faces, drop unused vertices.
+//
+// What always holds: no vertex that stays is moved, and no hole is filled. Of equals the lowest row or
+// triangle wins. Questions about edges are walks over one sorted list of all sides of triangles
+// (detail/edges.h): they cost n log n, and take any soup, whatever meets at an edge. Where a CornerMap is
+// given, each corner that is left keeps what the file shows at its place: a triangle that goes takes its rows
+// with it, one that is turned swaps two of them, and a flip interpolates its neighbour's.
 #include "meshing/repair.h"
 
 #include <algorithm>
@@ -43,9 +51,9 @@ int keep_triangles(SurfaceMesh& mesh, const std::vector<char>& keep, CornerMap* 
 
 }  // namespace
 
-// ── weld
-// ──────────────────────────────────────────────────────────────────────────────────────────────────────────
+// ---- weld ----
 
+// Sides of no length do not count for the median, which they would make 0, and the tolerance with it.
 double weld_tolerance_m(const SurfaceMesh& mesh, double relative) {
   Box box;
   std::vector<double> sides;
@@ -86,6 +94,10 @@ void add_entries(const Vec3& p, int row, double tolerance_m, std::vector<CellEnt
 
 }  // namespace
 
+// First places that are exactly the same, found by sorting: so a cell of the second part holds few points
+// even where a file repeats each vertex for every face. Then places within the tolerance, cell by cell.
+// Groups grow together by union and find, whose root is the lowest row, so neither the order of pairs nor
+// that of vertices counts.
 std::vector<int> weld(const Points& positions, double tolerance_m) {
   const int n = int(positions.rows());
   detail::UnionFind welded(n);
@@ -128,9 +140,9 @@ std::vector<int> weld(const Points& positions, double tolerance_m) {
   return representative;
 }
 
-// ── faces that say nothing
-// ────────────────────────────────────────────────────────────────────────────────────────
+// ---- faces that say nothing ----
 
+// Twice the area over the longest side.
 double thinness(const SurfaceMesh& mesh, int t) {
   const Vec3 a = corner(mesh, t, 0), b = corner(mesh, t, 1), c = corner(mesh, t, 2);
   const double longest = std::max({(b - a).norm(), (c - b).norm(), (a - c).norm()});
@@ -143,6 +155,8 @@ int drop_collapsed(SurfaceMesh& mesh, CornerMap* corners) {
   return keep_triangles(mesh, keep, corners);
 }
 
+// Sorted by corners, then by triangle: of each set with the same corners, whichever way round, the first
+// stays.
 int drop_duplicates(SurfaceMesh& mesh, CornerMap* corners) {
   std::vector<std::array<int, 4>> faces;  // sorted corners, then the triangle
   for (int t = 0; t < mesh.triangles.rows(); ++t) {
@@ -158,6 +172,7 @@ int drop_duplicates(SurfaceMesh& mesh, CornerMap* corners) {
 
 namespace {
 
+// All sides of triangles along one edge; `uses` are sorted by edge.
 std::span<const EdgeUse> uses_of(const std::vector<EdgeUse>& uses, int a, int b) {
   const std::array<int, 2> wanted{std::min(a, b), std::max(a, b)};
   const auto begin =
@@ -183,7 +198,11 @@ void carry_flip(const SurfaceMesh& mesh, int a, int b, int c, int t, int n, int 
 }
 
 // One pass over the flat triangles, each with its neighbour on its longest side; returns how many were
-// flipped.
+// flipped. The flat one, b on or beside its longest side a–c, and its neighbour beyond that side make a quad,
+// which is cut by its other diagonal: the neighbour is cut in two at b, and the surface stays where it is and
+// watertight. Left alone are: an edge of other than two triangles, or of two that disagree about their sides;
+// a neighbour that is flat itself, for the next pass; and a diagonal that is an edge already, which would
+// then have too many triangles. A triangle is changed once a pass, for the list of edges is that of before.
 int flip_flat(SurfaceMesh& mesh, double tolerance_m, CornerMap* corners) {
   const std::vector<EdgeUse> uses = detail::edge_uses(mesh.triangles);
   std::vector<char> changed(std::size_t(mesh.triangles.rows()), false);
@@ -225,7 +244,8 @@ int flip_flat(SurfaceMesh& mesh, double tolerance_m, CornerMap* corners) {
 
 Flattened remove_flat(SurfaceMesh& mesh, double tolerance_m, CornerMap* corners) {
   Flattened done;
-  // A row of flat triangles along one side is unrolled from the outside, one a pass.
+  // A row of flat triangles along one side is unrolled from the outside, one a pass. What is still flat then
+  // is dropped, and leaves a slit no wider than the tolerance.
   for (int pass = 0; pass < 50; ++pass) {
     const int flipped = flip_flat(mesh, tolerance_m, corners);
     if (flipped == 0) break;
@@ -237,8 +257,7 @@ Flattened remove_flat(SurfaceMesh& mesh, double tolerance_m, CornerMap* corners)
   return done;
 }
 
-// ── orientation
-// ───────────────────────────────────────────────────────────────────────────────────────────────────
+// ---- orientation ----
 
 namespace {
 
@@ -257,6 +276,10 @@ struct Pieces {
   std::vector<char> one_sided;  // (F) said at the piece's lowest triangle
 };
 
+// Flood fill from the lowest triangle of each piece. Two neighbours agree when they run along their common
+// edge in opposite directions. A piece in which some triangle is reached both ways round has one side only
+// (Möbius). Edges of three or more triangles join nothing: across them there is no telling who continues
+// whom.
 Pieces agreeing_pieces(const Triangles& triangles) {
   struct Neighbour {
     int triangle = -1;
@@ -321,6 +344,8 @@ void make_pieces_agree(SurfaceMesh& mesh, const Pieces& pieces, CornerMap* corne
   }
 }
 
+// ---- which side is out ----
+
 // Triangles whose sides are judged together.
 struct Solid {
   std::vector<int> triangles;
@@ -330,7 +355,9 @@ struct Solid {
   bool closed = false;
 };
 
-// As many triangles run along each edge of the group one way as the other. group (F); answers (by group).
+// Closed means: as many triangles run along each edge of the group one way as the other. Directions count,
+// and not faces: two cubes with a common edge have an edge of four triangles, and are closed. group (F);
+// answers (by group).
 std::vector<char> balanced_groups(const std::vector<EdgeUse>& uses, const std::vector<int>& group,
                                   int groups) {
   std::vector<char> balanced(std::size_t(groups), true);
@@ -349,7 +376,8 @@ std::vector<char> balanced_groups(const std::vector<EdgeUse>& uses, const std::v
   return balanced;
 }
 
-// The middle of the rim; of nothing, when the solid is closed.
+// The middle of the rim, of edges that an odd number of its triangles have; of the box, when the solid is
+// closed.
 Vec3 rim_center(const SurfaceMesh& mesh, const Solid& solid) {
   if (solid.closed) return solid.box.center();
   Triangles own(Eigen::Index(solid.triangles.size()), 3);
@@ -365,6 +393,10 @@ Vec3 rim_center(const SurfaceMesh& mesh, const Solid& solid) {
   return rim_edges > 0 ? Vec3(sum / rim_edges) : solid.box.center();
 }
 
+// Volume and area vector, V = Σ det(a − p, b − p, c − p) / 6 and Σ (b − a) × (c − a) / 2, over the triangles
+// (a, b, c). The apex p is on or near the solid: seen from far away, a flake of two opposite triangles gets a
+// sign from rounding. Of an open solid it is the middle of the rim, and the volume that of the solid closed
+// by a cone.
 void measure(const SurfaceMesh& mesh, Solid& solid) {
   for (const int t : solid.triangles)
     for (int i = 0; i < 3; ++i) solid.box.include(corner(mesh, t, i));
@@ -378,7 +410,9 @@ void measure(const SurfaceMesh& mesh, Solid& solid) {
   }
 }
 
-// A closed piece is a solid; the open pieces of a component are one together (two boxes with a common wall).
+// A closed piece is a solid; the open pieces of a component are one together (two boxes with a common wall,
+// whose edges have three triangles). Groups are numbered by their piece, or n + their component; one-sided
+// pieces are in none.
 std::vector<Solid> solids_of(const SurfaceMesh& mesh, const Pieces& pieces) {
   const int n = int(mesh.triangles.rows());
   std::vector<int> group(std::size_t(n), 0);
@@ -407,6 +441,7 @@ std::vector<Solid> solids_of(const SurfaceMesh& mesh, const Pieces& pieces) {
   return solids;
 }
 
+// Whether the sign of its volume can be trusted to say which way it faces.
 bool shows_its_outside(const Solid& s) {
   if (s.closed) return std::abs(s.volume) > min_closed_volume * s.area * std::sqrt(s.area);
   return s.area_vector.norm() < max_open * s.area &&
@@ -430,6 +465,9 @@ class Nest {
         asked_(solids.size(), 0),
         quick_(solids.size()) {}
 
+  // Of the first `count` solids, by their winding numbers (van Oosterom and Strackee 1983); only those whose
+  // boxes hold the point are asked. They are taken in order, so `innermost` is the smallest of those round
+  // the point.
   Surroundings around(const Vec3& p, int count) {
     std::vector<int> near;
     tree_.any([&](const Box& box) { return !holds(box, p); },
@@ -483,6 +521,9 @@ class Nest {
 
 }  // namespace
 
+// First the triangles of each piece are made to agree, then whole solids to face outward, from the largest to
+// the smallest volume. Neither a test of the whole model ("volume < 0, so turn all") nor one of each
+// component will do: the first is wrong for nests, the second for a nest that is inside out.
 Orientation orient(SurfaceMesh& mesh, CornerMap* corners) {
   Orientation done;
   const Pieces pieces = agreeing_pieces(mesh.triangles);
@@ -527,8 +568,7 @@ Orientation orient(SurfaceMesh& mesh, CornerMap* corners) {
   return done;
 }
 
-// ── the rest
-// ──────────────────────────────────────────────────────────────────────────────────────────────────────
+// ---- the rest ----
 
 int drop_unused(SurfaceMesh& mesh) {
   const std::vector<int> used = vertices_of(mesh.triangles);

@@ -1,3 +1,17 @@
+// The search: Algorithm 1 of Rodriguez, Lien and Amato (ICRA 2006), a kinodynamic RRT (LaValle and Kuffner,
+// IJRR 2001) over full states of robot and obstacles, computed ahead of itself. Method and measurements:
+// docs/planning.md.
+//
+// An expansion is one iteration: a random point x, the node nearest to it, a control from there, a rollout.
+// Only the choice of the node depends on the iterations before; what is drawn is a function of (seed,
+// iteration). So expansions are drawn ahead, rolled out side by side in threads and lanes, and committed in
+// order. There are two ways to do so:
+//   without a lag, on speculation: a commit that adds a node nearer to a later x aims that expansion anew;
+//   with a lag, by rule: expansion i knows the nodes of all before i − lag and no others, so none is in vain.
+//
+// What always holds: the tree, the counts of the algorithm and the trajectory are functions of system and
+// settings, for any number of threads, lanes and expansions in flight. A search that was cut short has a
+// prefix of the whole one's commits, and goes on from there to the same bytes.
 #include "plan/search.h"
 
 #include <algorithm>
@@ -30,7 +44,8 @@ double seconds_since(Clock::time_point t) { return std::chrono::duration<double>
 constexpr int steps_between_looks = 64;  // where no law looks; only so that an end is soon noticed
 constexpr double leads_away = 3;         // robot radii of free way that a guided rollout may lose
 
-// What became of a rollout.
+// What became of a rollout. Of a state that may be a node: the robot's centre of mass, and how far the goal
+// has moved.
 struct Outcome {
   enum Kind { node, diverged, rejected } kind = diverged;
   State state;
@@ -38,6 +53,8 @@ struct Outcome {
   Vec3 goal_shift = Vec3::Zero();
 };
 
+// Rejected: a state that is not acceptable (inverted tets, too large a change of volume, the goal lost …), or
+// in which surfaces are too deep in one another. It counts as an iteration all the same.
 Outcome outcome_of(const System& system, Rollout& rollout) {
   Outcome o;
   if (!rollout.ok) return o;
@@ -51,7 +68,8 @@ Outcome outcome_of(const System& system, Rollout& rollout) {
   return o;
 }
 
-// One iteration of Algorithm 1, on its way: computed from the node that is nearest as far as is known.
+// One iteration of Algorithm 1, on its way: computed from the node that is nearest as far as is known. It
+// waits, runs and is finished; one that is aimed anew waits again, or, where it runs, once it is given back.
 struct Expansion : Rollout {
   std::int64_t iteration = 0;
   Sample sample;
@@ -66,6 +84,7 @@ struct Expansion : Rollout {
   int looks_at_rest = 0;
 };
 
+// The cost-to-go over a grid, where a share of the expansions is led by it (plan/guidance.h).
 std::optional<Guidance> guidance_of(const System& system, const Settings& settings) {
   if (settings.search_options.guidance == 0) return std::nullopt;
   return Guidance(system.workspace(), settings.goal.center_of_mass_m, settings.search_options.soft_price);
@@ -74,8 +93,8 @@ std::optional<Guidance> guidance_of(const System& system, const Settings& settin
 // Threads take expansions from one queue and commit them in its order. With a lag, an expansion is drawn when
 // those that it knows are committed, and never changes. Without, expansions are drawn ahead on speculation:
 // when a commit adds a node that is nearer to the point of a later expansion than the node that one started
-// from, the later one is aimed anew. So whatever is committed started where the sequential algorithm would
-// have started it.
+// from, the later one is aimed anew. So, by induction over the commits, whatever is committed started where
+// the sequential algorithm would have started it.
 class Search {
  public:
   // `system` and `settings` are those of the plan's last leg; time counts from `started`.
@@ -104,6 +123,8 @@ class Search {
     restore();
   }
 
+  // Runs until the goal, a limit, a stop signal or an exception in a thread ends the search. The exception is
+  // thrown again here.
   void run() {
     if (plan_.solved()) end(Ending::goal);
     {
@@ -125,7 +146,8 @@ class Search {
   std::optional<Trajectory> way() && { return std::move(way_); }
 
  private:
-  // What one thread has in its lanes.
+  // What one thread has in its lanes. Where the queue or the plan is touched, the mutex is held; questions
+  // about a rollout on its way are answered without it, from the rollout and from what never changes.
   class Lanes final : public RolloutSource {
    public:
     explicit Lanes(Search& search) : search_(search) {}
@@ -167,6 +189,8 @@ class Search {
     bool took_any_ = false;
   };
 
+  // One thread's work: its lanes are filled as long as there is something to take. What it throws ends the
+  // search.
   void work() try {
     const std::unique_ptr<Propagator> propagator = system_.make_propagator();
     Lanes lanes(*this);
@@ -191,6 +215,8 @@ class Search {
                        [](const Expansion& e) { return e.status == Expansion::waiting; });
   }
 
+  // The first that waits, in order of iteration, for it is committed first. The state that it starts from is
+  // put together here, and its own: the rollout then needs neither mutex nor tree.
   Expansion* take() {
     look_at_limits();
     if (ended_) return nullptr;
@@ -208,6 +234,8 @@ class Search {
     return nullptr;
   }
 
+  // A rollout that was overtaken while it ran was in vain. All that is finished at the head of the queue is
+  // committed.
   void give_back(Expansion& e, Outcome outcome) {
     ++plan_.statistics.rollouts;
     e.outcome = std::move(outcome);
@@ -218,7 +246,11 @@ class Search {
     changed_.notify_all();
   }
 
-  // A function of the rollout and of what was seen of it, save when nobody wants the result any more.
+  // Whether a rollout goes on after a look (docs/planning.md, "Looks"). It ends where the goal is lost; with
+  // stop_in_goal, in the goal; with end_hopeless, where the robot stood still in two looks on end, or where a
+  // guided one is farther from the goal than it was at its nearest, by more than `leads_away` radii of free
+  // way. The state in which it ends becomes a node. A function of the rollout and of what was seen of it,
+  // save when nobody wants the result any more.
   bool goes_on(Expansion& e, const Observation& look) const {
     if (ended_ || look.lost) return false;
     if (look_every_ == 0) return true;
@@ -237,7 +269,8 @@ class Search {
     return to_go <= e.min_to_go + leads_away * guidance_->workspace().robot_radius_m;
   }
 
-  // Expansions are drawn in order, each when all that it may know is committed, and no more.
+  // Expansions are drawn in order. With a lag each is drawn when all that it may know is committed, and no
+  // more, so that it never changes; without, as many as the window holds, against the tree as it is.
   void draw_ahead() {
     while (next_iteration_ < settings_.max_iterations &&
            (search_options_.lag > 0 ? next_iteration_ <= committed_ + search_options_.lag
@@ -252,7 +285,8 @@ class Search {
   }
 
   // Goes through the earlier plan's commits again, so that each expansion that was on its way is drawn as it
-  // was.
+  // was. An iteration without a node in the tree grew none. Which ways were refused is not stored, so each is
+  // asked again; the answers are the same.
   void restore() try {
     int node = plan_.legs.back().root;
     for (selector_.add(plan_.tree, node++);; ++committed_) {
@@ -274,6 +308,8 @@ class Search {
     end(Ending::stopped);  // and the plan is as it was
   }
 
+  // What was computed is thrown away; the expansion waits for a rollout from the node at which it is aimed
+  // now.
   void compute_again(Expansion& e) {
     ++plan_.statistics.rollouts_wrong;
     e.overtaken = false;
@@ -289,6 +325,9 @@ class Search {
     }
   }
 
+  // One iteration of the sequential algorithm: it is counted, and its state becomes a node, unless it was
+  // rejected or the node that it grew from was refused meanwhile. Whether the new node solves is found first:
+  // that may be interrupted, and then the iteration counts as not done.
   void commit(const Expansion& e) {
     const bool grows = e.outcome.kind == Outcome::node && !selector_.refused(e.aimed.node);
     const Vec3 place = e.outcome.center - e.outcome.goal_shift;
@@ -345,6 +384,10 @@ class Search {
   double distance_at(const Vec3& place) const { return (place - settings_.goal.center_of_mass_m).norm(); }
 
   // Of the state to which `control` leads from `parent`, at `place`. Throws Interrupted.
+  // A node solves the leg where three things hold: it lies in the goal, the robot comes to rest there, and
+  // every frame of the way from the leg's root, rest included, may be shown (System::first_refused, too dear
+  // to ask of every state). The way is run again, now with its frames; it must pass through the tree's states
+  // to the bit.
   Arrival arrival_of(const State& state, const Vec3& place, int parent, const Control& control) const {
     if (!holds(settings_.goal, place)) return {};
     ControlRollout settle, way;
@@ -384,7 +427,9 @@ class Search {
     return {Arrival::refused, int(there - way.states.begin()), {}};
   }
 
-  // Nothing grows any more from the way to `node` after so many edges.
+  // Nothing grows any more from the way to `node` after so many edges: neither from the node behind the edge
+  // that leads into the refused frame nor from any below it, whose numbers are higher than their parents'.
+  // The good part of the way is kept, and the search cannot stay in what is spoiled.
   void refuse(const Arrival& arrival, int node) {
     const std::vector<int> path = path_to(plan_.tree, node);
     const auto root = std::find(path.begin(), path.end(), plan_.legs.back().root);
@@ -394,7 +439,8 @@ class Search {
         selector_.refuse(n);
   }
 
-  // What was aimed at, or the best, may have been refused.
+  // What was aimed at, or the best, may have been refused. With a lag, what was drawn stays as it was drawn,
+  // and is rejected when it is committed.
   void choose_again() {
     if (selector_.refused(plan_.best_node)) {
       plan_.best_distance_m = std::numeric_limits<double>::infinity();
@@ -409,6 +455,8 @@ class Search {
     }
   }
 
+  // The nearest to the goal is the best, the first of equals; one that solves is the best whatever its
+  // distance.
   void consider(int node, double distance, bool solves) {
     if (!solves && distance >= plan_.best_distance_m) return;
     plan_.best_distance_m = distance;
@@ -418,6 +466,7 @@ class Search {
     end(Ending::goal);
   }
 
+  // Each expansion on its way to whose point the new node is strictly nearer starts from that node instead.
   void aim_overtaken(int node) {
     for (Expansion& e : queue_) {
       if (!(selector_.cost(e.sample, node) < e.aimed.cost)) continue;  // the first of equals stays
@@ -426,11 +475,13 @@ class Search {
     }
   }
 
+  // One that still waits needs nothing more: its rollout has not begun.
   void aimed_anew(Expansion& e) {
     if (e.status == Expansion::running) e.overtaken = true;
     if (e.status == Expansion::finished) compute_again(e);
   }
 
+  // Iterations first: a search that has done all of them is not told to have been stopped.
   void look_at_limits() {
     if (ended_) return;
     if (plan_.statistics.iterations >= settings_.max_iterations) return end(Ending::iterations);
@@ -456,7 +507,7 @@ class Search {
   const std::int64_t iterations_before_ = plan_.statistics.iterations;
 
   const FrameTimes frames_;
-  const std::optional<Guidance> guidance_;  // as the search begins; prices are learnt in the chooser's copy
+  const std::optional<Guidance> guidance_;  // as the search begins; prices are learnt in the selector's copy
 
   std::atomic<bool> ended_ = false;
   std::mutex mutex_;  // guards all below, and plan_ (states already in the tree are read without it)
@@ -469,7 +520,7 @@ class Search {
   std::optional<Trajectory> way_;
 };
 
-// At the root of a leg, with the system and settings of that leg.
+// At the root of a leg, with the system and settings of that leg: it may already lie in the leg's goal.
 void begin_leg(const System& system, const Settings& settings, Plan& plan) {
   const int root = plan.legs.back().root;
   const State state = plan.tree.states[std::size_t(root)];
@@ -480,6 +531,7 @@ void begin_leg(const System& system, const Settings& settings, Plan& plan) {
   plan.goal_node = solves ? root : -1;
 }
 
+// A tree of one node, the start, of no iteration (−1).
 Plan begin(const System& system, const Settings& settings) {
   Plan plan;
   plan.system_hash = system.hash();
@@ -491,7 +543,9 @@ Plan begin(const System& system, const Settings& settings) {
   return plan;
 }
 
-// Where the next leg begins: the goal's node, or a node behind it in which the robot has come to rest.
+// Where the next leg begins: the goal's node, or a node behind it in which the robot has come to rest. That
+// node's control is the settle, so the legs hang together in one tree, and a path through several goals is
+// one way in it.
 int reached(const System& system, const Settings& settings, Plan& plan) {
   if (settings.settle.max_duration_s == 0) return plan.goal_node;
   ControlRollout settle;
@@ -502,6 +556,7 @@ int reached(const System& system, const Settings& settings, Plan& plan) {
                        system.robot_center(settle.end).cast<float>());
 }
 
+// A tree goes on only in the world and with the settings that it grew by; limits may differ.
 void require_same_search(const System& system, const Settings& settings, const Plan& earlier) {
   if (earlier.system_hash != system.hash())
     throw InputError(
@@ -515,6 +570,8 @@ void require_same_search(const System& system, const Settings& settings, const P
 
 }  // namespace
 
+// One search a leg. The trajectory of a plan with one leg was run when its way was judged; else it is run
+// once more, to the best node.
 Plan plan(const System& system, const Settings& settings, std::optional<Plan> earlier,
           const ProgressCallback& on_progress) {
   validate(settings, system);
@@ -573,6 +630,7 @@ std::string explain_simulation(const Plan& plan) {
 
 }  // namespace
 
+// First how near it came, then what ended it and what to try, then what was in the way.
 std::string explain(const Plan& plan) {
   if (plan.simulation) return explain_simulation(plan);
   const Settings s = settings_of_leg(plan.settings, plan.leg());

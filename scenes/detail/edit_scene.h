@@ -1,5 +1,6 @@
 // What is done to a scene's text, as a tree of values, before it is checked: edits by --set, and lists from a
-// file of their own. So there is one road for a parameter, and one check.
+// file of their own (--control). So there is one road for a parameter, and one check. What edits may say:
+// docs/scene.md, "Edits".
 #pragma once
 
 #include "scenes/detail/document.h"

@@ -1,5 +1,7 @@
 // camera, [[cameras]] and film: from where the motion is seen, and how it is told. Meaning:
-// docs/rendering.md.
+// docs/rendering.md. What would only come to light when a film is painted is refused here: letters that
+// cannot be seen, a range of colours that is empty, pictures that exclude one another, an inset of a camera
+// that is not there.
 #include <fmt/ranges.h>
 
 #include <algorithm>

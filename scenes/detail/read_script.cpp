@@ -1,5 +1,6 @@
 // What happens by itself, whatever the planner does: [[forces]] on bodies that can be pushed, [[motions]] of
-// rigid obstacles. Meaning: docs/simulation.md, "What happens by itself".
+// rigid obstacles. Bodies are called by their names and kept by their numbers. Meaning: docs/simulation.md,
+// "What happens by itself".
 #include "scenes/detail/scene_parts.h"
 #include "scenes/detail/typed_reads.h"
 

@@ -1,3 +1,6 @@
+// The extreme vertices of a surface along evenly many directions, each vertex once: at most 200 of them,
+// however fine the surface is. No direction is farther than 11 degrees from one of the 200, so of a ball of
+// radius r what is missed stands out by at most r (1 − cos 11°), 2 % of r.
 #include "limber/detail/film/outermost.h"
 
 #include <algorithm>

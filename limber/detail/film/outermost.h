@@ -1,4 +1,7 @@
-// A body's outline from a few of its vertices: enough for cameras, and for words that keep clear of bodies.
+// A body's outline from a few of its vertices: enough to frame a camera, and for words that keep clear of
+// bodies, for a fraction of what moving the whole surface costs. The vertices are found at rest, in
+// directions all round, so they stay the outermost however the body turns; where it bends, others may come to
+// stand a little farther out.
 #pragma once
 
 #include "ffd/binding.h"
@@ -6,8 +9,7 @@
 
 namespace limber::detail {
 
-// The binding of the body's outermost vertices at rest alone: where these are, deform() tells from the nodes
-// of the cage, for a fraction of what the whole surface costs.
+// The binding of those vertices alone, for deform().
 ffd::Binding outermost_part(const PreparedBody&);
 
 }  // namespace limber::detail

@@ -5,8 +5,8 @@
 // the camera's path (shot_camera.cpp), where words and insets stand (shot_places.cpp), pushes, touches,
 // arrows and panes (shot_forces.cpp), and ranges of colours and depths (shot_passes.cpp). After that a shot
 // never changes, and a frame is a function of its number: any worker paints any frame, in any order, and gets
-// the same picture. What it depends on is in its hash (shot_hash.cpp). The painting is in painter.cpp.
-// Method: docs/rendering.md.
+// the same picture. The hash by which a frame is known is made in shot_hash.cpp; the painting is in
+// painter.cpp. Method: docs/rendering.md.
 #include "limber/detail/film/shot.h"
 
 #include <fmt/ranges.h>

@@ -1,9 +1,9 @@
 // What acts in a shot: the robot's pushes, what touches what, and how both are shown (arrows, panes).
 //
-// Forces of contact are worked out anew from the stored states, by the code that steps (fem::contact_forces),
-// once for each stored frame, and only where something asks for them: the pace, panes, passes. Arrows are
-// proportional to their forces: the strongest push is as long as the robot, and no arrow is longer than twice
-// that.
+// Forces of contact are worked out anew from the stored states, by the code that steps (fem::contact_forces):
+// for the pace, panes and passes once for each stored frame, where one of these asks for them; for arrows
+// where a frame shows them. Arrows are proportional to their forces: the strongest push is as long as the
+// robot, and no arrow is longer than twice that.
 #include <algorithm>
 #include <cmath>
 

@@ -1,5 +1,6 @@
 // The ranges of depths and colours, which hold for the whole film so that one level means one thing in all
-// frames, and what is told of the passes beside them (passes.json; docs/files.md).
+// frames, and what is told of the passes beside them (passes.json; docs/files.md). Others that draw the same
+// moment (tools/compare_films) find cameras and light there, too.
 #include <algorithm>
 #include <limits>
 

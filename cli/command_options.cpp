@@ -1,0 +1,110 @@
+// The options that several commands have. Ranges are checked here, as the words are parsed: a command never
+// sees a value that is out of its range. What depends on more than one word (a frame without --from, options
+// of many models for one) is checked where the command is described.
+#include "cli/command_options.h"
+
+#include <CLI/CLI.hpp>
+
+#include "core/error.h"
+
+namespace limber::cli {
+
+CLI::Validator within(double low, double high) {
+  return CLI::Validator(
+      [low, high](std::string& text) {
+        double value = 0;
+        const bool is_number = CLI::detail::lexical_cast(text, value);
+        return is_number && value >= low && value <= high
+                   ? std::string()
+                   : fmt::format("{} is no number from {} to {}", text, low, high);
+      },
+      fmt::format("FLOAT in [{:g} - {:g}]", low, high));
+}
+
+void add_global(CLI::App& command, GlobalOptions& options) {
+  command.add_flag("--json", options.json, "print one JSON document on stdout, and nothing else there");
+  command.add_flag("-q,--quiet", options.quiet, "only warnings and errors on stderr; no progress bars");
+  command.add_flag("-v,--verbose", options.verbose, "more on stderr");
+}
+
+void add_threads(CLI::App& command, GlobalOptions& options) {
+  command
+      .add_option("--threads", options.threads,
+                  "threads to use, 0 … 256; 0: as many as the machine has. Results do not depend on it")
+      ->check(CLI::Range(0, 256))
+      ->capture_default_str();
+}
+
+void add_progress(CLI::App& command, GlobalOptions& options) {
+  command
+      .add_option("--progress", options.progress,
+                  "tell what goes on, a line of JSON an event: json (on stderr, which has nothing else then) "
+                  "or a file whose name ends in .jsonl")
+      ->type_name("json|FILE.jsonl")
+      ->check(CLI::Validator(
+          [](const std::string& where) {
+            return where == "json" || where.ends_with(".jsonl") ? "" : "neither json nor a file FILE.jsonl";
+          },
+          ""));
+}
+
+CLI::Validator no_empty_list() {
+  return {
+      [](const std::string& text) { return text.empty() ? "names no frame; write for example 0-30" : ""; },
+      ""};
+}
+
+void add_edits(CLI::App& command, std::vector<std::string>& sets, std::vector<fs::path>& data) {
+  command
+      .add_option("--set", sets,
+                  "edit the scene before it is read: --set bodies.robot.material.youngs_modulus_pa=5e4")
+      ->type_name("KEY=VALUE")
+      ->allow_extra_args(false);
+  command.add_option("--data", data, "a folder in which model files of the scene are looked for first")
+      ->type_name("DIR")
+      ->check(CLI::ExistingDirectory)
+      ->allow_extra_args(false);
+}
+
+void add_store(CLI::App& command, fs::path& store, const char* otherwise) {
+  command
+      .add_option(
+          "--store", store,
+          fmt::format("folder in which prepared bodies are kept and found, shared by models, scenes and "
+                      "machines; default: LIMBER_STORE of the environment, else {}",
+                      otherwise))
+      ->type_name("DIR")
+      ->envname("LIMBER_STORE");
+}
+
+void add_scene(CLI::App& command, detail::SceneOptions& options) {
+  command
+      .add_option("SCENE", options.scene,
+                  "a scene file, or the name of a scene that comes with limber (see limber scenes)")
+      ->required();
+  add_edits(command, options.sets, options.data);
+  add_store(command, options.store, "none");
+}
+
+template <class Options>
+void add_limits(CLI::App& command, Options& options) {
+  command
+      .add_option("--iterations", options.iterations, "limit of the search, 0 … 1e9; default: the scene's")
+      ->check(within(0.0, 1e9));
+  command
+      .add_option("--time-limit", options.time_limit_s,
+                  "wall time of the search: 30, 30s, 5min or 1h; the best so far is kept; default: none")
+      ->transform(CLI::AsNumberWithUnit(std::map<std::string, double>{{"s", 1}, {"min", 60}, {"h", 3600}},
+                                        CLI::AsNumberWithUnit::DEFAULT, "s|min|h"));
+  command
+      .add_option("--in-flight", options.in_flight,
+                  "expansions computed ahead, 0 … 4096; 0: chosen from threads and lanes. The plan does not "
+                  "depend on it")
+      ->check(CLI::Range(0, 4096))
+      ->capture_default_str();
+}
+template void add_limits(CLI::App&, detail::PlanOptions&);
+template void add_limits(CLI::App&, detail::BenchOptions&);
+template void add_limits(CLI::App&, detail::RefineOptions&);
+
+}  // namespace limber::cli

@@ -1,0 +1,127 @@
+// That the tree is what a search from the scene finds.
+//
+// A search is a function of scene, bodies, settings and seed, so it is done again, and its tree must come out
+// the same, node by node. That proves more than checking each node by itself: a tree whose nodes all follow
+// from their parents may still not be the one that was searched. Nodes that came after the search (shortcuts
+// and better paths, of the iteration −1), and all nodes of a plan that was carried to finer cages, are
+// replayed one by one.
+#include "core/error.h"
+#include "core/hash.h"
+#include "core/progress.h"
+#include "core/same_bits.h"
+#include "limber/detail/verify/plan_checks.h"
+#include "plan/search.h"
+
+namespace limber::detail {
+
+namespace {
+
+bool same_nodes(const plan::Tree& a, const plan::Tree& b, int count) {
+  for (int n = 0; n < count; ++n) {
+    const auto i = std::size_t(n);
+    if (a.parents[i] != b.parents[i] || a.iterations[i] != b.iterations[i] ||
+        !same_bits(a.controls[i], b.controls[i]) || !same_bits(a.centers[n], b.centers[n]) ||
+        !same_bits(a.states[i], b.states[i]))
+      return false;
+  }
+  return true;
+}
+
+// Whether each node from `first` on is where its control leads from its parent. As many at once as the system
+// has lanes: a rollout's result does not depend on its neighbours.
+bool nodes_follow(const FemSystem& system, const plan::Tree& tree, int first) {
+  const std::unique_ptr<plan::Propagator> propagator = system.make_propagator();
+  for (int from = first; from < tree.size();) {
+    throw_if_stopped();
+    const int to = std::min(tree.size(), from + system.lanes());
+    std::vector<State> parents;
+    for (int n = from; n < to; ++n) parents.push_back(tree.states[std::size_t(tree.parents[std::size_t(n)])]);
+    std::vector<plan::Rollout> rollouts;
+    for (int n = from; n < to; ++n)
+      rollouts.push_back({&parents[std::size_t(n - from)], tree.controls[std::size_t(n)], {}, false});
+    propagator->propagate(rollouts);
+    for (int n = from; n < to; ++n) {
+      const plan::Rollout& end = rollouts[std::size_t(n - from)];
+      if (!end.ok || !same_bits(end.to, tree.states[std::size_t(n)]) ||
+          !same_bits(tree.centers[n], system.robot_center(end.to).cast<float>()))
+        return false;
+    }
+    from = to;
+  }
+  return true;
+}
+
+// Told by a search that has gone another way than the plan's: who made the file may ask for any number of
+// iterations.
+struct GoneAstray {};
+
+// With the plan's seed and as many iterations as it took, without a time limit. Counts only ever grow, so the
+// search ends as soon as one is beyond the plan's.
+plan::Plan searched_again(const FemSystem& system, plan::Settings settings, const plan::Plan& then) {
+  settings.max_iterations = then.statistics.iterations;
+  settings.time_limit_s = std::numeric_limits<double>::infinity();
+  const plan::Plan found = plan::plan(system, settings, std::nullopt, [&](const plan::SearchProgress& now) {
+    if (now.nodes > then.tree.size() || now.statistics.diverged > then.statistics.diverged ||
+        now.statistics.rejected > then.statistics.rejected ||
+        now.statistics.refused > then.statistics.refused)
+      throw GoneAstray{};
+  });
+  throw_if_stopped();
+  return found;
+}
+
+}  // namespace
+
+// The search once more, as far as the plan's went. What came after it, shortcuts and better paths, hangs on
+// its tree as nodes of no iteration. A plan that `refine` carried over comes from no search in this world: of
+// it only the start is compared, and every node is replayed.
+//
+// Of the counts, how many rollouts were computed in vain depends on the threads of then; with a lag there are
+// none.
+void check_search(const PlanFolder& planned, const FemSystem& system, const plan::Settings& settings,
+                  Promises& table) {
+  const plan::Plan& plan = planned.plan;
+  const plan::Tree& tree = plan.tree;
+  const bool carried = planned.summary.contains("refine");
+  int searched = 1;  // the start is the world's
+  bool same = same_bits(tree.states[0], system.start()) && tree.iterations[0] == -1 &&
+              same_bits(tree.controls[0], Control{}) &&
+              same_bits(tree.centers[0], system.robot_center(system.start()).cast<float>());
+  if (!carried) {
+    plan::Plan found;
+    try {
+      found = searched_again(system, settings, plan);
+    } catch (const GoneAstray&) {
+    }
+    const plan::Statistics &now = found.statistics, &then = plan.statistics;
+    const bool counted = now.iterations == then.iterations && now.diverged == then.diverged &&
+                         now.rejected == then.rejected && now.refused == then.refused &&
+                         now.rollout_steps == then.rollout_steps && then.rollouts >= then.iterations &&
+                         then.rollouts_wrong <= then.rollouts &&
+                         (settings.search_options.lag == 0 || then.rollouts_wrong == 0);
+    searched = found.tree.size();  // none where it went astray
+    const bool later = planned.summary.contains("shortcut") || planned.summary.contains("improve");
+    same = searched > 0 && searched <= tree.size() && same_nodes(found.tree, tree, searched) &&
+           found.legs.size() == plan.legs.size() && found.solved() == plan.solved();
+    for (std::size_t leg = 0; same && leg < plan.legs.size(); ++leg)
+      same = found.legs[leg].first_iteration == plan.legs[leg].first_iteration &&
+             (later || found.legs[leg].root == plan.legs[leg].root);
+    same = same && (later || (searched == tree.size() && found.best_node == plan.best_node &&
+                              hash_of(found.trajectory) == hash_of(plan.trajectory)));
+    table.row("searched again from the scene: the same tree", same,
+              fmt::format("seed {}, {} nodes", settings.seed, searched));
+    table.row("searched again from the scene: the same counts", counted,
+              fmt::format("{} iterations, {} diverged, {} rejected, {} ways refused, {} steps",
+                          now.iterations, now.diverged, now.rejected, now.refused, now.rollout_steps));
+  } else {
+    table.row("the tree starts where the world does", same, "");
+  }
+  if (!same || searched == tree.size()) return;
+  bool later = true;
+  for (int n = searched; n < tree.size() && !carried; ++n)
+    later = later && tree.iterations[std::size_t(n)] == -1;
+  table.row("each other node is where its control leads", later && nodes_follow(system, tree, searched),
+            fmt::format("{} nodes", tree.size() - searched));
+}
+
+}  // namespace limber::detail

@@ -1,0 +1,39 @@
+// What a scene's bodies and scenery are made from: the model, where the scene puts it, and all that a change
+// of which makes the meshes anew. Private to what prepares bodies (scene_world.cpp) and what compares them
+// with their scene (origin.cpp).
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "limber/detail/body/body_store.h"
+#include "scenes/scene.h"
+
+namespace limber::detail {
+
+// The lines of the scene that shape a body's meshes, as the user's text has them once more: a change of any
+// makes them anew.
+Json identity_of(const scenes::BodySpec&, const std::string& model_hash);
+// In place of a file's hash, of a model that limber makes.
+std::string hash_of_made(const SurfaceMesh& made, const Appearance&);
+
+// `body` must outlive what is returned. Throws InputError when its file is not found and no made model may
+// take its place.
+BodySource source_of(const scenes::Scene&, const scenes::BodySpec& body, std::vector<fs::path> folders);
+PrepareSettings settings_of(const scenes::BodySpec&);
+
+// scenery/NAME.ply or .json.
+fs::path scenery_file(const fs::path& work_folder, const scenes::BodySpec&, const char* extension);
+// A model that is not found loads an empty mesh: without scenery a scene is still what it is.
+BodySource source_of_scenery(const scenes::Scene&, const scenes::BodySpec&,
+                             const std::vector<fs::path>& data);
+SurfaceMesh make_scenery(const scenes::BodySpec&, const BodySource&);
+// Of a scenery's NAME.json: whether its model was found.
+bool was_found(const Json& said);
+Json hash_of_scenery(const fs::path& mesh, const Json& said);  // of the file; null where there is none
+
+// A copy of goal.shape.cage lies in the robot's folder: a scene that is read from a plan knows no folder.
+fs::path goal_cage_file(const scenes::Scene&, const fs::path& work_folder);
+bool has_goal_cage(const scenes::Scene&);
+
+}  // namespace limber::detail

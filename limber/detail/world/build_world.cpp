@@ -1,0 +1,259 @@
+// From a scene and its prepared bodies to the world that is stepped: what the scene says of each body is
+// handed to fem, which makes springs, masses and time step of it.
+//
+// What is wrong only now, when the cages are known (a box that holds no node, a shell that is not there,
+// bodies that overlap), is told with the place in the scene's text, as the reader's complaints are.
+#include <algorithm>
+#include <numbers>
+#include <set>
+
+#include "core/error.h"
+#include "core/progress.h"
+#include "limber/detail/body/write_robot.h"
+#include "limber/detail/world/body_source.h"
+#include "limber/detail/world/scene_world.h"
+#include "limber/detail/world/seen.h"
+#include "meshing/contact_shape.h"
+#include "meshing/convex_hull.h"
+#include "scenes/models.h"
+
+namespace limber::detail {
+
+namespace {
+
+// Surfaces that near push each other, as a share of the robot's size; a field is off by less than that nearly
+// everywhere.
+constexpr double usual_contact_offset = 0.005;
+
+fem::BodyKind kind_of(const scenes::BodySpec& body) {
+  if (body.kind == scenes::Kind::deformable) return fem::BodyKind::deformable;
+  return body.role == scenes::Role::obstacle ? fem::BodyKind::immovable : fem::BodyKind::rigid;
+}
+
+// [[forces]] and [[motions]] (docs/simulation.md). A body that has a motion is kinematic: it goes its way and
+// is not pushed. A force on a box of nodes must reach one that is not held.
+void set_script(const scenes::Scene& scene, const std::vector<PreparedBody>& prepared, fem::WorldSpec& spec) {
+  for (const scenes::MotionSpec& motion : scene.motions) {
+    fem::BodySpec& body = spec.bodies[std::size_t(motion.body)];
+    body.kind = fem::BodyKind::kinematic;
+    body.track.pivot_m = scene.bodies[std::size_t(motion.body)].pose.position_m;
+    for (const scenes::MotionSpec::Keyframe& k : motion.keyframes)
+      body.track.keyframes.push_back({k.at_s, k.position_m, k.angle_deg * std::numbers::pi / 180 * k.axis});
+  }
+  for (const scenes::ForceSpec& force : scene.forces) {
+    fem::ForceSpec& made =
+        spec.forces.emplace_back(fem::ForceSpec{force.body, force.from_s, force.to_s, force.force_n});
+    if (!force.box_m) continue;
+    const std::string& name = scene.bodies[std::size_t(force.body)].name;
+    made.nodes =
+        scenes::nodes_in(*force.box_m, scene.bounds_m, prepared[std::size_t(force.body)].cage.positions);
+    if (made.nodes.empty())
+      throw InputError(
+          fmt::format("{}: no node of the cage of {} is in the box of this force; enlarge or move it",
+                      force.where, name));
+    const std::vector<int>& held = spec.bodies[std::size_t(force.body)].fixed_nodes;
+    if (std::includes(held.begin(), held.end(), made.nodes.begin(), made.nodes.end()))
+      throw InputError(
+          fmt::format("{}: all nodes of {} in the box of this force are held, so it moves nothing; "
+                      "move the box, or hold fewer",
+                      force.where, name));
+  }
+}
+
+// The cage weighs what the model does, as far as that has an inside: densities are of the model, and the cage
+// is larger, so its own density is lower by the ratio of the volumes. Where the model is not closed the ratio
+// is 1.
+double share_of_the_cage(const PreparedBody& prepared) {
+  return std::min(1., mass_of(prepared).of.volume_m3 / volume(prepared.cage));
+}
+
+// What the parts of a body say, tet by tet: of a convex shell, or of a box at the start, by the middle of the
+// tet. Later parts rule.
+void set_parts(const scenes::BodySpec& body, const PreparedBody& prepared, double share, fem::BodySpec& out) {
+  if (body.parts.empty()) return;
+  const Tets& tets = prepared.cage.tets;
+  const int shells = prepared.report.at("shells").at("count").get<int>();
+  out.youngs_modulus_from_tet_pa.assign(std::size_t(tets.rows()), body.material.youngs_modulus_pa);
+  out.density_from_tet_kg_m3.assign(std::size_t(tets.rows()), out.material.density_kg_m3);
+  for (const scenes::PartSpec& part : body.parts) {
+    if (part.shell && *part.shell >= shells)
+      throw InputError(
+          fmt::format("{}: bodies.{}.parts: there is no shell {}; the body has {}, numbered from 0 (limber "
+                      "info on its folder "
+                      "shows them)",
+                      part.where, body.name, *part.shell, shells));
+    int chosen = 0;
+    for (int t = 0; t < tets.rows(); ++t) {
+      Vec3 middle = Vec3::Zero();
+      for (int i = 0; i < 4; ++i) middle += prepared.cage.positions.row(tets(t, i)).transpose() / 4;
+      const bool in_box = (middle.array() >= part.box_m.lower.array()).all() &&
+                          (middle.array() <= part.box_m.upper.array()).all();
+      if (part.shell ? prepared.shell_from_tet[std::size_t(t)] != *part.shell : !in_box) continue;
+      ++chosen;
+      if (part.youngs_modulus_pa) out.youngs_modulus_from_tet_pa[std::size_t(t)] = *part.youngs_modulus_pa;
+      if (part.density_kg_m3) out.density_from_tet_kg_m3[std::size_t(t)] = share * *part.density_kg_m3;
+    }
+    if (chosen == 0)
+      throw InputError(
+          fmt::format("{}: bodies.{}.parts: {}; {}", part.where, body.name,
+                      part.shell ? fmt::format("no tet of the cage has its middle in shell {}", *part.shell)
+                                 : std::string("no tet of the cage has its middle in that box"),
+                      part.shell ? "ask for more tets, fewer shells, or give a box_m"
+                                 : "enlarge or move it, or ask for more tets"));
+  }
+}
+
+// The rest shape, stretched along x, y and z and then turned: x ↦ R S x. Or the cage of a file, node by node.
+Points goal_shape(const scenes::Scene& scene, const PreparedBody& robot) {
+  const scenes::Goal::Shape& shape = *scene.goal.shape;
+  const Points& rest = robot.cage.positions;
+  if (has_goal_cage(scene)) {
+    if (robot.goal_shape_m.rows() != rest.rows())
+      throw InputError(
+          fmt::format("{}: goal.shape.cage has {} nodes, the robot's cage {}; deform the cage.msh of its "
+                      "folder in bodies/",
+                      shape.cage, robot.goal_shape_m.rows(), rest.rows()));
+    return robot.goal_shape_m;
+  }
+  const Eigen::Matrix3d turn =
+      Eigen::AngleAxisd(shape.angle_deg * std::numbers::pi / 180, shape.axis).toRotationMatrix();
+  return rest * (turn * shape.stretch.asDiagonal()).transpose();
+}
+
+// ---- contact ----
+
+// Of a body that is touched at its cage among others that are not: the cage is its surface.
+ContactShape shape_of_cage(const TetMesh& cage) {
+  return meshing::make_contact_shape({cage.positions, boundary_triangles(cage.tets)}, cage);
+}
+
+double hull_volume(const Points& positions) {
+  const ConvexShell hull = meshing::convex_hull(positions);
+  return volume(SurfaceMesh{hull.vertices, hull.triangles});
+}
+
+// The farthest along evenly many directions.
+Points some_extreme_points(const Points& positions) {
+  constexpr int along_an_edge = 6;  // of a cube, through whose surface the directions go
+  std::set<Eigen::Index> rows;
+  for (int i = -along_an_edge; i <= along_an_edge; ++i)
+    for (int j = -along_an_edge; j <= along_an_edge; ++j)
+      for (int axis = 0; axis < 3; ++axis) {
+        Vec3 direction;
+        direction[axis] = along_an_edge, direction[(axis + 1) % 3] = i, direction[(axis + 2) % 3] = j;
+        const Eigen::VectorXd heights = positions * direction;
+        Eigen::Index least, most;
+        heights.minCoeff(&least), heights.maxCoeff(&most);
+        rows.insert({least, most});
+      }
+  return positions(std::vector<Eigen::Index>(rows.begin(), rows.end()), Eigen::all);
+}
+
+// Whether parts of a surface can meet without folding it flat: it is far from convex. The hull of some points
+// is within that of all, and says so at once of most models.
+bool can_reach_itself(const PreparedBody& body) {
+  constexpr double convex = 0.9;  // of its hull
+  const double filled = std::abs(volume(body.surface));
+  return filled < convex * hull_volume(some_extreme_points(body.surface.positions)) ||
+         filled < convex * hull_volume(body.surface.positions);
+}
+
+// Contact at the fine surfaces, unless all bodies are touched at their cages: then shapes are left out, and
+// fem goes by the cages (docs/contact.md).
+void set_contact(const scenes::Scene& scene, const std::vector<PreparedBody>& prepared,
+                 fem::WorldSpec& spec) {
+  const bool all_cages = all_touched_at_cages(scene);
+  for (std::size_t b = 0; b < prepared.size(); ++b) {
+    throw_if_stopped();
+    const scenes::BodySpec& body = scene.bodies[b];
+    const bool on_surface = body.contact == scenes::Contact::surface && prepared[b].contact.usable;
+    spec.bodies[b].phong = !all_cages && body.deformation == scenes::Deformation::phong;
+    if (!all_cages)
+      spec.bodies[b].shape = std::make_shared<const ContactShape>(
+          on_surface ? prepared[b].contact : shape_of_cage(prepared[b].cage));
+    spec.bodies[b].self_contact =
+        body.self_contact ? *body.self_contact : on_surface && can_reach_itself(prepared[b]);
+  }
+  const Box robot = bounding_box(prepared[std::size_t(scene.robot)].surface.positions);
+  spec.contact_offset_m = contact_offset_m(scene, robot);
+  // What is promised of what is seen, less what fields may be off by.
+  if (!all_cages)
+    spec.max_overlap_m =
+        (SeenLimits{}.overlap - meshing::ContactShapeSettings{}.field_error) * robot.size().maxCoeff();
+}
+
+}  // namespace
+
+GoalRules goal_rules_of(const scenes::Scene& scene) {
+  const auto rules_of = [](const scenes::Goal& goal) {
+    GoalRules rules;
+    rules.body = goal.moves_with, rules.lost_below_m = goal.lost_below_m;
+    if (goal.shape)
+      rules.turn_tolerance_deg = goal.shape->turn_tolerance_deg,
+      rules.shape_tolerance_m = goal.shape->tolerance_m;
+    rules.above = goal.above, rules.below = goal.below, rules.clear_of = goal.clear_of;
+    return rules;
+  };
+  GoalRules rules = rules_of(scene.goal);
+  for (const scenes::Via& via : scene.via) rules.via.push_back(rules_of(via.goal));
+  return rules;
+}
+
+double contact_offset_m(const scenes::Scene& scene, const Box& robot) {
+  return scene.contact_offset_m.value_or(usual_contact_offset * robot.size().maxCoeff());
+}
+
+bool all_touched_at_cages(const scenes::Scene& scene) {
+  return std::all_of(scene.bodies.begin(), scene.bodies.end(),
+                     [](const scenes::BodySpec& body) { return body.contact == scenes::Contact::cage; });
+}
+
+// Complaints of fem name a body, not its place in the text.
+fem::World build_world(const scenes::Scene& scene, const std::vector<PreparedBody>& prepared,
+                       const std::vector<float>& start_positions) {
+  fem::WorldSpec spec;
+  for (std::size_t b = 0; b < prepared.size(); ++b) {
+    const scenes::BodySpec& body = scene.bodies[b];
+    fem::BodySpec fem_body;
+    fem_body.name = body.name;
+    fem_body.cage = prepared[b].cage;
+    const double share = share_of_the_cage(prepared[b]);
+    fem_body.material = {.model = body.material.model == "springs" ? fem::MaterialModel::springs
+                                                                   : fem::MaterialModel::neo_hookean,
+                         .youngs_modulus_pa = body.material.youngs_modulus_pa,
+                         .poisson_ratio = body.material.poisson_ratio,
+                         .density_kg_m3 = share * body.material.density_kg_m3,
+                         .damping_ratio = body.material.damping_ratio,
+                         .friction = body.material.friction,
+                         .mesh_independent = body.material.mesh_independent};
+    fem_body.fixed_nodes = scenes::fixed_nodes(body, scene.bounds_m, prepared[b].cage.positions);
+    fem_body.kind = kind_of(body);
+    fem_body.velocity_m_s = body.velocity_m_s, fem_body.angular_velocity_rad_s = body.angular_velocity_rad_s;
+    fem_body.max_volume_change = body.max_volume_change;
+    if (body.max_stretch && *body.max_stretch < scenes::any_stretch) fem_body.max_stretch = *body.max_stretch;
+    set_parts(body, prepared[b], share, fem_body);
+    spec.bodies.push_back(std::move(fem_body));
+  }
+  set_script(scene, prepared, spec);
+  set_contact(scene, prepared, spec);
+  spec.robot = scene.robot;
+  spec.bounds_m = scene.bounds_m;
+  spec.walls = scene.walls;
+  spec.gravity_m_s2 = scene.gravity_m_s2;
+  spec.rest_speed_m_s = scene.rest_speed_m_s;
+  if (scene.goal.shape) spec.goal_shape_m = goal_shape(scene, prepared[std::size_t(scene.robot)]);
+  spec.max_dt_s = scene.max_dt_s.value_or(0);
+  spec.part_overlaps = scene.part_overlaps;
+  spec.start_positions = start_positions;
+  try {
+    return fem::build_world(spec);
+  } catch (const InputError& error) {
+    for (const scenes::BodySpec& body : scene.bodies)  // the first that is named has the place
+      if (fmt::format(" {} ", error.what()).find(fmt::format(" {} ", body.name)) != std::string::npos ||
+          std::string_view(error.what()).find(fmt::format("body {}:", body.name)) != std::string_view::npos)
+        throw InputError(fmt::format("{}: {}", body.where, error.what()));
+    throw InputError(fmt::format("scene {}: {}", scene.name, error.what()));
+  }
+}
+
+}  // namespace limber::detail

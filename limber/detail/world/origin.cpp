@@ -1,0 +1,127 @@
+// Whether bodies, scenery and the goal's shape that lie in a work folder are those of the scene: what limber
+// verify asks. Models are read, or made, and placed again, and the meshes compared.
+//
+// Where the model's file is not here, or holds something else than the body was made from, nothing is said of
+// the surface: that proves nothing either way. What the report says of pose, cage and settings is compared in
+// every case. docs/verify.md, "Of each body".
+#include <algorithm>
+
+#include "core/error.h"
+#include "core/hash.h"
+#include "core/mesh_files.h"
+#include "limber/detail/world/body_source.h"
+#include "limber/detail/world/scene_world.h"
+#include "scenes/library.h"
+#include "scenes/models.h"
+
+namespace limber::detail {
+
+namespace {
+
+// Triangle for triangle, but for the rounding of other machines.
+bool same_surface(const SurfaceMesh& a, const SurfaceMesh& b) {
+  return a.positions.rows() == b.positions.rows() && a.triangles.rows() == b.triangles.rows() &&
+         a.triangles == b.triangles &&
+         (a.positions.rows() == 0 || (a.positions - b.positions).rowwise().norm().maxCoeff() <=
+                                         1e-9 * bounding_box(a.positions).diagonal());
+}
+
+// Coordinates and colours within a millionth, as files keep them with fewer digits; images byte for byte.
+bool same_appearance(const Appearance& a, const Appearance& b) {
+  const auto near = [](const auto& one, const auto& other) {
+    return one.rows() == other.rows() &&
+           (one.rows() == 0 || (one - other).cwiseAbs().maxCoeff() <= 1e-6 * (1 + one.cwiseAbs().maxCoeff()));
+  };
+  return near(a.uv, b.uv) && near(a.colors, b.colors) &&
+         a.material_from_triangle == b.material_from_triangle &&
+         std::equal(a.materials.begin(), a.materials.end(), b.materials.begin(), b.materials.end(),
+                    [&](const SurfaceMaterial& one, const SurfaceMaterial& other) {
+                      return one.name == other.name && near(one.color, other.color) &&
+                             one.image == other.image && one.normal_image == other.normal_image;
+                    }) &&
+         std::equal(a.images.begin(), a.images.end(), b.images.begin(), b.images.end(),
+                    [](const ImageFile& one, const ImageFile& other) {
+                      return one.name == other.name && one.bytes == other.bytes;
+                    });
+}
+
+std::vector<fs::path> with(std::vector<fs::path> folders, const fs::path& last) {
+  folders.push_back(last);
+  return folders;
+}
+
+}  // namespace
+
+GoalCage goal_cage_of(const scenes::Scene& scene, const std::vector<fs::path>& data,
+                      const std::vector<PreparedBody>& bodies) {
+  if (!has_goal_cage(scene)) return GoalCage::none_asked;
+  const std::optional<fs::path> file = find_goal_cage(scene, data);
+  if (!file) return GoalCage::not_here;
+  const Points asked = read_msh(*file).positions, &there = bodies[std::size_t(scene.robot)].goal_shape_m;
+  return asked.rows() == there.rows() && asked == there ? GoalCage::same : GoalCage::another;
+}
+
+Origin origin_of_scenery(const scenes::Scene& scene, const scenes::BodySpec& body,
+                         const std::vector<fs::path>& data, const fs::path& work_folder) {
+  Origin origin;
+  const fs::path mesh = scenery_file(work_folder, body, ".ply");
+  const Json said = read_json(scenery_file(work_folder, body, ".json"));
+  if (!was_found(said)) {
+    // Only a file is ever not found.
+    const auto* file = std::get_if<scenes::FileModel>(&body.model);
+    origin.placed_so = file && file->made.empty() &&
+                       said == Json{{"version", said.value("version", "")},
+                                    {"input", {{"triangles", body.triangles}}},
+                                    {"hash", Json()}} &&
+                       !fs::exists(mesh);
+    return origin;
+  }
+  try {
+    Json identity = identity_of(body, said.at("input").at("model").at("source").get<std::string>());
+    identity["triangles"] = body.triangles;
+    origin.placed_so = said.at("input") == identity && said.at("hash") == hash_of_scenery(mesh, said);
+    if (const auto* file = std::get_if<scenes::FileModel>(&body.model);
+        file && !scenes::find_model(file->file, with(data, scene.folder)))
+      return origin;
+    const BodySource found = source_of_scenery(scene, body, data);
+    if (found.identity == said.at("input"))
+      origin.same_surface = same_surface(make_scenery(body, found), read_ply(mesh));
+  } catch (const Json::exception&) {
+    origin.placed_so = false;
+  }
+  return origin;
+}
+
+// Where the file is not found, the body may have been made from the made model that takes its place: the hash
+// tells.
+Origin origin_of(const scenes::Scene& scene, const scenes::BodySpec& body, const std::vector<fs::path>& data,
+                 const PreparedBody& prepared) {
+  const Json& said = prepared.report.at("input");
+  Origin origin;
+  if (!prepared.appearance.empty()) origin.appearance = Appearing::not_here;
+  try {
+    const std::string source = said.at("model").at("model").at("source").get<std::string>();
+    origin.placed_so = said == input_of(identity_of(body, source), settings_of(body));
+    const auto* file = std::get_if<scenes::FileModel>(&body.model);
+    if (file && !scenes::find_model(file->file, with(data, scene.folder))) {
+      const std::optional<SurfaceMesh> made = scenes::made_surface(body);
+      if (!made || source != hash_of_made(*made, scenes::made_appearance(body, *made))) return origin;
+    }
+    const BodySource found = source_of(scene, body, data);
+    // A file may have changed, or another of its name lie here.
+    if (file && found.identity.at("model").at("source") != source) return origin;
+    meshing::ImportedModel model = found.load();
+    make_model_of_body(model, settings_of(body));
+    origin.same_surface = same_surface(model.surface, prepared.surface);
+    if (!model.appearance.empty() || !prepared.appearance.empty())
+      origin.appearance = *origin.same_surface && same_appearance(model.appearance, prepared.appearance)
+                              ? Appearing::same
+                              : Appearing::another;
+    origin.made_cage = found.made_cage();
+  } catch (const Json::exception&) {
+    origin.placed_so = false;
+  }
+  return origin;
+}
+
+}  // namespace limber::detail
