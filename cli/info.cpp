@@ -46,7 +46,7 @@ std::string text_of_body(const Json& body) {
   return text;
 }
 
-std::string text_of(const detail::FileFacts& file) {
+std::string text_of_facts(const detail::FileFacts& file) {
   switch (file.kind) {
     case detail::FileFacts::scene:
       return text_of_scene(file.facts);
@@ -64,7 +64,7 @@ std::string text_of(const detail::FileFacts& file) {
 
 Outcome info(const fs::path& path) {
   const detail::FileFacts file = detail::facts_of_file(path);
-  return {exit_done, file.facts, text_of(file)};
+  return {exit_done, file.facts, text_of_facts(file)};
 }
 
 Outcome list_scenes() {

@@ -194,6 +194,22 @@ TEST_F(Filmed_slow, AFrameWithoutItsPassIsNotWhole) {
   EXPECT_EQ(limber_program(words).json().at("painted"), 1);
 }
 
+// The key light comes from over the shoulder of whoever films the first frame: where that is moved, all is
+// lit otherwise, though the other frames' cameras stay.
+TEST_F(Filmed_slow, WhoMovesTheFirstCameraPaintsAllFramesAnew) {
+  const auto painted = [&](const std::string& eye) {
+    return limber_program({"render", out(), "--resume", "--json", "--as", "moved", "--set",
+                           "camera.keyframes=[{ at = 0, eye_m = " + eye +
+                               ", target_m = [2, 1, 1] }, { at = 0.01, eye_m = [0, -5, 2], target_m = [2, 1, "
+                               "1] }, { at = 1, eye_m = [0, -5, 2], target_m = [2, 1, 1] }]"})
+        .json()
+        .at("painted");
+  };
+  ASSERT_EQ(painted("[0, -5, 2]"), frames);
+  EXPECT_EQ(painted("[0, -5, 2]"), 0);
+  EXPECT_EQ(painted("[-3, -4, 2]"), frames);
+}
+
 class SlowMotion_slow : public Filmed {
   std::string text() const override {
     std::string edited = replaced("frames_per_second = 5\n", "frames_per_second = 5\nspeed = 0.5\n");

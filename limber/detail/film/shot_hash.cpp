@@ -27,6 +27,9 @@ std::uint64_t Shot::hash_of_look() const {
   if (film.background_srgb) hasher.matrix(*film.background_srgb);
   hasher.matrix(look_.stage.lower).matrix(look_.stage.upper).matrix(scene_.bounds_m.lower);
   hasher.matrix(scene_.bounds_m.upper);
+  // These follow from the camera of the first frame, or of all: a frame's own camera does not tell them.
+  hasher.matrix(look_.toward_key).value(int(words_.corner)).value(scale_m_);
+  if (!output_.passes.empty()) hasher.value(near_m_).value(far_m_);
   for (const bool flag : {film.bounds_lines, film.transparent, film.clock, film.cages, film.forces, film.path,
                           film.tree, film.side_by_side, film.scale_bar})
     hasher.value(int(flag));
