@@ -21,7 +21,7 @@ double solid_angle_share(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3
 class WindingNumber {
  public:
   WindingNumber(const Points& positions, const Triangles&);  // copies what it needs
-  // Within 1e-2 of exact, 1e-3 on average (measured: docs/decomposition.md). Safe to call from many threads.
+  // Within 1e-2 of exact, 2e-3 on average (docs/decomposition-measured.md). Safe to call from many threads.
   double at(const Vec3& point) const;
   bool inside(const Vec3& point) const { return at(point) > 0.5; }
 

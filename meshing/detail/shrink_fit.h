@@ -1,5 +1,5 @@
 // Draws the boundary of a cage towards the surface that it holds, and never lets the surface out
-// (docs/cage.md, step 7).
+// (docs/cage.md, step 8).
 #pragma once
 
 #include "meshing/quality.h"
