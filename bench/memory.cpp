@@ -1,4 +1,5 @@
-// What a tree of many full states takes, in memory and as a file: the figures of docs/planning.md, "Memory".
+// What a tree of many full states takes, in memory and as a file: the figures of docs/planning-measured.md,
+// "Memory".
 //
 //   memory_bench [nodes] [vertices] [moving vertices]
 //

@@ -1,5 +1,5 @@
 // What a rigid body costs beside the same body soft, what a long spin keeps, and how deep a thrown cube goes:
-// the figures of docs/dynamics.md, "Rigid bodies".
+// the figures of docs/dynamics-measured.md, "Rigid bodies".
 #include <fmt/format.h>
 
 #include <algorithm>

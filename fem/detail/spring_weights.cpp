@@ -41,7 +41,7 @@ Cubic cubic(const Vec3& n) {
 // How much a spring's distance from the even share counts beside anisotropy: the fit alone leaves freedom.
 constexpr double pull_to_even_share = 0.02;
 // How much more an unbalanced pull counts than anisotropy, and how little the nodes at the surface count,
-// whose springs cannot be isotropic. Figures of other choices: docs/dynamics.md.
+// whose springs cannot be isotropic. Figures of other choices: docs/dynamics-measured.md.
 constexpr double balance = 5, weight_at_surface = 0.1;
 constexpr int sweeps = 100;
 

@@ -1,5 +1,5 @@
 // Controls: that a scene is solved means something only where it would not be solved otherwise. The figures
-// of thirty seeds are in docs/planning.md.
+// of thirty seeds are in docs/planning-measured.md.
 #include <algorithm>
 
 #include "limber/detail/plan/plan.h"

@@ -236,7 +236,7 @@ TEST(SearchOptions, AHopelessPushIsShorter) {
   EXPECT_NEAR(p.tree.centers[1].x(), 4.8, 1e-6);
 }
 
-// The law whose worth the table of docs/planning.md shows, on a point before a wall with a gap.
+// The law whose worth the table of docs/planning-measured.md shows, on a point before a wall with a gap.
 TEST(Laws_slow, GuidanceFindsTheGapSooner) {
   Toy toy(1, true, false, 99);
   std::int64_t with = 0, without = 0;
