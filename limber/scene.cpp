@@ -2,6 +2,7 @@
 
 #include <atomic>
 #include <climits>
+#include <limits>
 
 #include "core/error.h"
 #include "core/hash.h"
@@ -14,6 +15,8 @@
 #include "limber/detail/interface/body.h"
 #include "limber/detail/interface/problem.h"
 #include "limber/detail/interface/working_for.h"
+#include "plan/control_rollout.h"
+#include "plan/settings.h"
 #include "plan/simulation.h"
 #include "scenes/library.h"
 
@@ -66,6 +69,9 @@ void append(States& states, const State& state, bool sound) {
   states.sound.push_back(sound);
 }
 
+constexpr std::int64_t largest_exact = std::int64_t{1}
+                                       << 53;  // of a double, in which scenes and JSON have it
+
 void require_states(const States& states, int nodes) {
   const std::size_t count = std::size_t(std::max(states.count, 0)), numbers = count * std::size_t(nodes) * 3;
   if (states.count < 0 || states.nodes != nodes || states.steps.size() != count ||
@@ -75,6 +81,10 @@ void require_states(const States& states, int nodes) {
         "{} nodes, one step, and three positions and velocities a node",
         states.count, states.nodes, states.steps.size(), states.positions.size(), states.velocities.size(),
         nodes));
+  for (std::size_t i = 0; i < count; ++i)
+    if (states.steps[i] < 0 || states.steps[i] > largest_exact)
+      throw InputError(
+          fmt::format("state {}: its step is {}; it must be in [0, {}]", i, states.steps[i], largest_exact));
   for (const auto* all : {&states.positions, &states.velocities})
     for (const float x : *all)
       if (!std::isfinite(x)) throw InputError("states: a position or a velocity is not finite");
@@ -230,7 +240,11 @@ States Problem::rollout(const States& states, const std::vector<Push>& pushes, c
     throw_if_stopped();
     States ends;
     ends.nodes = nodes();
-    for (const plan::Rollout& rollout : rollouts) append(ends, rollout.to, rollout.ok);
+    for (std::size_t i = 0; i < rollouts.size(); ++i) {
+      const bool was_sound =
+          i >= states.sound.size() || states.sound[i];  // who makes states may leave it out
+      append(ends, rollouts[i].to, was_sound && rollouts[i].ok);
+    }
     return ends;
   });
 }
@@ -245,7 +259,25 @@ std::vector<std::array<double, 3>> Problem::robot_centers(const States& states) 
   return centers;
 }
 
+namespace {
+
+// Before the search, which would be lost. The ranges are the command's.
+void validate(const SolveOptions& options) {
+  const auto require = []<class Number>(const char* name, Number value, Number upper) {
+    if (!(value >= 0 && value <= upper))
+      throw InputError(fmt::format("{} is {}; it must be in [0, {}]", name, value, upper));
+  };
+  if (options.seed) require("seed", *options.seed, largest_exact);
+  if (options.iterations) require("iterations", *options.iterations, plan::most_iterations);
+  require("time_limit_s", options.time_limit_s, std::numeric_limits<double>::infinity());
+  if (options.shortcut_rounds) require("shortcut_rounds", *options.shortcut_rounds, 100'000);
+  plan::cost_kind_from(options.cost);
+}
+
+}  // namespace
+
 Plan Problem::solve(const SolveOptions& options, const Context& context) const {
+  validate(options);
   return working_for(context, [&] {
     detail::PlanOptions command;
     command.seed = options.seed, command.iterations = options.iterations;

@@ -44,7 +44,8 @@ struct States {
   int count = 0, nodes = 0;
   std::vector<std::int64_t> steps;           // (count) time = step × World's dt_s
   std::vector<float> positions, velocities;  // (count × nodes × 3), metres, metres a second
-  std::vector<std::uint8_t> sound;           // (count) 0: the dynamics diverged there; else 1
+  // (count) 0: the dynamics diverged, in this rollout or one before, and the state means nothing; else 1.
+  std::vector<std::uint8_t> sound;
 };
 
 // One push of the robot, held for `steps`. docs/planning.md.

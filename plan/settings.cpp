@@ -122,9 +122,10 @@ Settings settings_of_leg(const Settings& settings, int leg) {
 
 void validate(const Settings& s) {
   describe(s, [](const char* name, const auto& value, const Range& range) {
-    if constexpr (requires { double(value); }) require_in(range, double(value), name_of(name));
+    require_in(range, double(value), name_of(name));  // flags and choices have a range that holds them all
   });
-  require_in(at_least_zero, std::min(s.time_limit_s, 1e300), "time_limit_s");  // may be without end
+  if (s.time_limit_s != std::numeric_limits<double>::infinity())
+    require_in(at_least_zero, s.time_limit_s, "time_limit_s");
   validate_goal(s.goal, "the goal");
   for (std::size_t i = 0; i < s.via.size(); ++i) validate_goal(s.via[i].goal, fmt::format("via {}", i + 1));
   const double elsewhere = s.weights.body + s.weights.control_point;

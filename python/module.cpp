@@ -196,8 +196,10 @@ py::tuple tuple_of(limber::States states) {
 
 using Floats = py::array_t<float, py::array::c_style | py::array::forcecast>;
 using Steps = py::array_t<std::int64_t, py::array::c_style | py::array::forcecast>;
+using Flags = py::array_t<bool, py::array::c_style | py::array::forcecast>;
 
-limber::States states_of(const Floats& positions, const Floats& velocities, const Steps& steps) {
+limber::States states_of(const Floats& positions, const Floats& velocities, const Steps& steps,
+                         const Flags& sound) {
   const auto require = [](bool holds, const std::string& text) {
     if (!holds) throw limber::InputError("states: " + text);
   };
@@ -206,12 +208,13 @@ limber::States states_of(const Floats& positions, const Floats& velocities, cons
               velocities.shape(1) == positions.shape(1) && velocities.shape(2) == 3,
           "velocities must have the shape of positions");
   require(steps.ndim() == 1 && steps.shape(0) == positions.shape(0), "steps must have the shape (b,)");
+  require(sound.ndim() == 1 && sound.shape(0) == positions.shape(0), "sound must have the shape (b,)");
   limber::States states;
   states.count = int(positions.shape(0)), states.nodes = int(positions.shape(1));
   states.positions.assign(positions.data(), positions.data() + positions.size());
   states.velocities.assign(velocities.data(), velocities.data() + velocities.size());
   states.steps.assign(steps.data(), steps.data() + steps.size());
-  states.sound.assign(std::size_t(states.count), 1);
+  states.sound.assign(sound.data(), sound.data() + sound.size());
   return states;
 }
 
@@ -457,21 +460,21 @@ PYBIND11_MODULE(_limber, m) {
       .def(
           "rollout",
           [](const limber::Problem& self, const Floats& positions, const Floats& velocities,
-             const Steps& steps, const py::array& pushes, int threads) {
-            const limber::States states = states_of(positions, velocities, steps);
+             const Steps& steps, const Flags& sound, const py::array& pushes, int threads) {
+            const limber::States states = states_of(positions, velocities, steps, sound);
             const std::vector<limber::Push> each = pushes_of(pushes);
             return tuple_of(call(py::none(), threads, [&](const limber::Context& context) {
               return self.rollout(states, each, context);
             }));
           },
-          "positions"_a, "velocities"_a, "steps"_a, "pushes"_a, py::kw_only(), "threads"_a)
+          "positions"_a, "velocities"_a, "steps"_a, "sound"_a, "pushes"_a, py::kw_only(), "threads"_a)
       .def(
           "robot_centers",
           [](const limber::Problem& self, const Floats& positions, const Floats& velocities,
-             const Steps& steps) {
-            return owned(self.robot_centers(states_of(positions, velocities, steps)));
+             const Steps& steps, const Flags& sound) {
+            return owned(self.robot_centers(states_of(positions, velocities, steps, sound)));
           },
-          "positions"_a, "velocities"_a, "steps"_a)
+          "positions"_a, "velocities"_a, "steps"_a, "sound"_a)
       .def(
           "plan",
           [](const limber::Problem& self, const std::optional<std::int64_t>& seed,

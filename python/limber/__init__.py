@@ -282,7 +282,7 @@ class States(NamedTuple):
     positions: np.ndarray   # (B, N, 3) float32, metres
     velocities: np.ndarray  # (B, N, 3) float32, metres a second
     steps: np.ndarray       # (B,) int64
-    sound: np.ndarray       # (B,) bool; False: the dynamics diverged on the way there
+    sound: np.ndarray       # (B,) bool; False: the dynamics diverged, now or before, and the state means nothing
 
 
 _kinds = ("none", "body", "control_point", "interpolation", "hold")
@@ -335,12 +335,12 @@ class World:
 
     def rollout(self, states: States, pushes: np.ndarray, *, threads: int = 0) -> States:
         """Where each state is led by the push of its row. A result depends on its state and push alone."""
-        return States(*self._world.rollout(states.positions, states.velocities, states.steps, pushes,
+        return States(*self._world.rollout(states.positions, states.velocities, states.steps, states.sound, pushes,
                                            threads=threads))
 
     def robot_centers(self, states: States) -> np.ndarray:
         """(B, 3) centres of mass of the robot, metres."""
-        return self._world.robot_centers(states.positions, states.velocities, states.steps)
+        return self._world.robot_centers(states.positions, states.velocities, states.steps, states.sound)
 
     def plan(self, *, seed: Optional[int] = None, iterations: Optional[int] = None,
              time_limit: float = float("inf"), shortcut: Optional[int] = None, cost: str = "duration",

@@ -240,7 +240,48 @@ TEST_F(Library_slow, RolloutsOfWhatDoesNotFitAreRefused) {
                 problem.rollout(odd, {{.steps = 1}, {.steps = 1}});
               }),
               HasSubstr("not finite"));
+  odd = start;
+  odd.steps[1] = -1;
+  EXPECT_THAT(complaint([&] {
+                problem.rollout(odd, {{.steps = 1}, {.steps = 1}});
+              }),
+              HasSubstr("state 1: its step is -1"));
+  odd = start;
+  odd.steps[0] = std::int64_t{1} << 60;
+  EXPECT_THAT(complaint([&] { problem.rollout(odd, {{.steps = 1}, {.steps = 1}}); }), HasSubstr("state 0"));
   EXPECT_EQ(problem.rollout(problem.start(0), {}).count, 0);
+}
+
+TEST_F(Library_slow, WhatHasDivergedStaysSo) {
+  const Problem problem = small_problem();
+  const Push too_hard{.kind = Push::Kind::body, .force_n = {1e30f, 0, 0}, .steps = 5}, rest{.steps = 5};
+  States states = problem.rollout(problem.start(2), {too_hard, rest});
+  EXPECT_THAT(states.sound, testing::ElementsAre(0, 1));
+  states = problem.rollout(states, {rest, rest});
+  EXPECT_THAT(states.sound, testing::ElementsAre(0, 1));
+}
+
+// Each as the command refuses it, before anything is searched: an hour of search would be lost.
+TEST_F(Library_slow, OptionsOutOfRangeAreRefusedBeforeTheSearch) {
+  struct Searching final : Watcher {
+    bool searched = false;
+    void progress(const std::string&, std::int64_t, std::int64_t, const std::string&) override {
+      searched = true;
+    }
+  };
+  const Problem problem = small_problem();
+  const auto refused = [&](const SolveOptions& options) {
+    Searching watcher;
+    const std::string what = complaint([&] { problem.solve(options, {.watcher = &watcher}); });
+    EXPECT_FALSE(watcher.searched) << what;
+    return what;
+  };
+  EXPECT_THAT(refused({.seed = -1}), HasSubstr("seed is -1"));
+  EXPECT_THAT(refused({.seed = (std::int64_t{1} << 53) + 1}), HasSubstr("seed is"));
+  EXPECT_THAT(refused({.iterations = -1}), HasSubstr("iterations is -1"));
+  EXPECT_THAT(refused({.time_limit_s = NAN}), HasSubstr("time_limit_s is nan"));
+  EXPECT_THAT(refused({.shortcut_rounds = -1}), HasSubstr("shortcut_rounds is -1"));
+  EXPECT_THAT(refused({.cost = "length"}), HasSubstr("there is no cost \"length\""));
 }
 
 // Stops after so many questions, and remembers what it was told.

@@ -183,6 +183,13 @@ class Scenes(unittest.TestCase):
         for i in (0, 17, 39):
             alone = world.rollout(world.start(), pushes[i:i + 1])
             np.testing.assert_array_equal(alone.positions[0], ends.positions[i])
+        shoved = world.rollout(world.start(2), limber.pushes(2, force_n=[[1e30, 0, 0], [0, 0, 0]], steps=5))
+        np.testing.assert_array_equal(shoved.sound, [False, True])
+        np.testing.assert_array_equal(world.rollout(shoved, limber.pushes(2, steps=2)).sound, [False, True])
+        with self.assertRaisesRegex(limber.InputError, "state 0: its step is -1"):
+            world.rollout(shoved._replace(steps=[-1, 5]), limber.pushes(2, steps=2))
+        with self.assertRaisesRegex(limber.InputError, "sound must have the shape"):
+            world.rollout(shoved._replace(sound=[True]), limber.pushes(2, steps=2))
         with self.assertRaisesRegex(limber.InputError, "40 pushes for 1 states"):
             world.rollout(world.start(), pushes)
         with self.assertRaisesRegex(limber.InputError, "push_dtype"):
