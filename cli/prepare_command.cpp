@@ -56,8 +56,8 @@ void DescribedCommands::add_prepare_command() {
       "--exact", prepare_options.exact,
       "shells are the exact convex parts of a closed model of at most 2000 triangles, as many "
       "as it takes; --shells and --concavity do not count");
-  prepare_command.add_option("--tets", prepare_options.tets, "tets of the cage, about; 60 … 200000")
-      ->check(CLI::Range(60, 200000))
+  prepare_command.add_option("--tets", prepare_options.tets, "tets of the cage, about; 24 … 200000")
+      ->check(CLI::Range(24, 200000))
       ->capture_default_str();
   prepare_command
       .add_option(

@@ -7,7 +7,9 @@
 namespace limber {
 
 Interrupted::Interrupted(int number)
-    : std::runtime_error(number == SIGTERM ? "stopped by SIGTERM" : "stopped by Ctrl-C"),
+    : std::runtime_error(number == SIGTERM  ? "stopped by SIGTERM"
+                         : number == SIGINT ? "stopped by Ctrl-C"
+                                            : "stopped, as the watcher asked"),
       signal_number(number) {}
 
 namespace detail {

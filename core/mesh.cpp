@@ -54,8 +54,9 @@ void validate(const TetMesh& mesh, std::string_view what) {
     const double volume = signed_volume(p(0), p(1), p(2), p(3));
     if (!(volume > 0))
       throw InputError(
-          fmt::format("{}: tet {} (vertices {} {} {} {}) has volume {:.3e}; swap two of its vertices", what,
-                      t, mesh.tets(t, 0), mesh.tets(t, 1), mesh.tets(t, 2), mesh.tets(t, 3), volume));
+          fmt::format("{}: tet {} (vertices {} {} {} {}) has volume {:.3e}; {}", what, t, mesh.tets(t, 0),
+                      mesh.tets(t, 1), mesh.tets(t, 2), mesh.tets(t, 3), volume,
+                      volume < 0 ? "swap two of its vertices" : "its corners lie in a plane: leave it out"));
   }
 }
 

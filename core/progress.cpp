@@ -95,7 +95,7 @@ void install_stop_signals() {
 }
 
 int stop_signal() {
-  if (Job* const job = current_job()) return job->stopped() ? SIGINT : 0;
+  if (Job* const job = current_job()) return job->stopped() ? Interrupted::by_watcher : 0;
   return arrived_signal.load(std::memory_order_relaxed);
 }
 void request_stop(int number) { arrived_signal = number; }

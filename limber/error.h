@@ -21,7 +21,8 @@ struct LIMBER_API DiskError : std::runtime_error {
 // A signal arrived, or a Watcher said stop; what was finished is kept.
 struct LIMBER_API Interrupted : std::runtime_error {
   explicit Interrupted(int signal_number);
-  int signal_number;
+  int signal_number;  // as of <csignal>; by_watcher: no signal
+  static constexpr int by_watcher = -1;
 };
 
 // A defect of ours.

@@ -31,17 +31,33 @@ void require_mode(const std::string& mode) {
       fmt::format("mode is \"{}\"; it must be one of \"lattice\", \"fast\", \"paper\", \"conform\"", mode));
 }
 
+// Before anything is read or made. The ranges are the command's.
+void require_in_range(const detail::PrepareSettings& s) {
+  const auto require = []<class Number>(const char* name, Number value, Number lower, Number upper) {
+    if (!(value >= lower && value <= upper))
+      throw InputError(fmt::format("{} is {}; it must be in [{}, {}]", name, value, lower, upper));
+  };
+  require("the count of hulls", s.shells, 1, 1000);
+  require("concavity", s.concavity, 0.0, 1.0);
+  require("threshold", s.threshold, 0.0, 1.0);
+  require("inflate", s.inflate, 0.0, 1.0);
+  require("max_hull_vertices", s.corners, 8, 10'000);
+  require("tets", s.tets, 24, 200'000);
+  require_mode(s.mode);
+}
+
 detail::PrepareSettings settings_of(const PrepareOptions& o) {
-  require_mode(o.mode);
-  return {.shells = o.shells,
-          .concavity = o.concavity,
-          .threshold = o.threshold,
-          .inflate = o.inflate,
-          .exact = o.exact,
-          .tets = o.tets,
-          .mode = o.mode,
-          .corners = o.max_hull_vertices,
-          .only = {}};
+  const detail::PrepareSettings settings{.shells = o.shells,
+                                         .concavity = o.concavity,
+                                         .threshold = o.threshold,
+                                         .inflate = o.inflate,
+                                         .exact = o.exact,
+                                         .tets = o.tets,
+                                         .mode = o.mode,
+                                         .corners = o.max_hull_vertices,
+                                         .only = {}};
+  require_in_range(settings);
+  return settings;
 }
 
 Cage cage_of(const TetMesh& mesh, const std::vector<int>& hull_from_tet) {
@@ -65,9 +81,8 @@ ImportedMesh imported(const meshing::ImportedModel& model) {
   return {mesh_of(model.surface), model.mended, model.warnings};
 }
 
-Body body_of(const detail::BodySource& source, const PrepareOptions& options) {
+Body body_of(const detail::BodySource& source, const detail::PrepareSettings& settings) {
   auto impl = std::make_shared<Body::Impl>();
-  const detail::PrepareSettings settings = settings_of(options);
   detail::WholeBody whole = detail::make_body(source, settings, [](const char*) {});
   impl->surface = mesh_of(whole.model.surface);
   for (const ConvexShell& shell : whole.made.decomposition.shells) impl->hulls.push_back(mesh_of(shell));
@@ -107,15 +122,16 @@ ImportedMesh clean(const Mesh& mesh, const Context& context) {
 
 Decomposition decompose(const Mesh& mesh, const DecomposeOptions& options, const Context& context) {
   return working_for(context, [&] {
+    const detail::PrepareSettings settings{.shells = options.max_convex_hull,
+                                           .concavity = options.concavity,
+                                           .threshold = options.threshold,
+                                           .inflate = options.inflate,
+                                           .exact = options.exact,
+                                           .corners = options.max_hull_vertices,
+                                           .only = {}};
+    require_in_range(settings);
     require_mesh(mesh, "mesh");
-    const meshing::Decomposition made =
-        detail::make_shells(surface_of(mesh), {.shells = options.max_convex_hull,
-                                               .concavity = options.concavity,
-                                               .threshold = options.threshold,
-                                               .inflate = options.inflate,
-                                               .exact = options.exact,
-                                               .corners = options.max_hull_vertices,
-                                               .only = {}});
+    const meshing::Decomposition made = detail::make_shells(surface_of(mesh), settings);
     Decomposition d;
     for (const ConvexShell& shell : made.shells) d.hulls.push_back(mesh_of(shell));
     d.neighbours = made.neighbours;
@@ -129,12 +145,12 @@ Decomposition decompose(const Mesh& mesh, const DecomposeOptions& options, const
 Cage build_cage(const Mesh& mesh, const std::vector<Mesh>& hulls, const CageOptions& options,
                 const Context& context) {
   return working_for(context, [&] {
-    require_mode(options.mode);
+    const detail::PrepareSettings settings{.tets = options.tets, .mode = options.mode, .only = {}};
+    require_in_range(settings);
     require_mesh(mesh, "mesh");
     const std::vector<ConvexShell> shells = detail::shells_of(hulls);
     for (std::size_t h = 0; h < shells.size(); ++h) validate(shells[h], fmt::format("hull {}", h));
-    const meshing::Cage made = detail::make_cage(
-        surface_of(mesh), shells, {.tets = options.tets, .mode = options.mode, .only = {}}, std::nullopt);
+    const meshing::Cage made = detail::make_cage(surface_of(mesh), shells, settings, std::nullopt);
     Cage cage = cage_of(made.mesh, made.shell_from_tet);
     cage.volume_ratio = made.volume_ratio;
     cage.notes = made.notes;
@@ -253,21 +269,23 @@ Body Body::load(const std::filesystem::path& folder) {
 
 Body prepare(const Mesh& mesh, const PrepareOptions& options, const Context& context) {
   return working_for(context, [&] {
+    const detail::PrepareSettings settings = settings_of(options);
     const SurfaceMesh surface = surface_of(mesh);
     detail::BodySource source;
     source.model = "mesh";
     source.identity = {{"mesh_hash", hex(hash_of(surface))}};
     source.load = [surface] { return meshing::clean(surface); };
-    return body_of(source, options);
+    return body_of(source, settings);
   });
 }
 
 Body prepare(const std::filesystem::path& model, const PrepareOptions& options, const ImportOptions& import,
              const Context& context) {
   return working_for(context, [&] {
+    const detail::PrepareSettings settings = settings_of(options);
     detail::PrepareOptions command;
     command.model = model, command.scale = import.scale, command.y_up = import.y_up;
-    return body_of(detail::source_of(command, model), options);
+    return body_of(detail::source_of(command, model), settings);
   });
 }
 

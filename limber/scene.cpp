@@ -37,9 +37,12 @@ std::vector<std::string> Scene::bodies() const {
 Scene read_scene(const std::string& file_or_name, const SceneOptions& options) {
   std::vector<std::string> sets = options.sets;
   if (!options.preset.empty()) sets.push_back("planner.preset=" + options.preset);
+  for (const std::filesystem::path& folder : options.data)
+    if (!std::filesystem::is_directory(folder))
+      throw InputError(fmt::format("data: {} is no folder", folder.string()));
   return working_for({}, [&] {
     return Scene(std::make_shared<Scene::Impl>(
-        scenes::read_scene_file(scenes::find_scene(file_or_name), sets), options.data));
+        Scene::Impl{scenes::read_scene_file(scenes::find_scene(file_or_name), sets), options.data}));
   });
 }
 
@@ -152,7 +155,7 @@ Problem::Impl::Impl(const Scene& of, const std::filesystem::path& work_folder)
 
 Problem::Impl::Impl(const detail::PlanFolder& planned, const std::filesystem::path& of_plan)
     : Impl(
-          Scene(std::make_shared<Scene::Impl>(planned.scene, std::vector<std::filesystem::path>{})), of_plan,
+          Scene(std::make_shared<Scene::Impl>(Scene::Impl{planned.scene, {}})), of_plan,
           [](const Scene::Impl& of, const std::filesystem::path& in) {
             return detail::read_bodies(of.scene, in);
           },
@@ -177,7 +180,12 @@ Problem::Range Problem::nodes_of(int body) const {
 }
 
 States Problem::start(int copies) const {
-  if (copies < 0) throw InputError(fmt::format("copies is {}; it must not be negative", copies));
+  constexpr double most_bytes = 16e9;
+  const double bytes = double(copies) * 6 * sizeof(float) * nodes();
+  if (copies < 0 || bytes > most_bytes)
+    throw InputError(fmt::format(
+        "copies is {}; it must be in [0, {}], so that states take at most {:g} GB", copies,
+        std::int64_t(most_bytes / (6 * sizeof(float) * std::max(1, nodes()))), 1e-9 * most_bytes));
   States states;
   states.nodes = nodes();
   const State start = impl_->system.start();
@@ -274,9 +282,8 @@ void validate(const SolveOptions& options) {
   plan::cost_kind_from(options.cost);
 }
 
-}  // namespace
-
-Plan Problem::solve(const SolveOptions& options, const Context& context) const {
+Plan search(const Problem& problem, const Plan* earlier, const SolveOptions& options,
+            const Context& context) {
   validate(options);
   return working_for(context, [&] {
     detail::PlanOptions command;
@@ -285,12 +292,33 @@ Plan Problem::solve(const SolveOptions& options, const Context& context) const {
     command.shortcut_rounds = options.shortcut_rounds;
     command.cost = options.cost;
     command.improve = options.improve;
-    const scenes::Scene& scene = impl_->scene.impl().scene;
+    const Problem::Impl& p = problem.impl();
+    const scenes::Scene& scene = p.scene.impl().scene;
     scenes::require_plannable(scene);
-    const detail::FemSystem system(impl_->world, impl_->prepared, detail::goal_rules_of(scene));
-    detail::Found found = detail::find_plan(scene, system, command);
-    return Plan(std::make_shared<Plan::Impl>(*this, std::move(found.plan), std::move(found.extra)));
+    const detail::FemSystem system(p.world, p.prepared, detail::goal_rules_of(scene));
+    std::optional<plan::Plan> begun;
+    Json summary;
+    if (earlier) {
+      begun = earlier->impl().plan;
+      if (begun->simulation) throw InputError("the earlier plan is a simulation, and no search");
+      if (begun->system_hash != system.hash())
+        throw InputError("the earlier plan was made for another world than this scene's; solve anew");
+      detail::require_of_world(*begun, p.world, "the earlier plan");
+      summary = earlier->impl().summary.is_null() ? earlier->impl().extra : earlier->impl().summary;
+    }
+    detail::Found found = detail::find_plan(scene, system, command, std::move(begun), summary);
+    return Plan(std::make_shared<Plan::Impl>(problem, std::move(found.plan), std::move(found.extra)));
   });
+}
+
+}  // namespace
+
+Plan Problem::solve(const SolveOptions& options, const Context& context) const {
+  return search(*this, nullptr, options, context);
+}
+
+Plan Problem::resume(const Plan& earlier, const SolveOptions& options, const Context& context) const {
+  return search(*this, &earlier, options, context);
 }
 
 Plan Problem::simulate(double duration_s, const Context& context) const {

@@ -95,6 +95,9 @@ class LIMBER_API Problem {
   // As `limber plan`: the same scene and options, the same bytes. Where a watcher says stop, what was found
   // so far. Throws InputError where the scene has no goal, or an option is out of range.
   Plan solve(const SolveOptions& = {}, const Context& = {}) const;
+  // As `limber plan --resume`: goes on from where `earlier` ended, with the same bytes as one search that was
+  // not cut. Throws as solve() does, and where `earlier` is of another world or was searched otherwise.
+  Plan resume(const Plan& earlier, const SolveOptions& = {}, const Context& = {}) const;
   // The scene left to itself, as `limber simulate`.
   Plan simulate(double duration_s, const Context& = {}) const;
 

@@ -41,6 +41,7 @@ std::vector<std::filesystem::path> export_motion(const std::filesystem::path& fo
                                                  const std::vector<std::string>& formats,
                                                  const std::filesystem::path& out, const Context& context) {
   return working_for(context, [&] {
+    if (formats.empty()) throw InputError("no format is named; there are gltf, pc2, usd, vtu");
     for (const std::string& format : formats)
       if (std::find(detail::motion_formats.begin(), detail::motion_formats.end(), format) ==
           detail::motion_formats.end())

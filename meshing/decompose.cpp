@@ -29,8 +29,8 @@ void check(const SurfaceMesh& mesh, const DecomposeOptions& options) {
   if (options.max_vertices < 8)
     throw InputError(fmt::format("a shell needs at least 8 vertices, not {}", options.max_vertices));
   if (!(options.max_concavity >= 0) || options.max_concavity > 1)
-    throw InputError(fmt::format("the concavity bound is a share of the diagonal from 0 to 1, not {}",
-                                 options.max_concavity));
+    throw InputError(
+        fmt::format("concavity is a share of the diagonal from 0 to 1, not {}", options.max_concavity));
   if (!(options.inflation >= 0) || options.inflation > 1)
     throw InputError(
         fmt::format("shells are inflated by a share of the diagonal from 0 to 1, not {}", options.inflation));

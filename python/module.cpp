@@ -4,6 +4,7 @@
 #include <pybind11/stl.h>
 #include <pybind11/stl/filesystem.h>
 
+#include <algorithm>
 #include <atomic>
 #include <condition_variable>
 #include <cstddef>
@@ -49,6 +50,7 @@ class PythonWatcher final : public limber::Watcher {
     for (const std::string& text : warnings_)
       if (PyErr_WarnEx(PyExc_UserWarning, text.c_str(), 2) != 0) throw py::error_already_set();
   }
+  bool has_raised() const { return raised_.has_value(); }
   void raise_what_was_raised() {
     if (raised_) throw *raised_;
   }
@@ -60,9 +62,10 @@ class PythonWatcher final : public limber::Watcher {
   std::optional<py::error_already_set> raised_;
 };
 
-// Works in a thread of its own, without the GIL, while this one listens for Ctrl-C.
+// Works in a thread of its own, without the GIL, while this one listens for Ctrl-C. `keep` is called with
+// what there is, where a call ends by what Python raised and still has a result.
 template <class F>
-auto call(const py::object& progress, int threads, F&& work) {
+auto call(const py::object& progress, int threads, F&& work, const py::object& keep = py::none()) {
   using Result = decltype(work(limber::Context{}));
   PythonWatcher watcher(progress);
   std::optional<Result> result;
@@ -97,6 +100,7 @@ auto call(const py::object& progress, int threads, F&& work) {
     lock.unlock();
     worker.join();
   }
+  if (watcher.has_raised() && result && !keep.is_none()) keep(py::cast(std::move(*result)));
   watcher.raise_what_was_raised();
   if (failure) std::rethrow_exception(failure);
   watcher.tell_warnings();
@@ -302,30 +306,40 @@ PYBIND11_MODULE(_limber, m) {
       "vertices"_a, "faces"_a, py::kw_only(), "max_convex_hull"_a, "threshold"_a, "concavity"_a,
       "max_hull_vertices"_a, "inflate"_a, "exact"_a, "progress"_a, "threads"_a);
 
-  py::class_<limber::Certificate>(m, "Certificate")
-      .def_readonly("holds", &limber::Certificate::holds)
-      .def_readonly("vertices_outside", &limber::Certificate::vertices_outside)
-      .def_readonly("triangles_crossing", &limber::Certificate::triangles_crossing)
-      .def_readonly("nonmanifold_edges", &limber::Certificate::nonmanifold_edges)
-      .def_readonly("nonmanifold_vertices", &limber::Certificate::nonmanifold_vertices)
-      .def_readonly("inverted_tets", &limber::Certificate::inverted_tets)
-      .def_readonly("min_dihedral_deg", &limber::Certificate::min_dihedral_deg)
-      .def_readonly("max_dihedral_deg", &limber::Certificate::max_dihedral_deg);
-  py::class_<limber::Cage>(m, "Cage")
+  py::class_<limber::Certificate>(
+      m, "Certificate", "Whether a cage encloses a surface: exact, proved from the two meshes alone.")
+      .def_readonly("holds", &limber::Certificate::holds,
+                    "every point of every triangle is in the cage, whose boundary is a manifold")
+      .def_readonly("vertices_outside", &limber::Certificate::vertices_outside, "of the surface")
+      .def_readonly("triangles_crossing", &limber::Certificate::triangles_crossing,
+                    "of the surface, that leave the cage")
+      .def_readonly("nonmanifold_edges", &limber::Certificate::nonmanifold_edges, "of the cage's boundary")
+      .def_readonly("nonmanifold_vertices", &limber::Certificate::nonmanifold_vertices,
+                    "of the cage's boundary")
+      .def_readonly("inverted_tets", &limber::Certificate::inverted_tets, "tets without a positive volume")
+      .def_readonly("min_dihedral_deg", &limber::Certificate::min_dihedral_deg,
+                    "smallest dihedral angle of a tet, degrees")
+      .def_readonly("max_dihedral_deg", &limber::Certificate::max_dihedral_deg,
+                    "largest dihedral angle of a tet, degrees");
+  py::class_<limber::Cage>(m, "Cage", "A coarse tetrahedral mesh that encloses a surface.")
       .def(py::init([](const py::object& vertices, const py::object& tets) {
              return limber::Cage{rows_of<double, 3>(vertices, "vertices"), rows_of<int, 4>(tets, "tets"), {}};
            }),
            "vertices"_a, "tets"_a)
       .def_property_readonly(
           "vertices",
-          [](const py::object& self) { return view(self.cast<const limber::Cage&>().nodes, self); })
+          [](const py::object& self) { return view(self.cast<const limber::Cage&>().nodes, self); },
+          "(N, 3) float64, metres")
       .def_property_readonly(
-          "tets", [](const py::object& self) { return view(self.cast<const limber::Cage&>().tets, self); })
+          "tets", [](const py::object& self) { return view(self.cast<const limber::Cage&>().tets, self); },
+          "(T, 4) int32, of positive volume")
       .def_property_readonly(
           "hull_from_tet",
-          [](const py::object& self) { return view(self.cast<const limber::Cage&>().hull_from_tet, self); })
-      .def_readonly("volume_ratio", &limber::Cage::volume_ratio)
-      .def_readonly("notes", &limber::Cage::notes);
+          [](const py::object& self) { return view(self.cast<const limber::Cage&>().hull_from_tet, self); },
+          "(T,) int32; empty where no hulls were given")
+      .def_readonly("volume_ratio", &limber::Cage::volume_ratio,
+                    "the cage's volume over the model's; 0 of an open one")
+      .def_readonly("notes", &limber::Cage::notes, "what the user should know, as sentences");
   m.def(
       "build_cage",
       [](const py::object& vertices, const py::object& faces, const py::sequence& hulls, int tets,
@@ -349,23 +363,29 @@ PYBIND11_MODULE(_limber, m) {
                     [&](const limber::Context& context) { return limber::certify(mesh, cage, context); });
       },
       "vertices"_a, "faces"_a, "cage"_a);
-  py::class_<limber::Binding>(m, "Binding")
-      .def_property_readonly("tet_from_vertex",
-                             [](const py::object& self) {
-                               return view(self.cast<const limber::Binding&>().tet_from_vertex, self);
-                             })
+  py::class_<limber::Binding>(m, "Binding", "Barycentric weights of a surface in a cage.")
+      .def_property_readonly(
+          "tet_from_vertex",
+          [](const py::object& self) {
+            return view(self.cast<const limber::Binding&>().tet_from_vertex, self);
+          },
+          "(V,) int32")
       .def_property_readonly(
           "weights",
-          [](const py::object& self) { return view(self.cast<const limber::Binding&>().weights, self); })
-      .def_readonly("outside", &limber::Binding::outside)
-      .def_readonly("max_outside_distance_m", &limber::Binding::max_outside_distance_m)
+          [](const py::object& self) { return view(self.cast<const limber::Binding&>().weights, self); },
+          "(V, 4) float64, each row sums to 1")
+      .def_readonly("outside", &limber::Binding::outside,
+                    "vertices in no tet, bound to the nearest by extrapolation")
+      .def_readonly("max_outside_distance_m", &limber::Binding::max_outside_distance_m,
+                    "of those, the farthest from its tet, metres")
       .def(
           "deform",
           [](const limber::Binding& self, const py::object& tets, const py::object& nodes) {
             return owned(
                 limber::deform(self, rows_of<int, 4>(tets, "tets"), rows_of<double, 3>(nodes, "nodes")));
           },
-          "tets"_a, "nodes"_a);
+          "tets"_a, "nodes"_a,
+          "(V, 3): where the surface is when the cage's nodes are at `nodes`, (N, 3) metres");
   m.def(
       "bind",
       [](const py::object& vertices, const py::object& faces, const limber::Cage& cage) {
@@ -375,33 +395,43 @@ PYBIND11_MODULE(_limber, m) {
       },
       "vertices"_a, "faces"_a, "cage"_a);
 
-  py::class_<limber::Body>(m, "Body")
+  py::class_<limber::Body>(m, "Body", "A model with its hulls, cage, certificate and binding; never changes.")
       .def_static("load", &limber::Body::load, "folder"_a)
-      .def("save", &limber::Body::save, "folder"_a, py::call_guard<py::gil_scoped_release>())
-      .def_property_readonly("vertices",
-                             [](const py::object& self) {
-                               return view(self.cast<const limber::Body&>().surface().vertices, self);
-                             })
+      .def("save", &limber::Body::save, "folder"_a, py::call_guard<py::gil_scoped_release>(),
+           "writes the files of docs/files.md; DiskError where the disk refuses")
+      .def_property_readonly(
+          "vertices",
+          [](const py::object& self) {
+            return view(self.cast<const limber::Body&>().surface().vertices, self);
+          },
+          "(V, 3) float64, metres")
       .def_property_readonly(
           "faces",
-          [](const py::object& self) { return view(self.cast<const limber::Body&>().surface().faces, self); })
-      .def_property_readonly("hulls", [](const limber::Body& self) { return pairs_of(self.hulls()); })
-      .def_property_readonly("cage", &limber::Body::cage, py::return_value_policy::reference_internal)
+          [](const py::object& self) { return view(self.cast<const limber::Body&>().surface().faces, self); },
+          "(F, 3) int32, counter-clockwise seen from outside")
+      .def_property_readonly(
+          "hulls", [](const limber::Body& self) { return pairs_of(self.hulls()); },
+          "list of (vertices, faces), convex")
+      .def_property_readonly("cage", &limber::Body::cage, py::return_value_policy::reference_internal,
+                             "the Cage")
       .def_property_readonly("certificate", &limber::Body::certificate,
-                             py::return_value_policy::reference_internal)
-      .def_property_readonly("binding", &limber::Body::binding, py::return_value_policy::reference_internal)
-      .def("report_json", &limber::Body::report_json)
-      .def("picture_png",
-           [](const limber::Body& self) {
-             return py::bytes(call(
-                 py::none(), 0, [&](const limber::Context& context) { return self.picture_png(context); }));
-           })
+                             py::return_value_policy::reference_internal, "the Certificate")
+      .def_property_readonly("binding", &limber::Body::binding, py::return_value_policy::reference_internal,
+                             "the Binding")
+      .def("report_json", &limber::Body::report_json, "report.json of docs/files.md, as text")
+      .def(
+          "picture_png",
+          [](const limber::Body& self) {
+            return py::bytes(call(py::none(), 0,
+                                  [&](const limber::Context& context) { return self.picture_png(context); }));
+          },
+          "the cage over the surface, small: bytes of a PNG")
       .def(
           "deform",
           [](const limber::Body& self, const py::object& nodes) {
             return owned(self.deform(rows_of<double, 3>(nodes, "nodes")));
           },
-          "nodes"_a);
+          "nodes"_a, "(V, 3): where the surface is when the cage's nodes are at `nodes`, (N, 3) metres");
   m.def(
       "prepare",
       [](const py::object& model, const py::object& faces, int shells, double concavity, double threshold,
@@ -479,14 +509,20 @@ PYBIND11_MODULE(_limber, m) {
           "plan",
           [](const limber::Problem& self, const std::optional<std::int64_t>& seed,
              const std::optional<std::int64_t>& iterations, double time_limit_s,
-             const std::optional<int>& shortcut_rounds, const std::string& cost, bool improve,
-             const py::object& progress, int threads) {
-            return call(progress, threads, [&](const limber::Context& context) {
-              return self.solve({seed, iterations, time_limit_s, shortcut_rounds, cost, improve}, context);
-            });
+             const std::optional<std::int64_t>& rounds, const std::string& cost, bool improve,
+             const limber::Plan* earlier, const py::object& keep, const py::object& progress, int threads) {
+            constexpr std::int64_t most = std::numeric_limits<int>::max();
+            std::optional<int> shortcut_rounds;  // one that is too large is refused as what it is cut to
+            if (rounds) shortcut_rounds = int(std::clamp(*rounds, -most, most));
+            const limber::SolveOptions options{seed, iterations, time_limit_s, shortcut_rounds,
+                                               cost, improve};
+            const auto search = [&](const limber::Context& context) {
+              return earlier ? self.resume(*earlier, options, context) : self.solve(options, context);
+            };
+            return call(progress, threads, search, keep);
           },
           py::kw_only(), "seed"_a, "iterations"_a, "time_limit_s"_a, "shortcut_rounds"_a, "cost"_a,
-          "improve"_a, "progress"_a, "threads"_a)
+          "improve"_a, "earlier"_a.none(true), "keep"_a, "progress"_a, "threads"_a)
       .def(
           "simulate",
           [](const limber::Problem& self, double duration_s, const py::object& progress, int threads) {

@@ -10,7 +10,7 @@
 namespace limber::render {
 
 // What make_film would say of these before it looks at any frame: another ending, frames_per_second, no
-// ffmpeg.
+// folder, no ffmpeg.
 void require_film_possible(double frames_per_second, const fs::path& film);
 
 // By the ffmpeg in PATH, as the file's name ends: .mp4, H.264 (yuv420p, BT.709, crf 18); .webm, VP9 (the

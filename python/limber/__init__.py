@@ -14,7 +14,10 @@ total, note)` where one is given. What depends on a seed depends on nothing else
 from __future__ import annotations
 
 import base64
+import functools
+import inspect
 import json
+import operator
 import os
 import signal
 import subprocess
@@ -22,7 +25,7 @@ import tempfile
 import threading
 import warnings as _warnings
 from html import escape as _escape
-from typing import Any, Callable, Dict, List, NamedTuple, Optional, Sequence, Tuple, Union
+from typing import Any, Callable, Dict, List, NamedTuple, Optional, Sequence, Tuple, TypeVar, Union, cast
 
 import numpy as np
 
@@ -40,6 +43,45 @@ __all__ = [
 Path = Union[str, "os.PathLike[str]"]
 Progress = Callable[[str, int, int, str], Any]
 Hull = Tuple[np.ndarray, np.ndarray]
+_F = TypeVar("_F", bound=Callable[..., Any])
+
+_text = (str, os.PathLike)
+_whole, _real, _bool = (int, np.integer), (int, float, np.integer, np.floating), (bool, np.bool_)
+# What an annotation below takes, and how that is said.
+_kinds_of_options: Dict[str, Tuple[Any, str]] = {
+    "int": (_whole, "a whole number"), "Optional[int]": (_whole, "a whole number or None"),
+    "float": (_real, "a number"), "Optional[float]": (_real, "a number or None"),
+    "bool": (_bool, "True or False"), "str": (str, "a str"), "Path": (_text, "a path"),
+    "Optional[Path]": (_text, "a path or None"),
+    "Optional[Dict[str, Any]]": (dict, "a dict by keys of the scene file, or None"),
+}
+
+
+def _checked(function: _F) -> _F:
+    """Refuses an option of another kind than its annotation says by a TypeError that names it."""
+    parameters = inspect.signature(function).parameters
+    positional, told = list(parameters), function.__qualname__.replace(".__init__", "")
+
+    @functools.wraps(function)
+    def checked(*given: Any, **options: Any) -> Any:
+        for name, value in [*zip(positional, given), *options.items()]:
+            annotation = str(parameters[name].annotation) if name in parameters else ""
+            kind, words = _kinds_of_options.get(annotation, (object, ""))
+            if value is None and annotation.startswith("Optional"):
+                continue
+            if not isinstance(value, kind) or (isinstance(value, _bool) and kind in (_whole, _real)):
+                raise TypeError(f"{told}: {name} is {value!r:.60}; it must be {words}")
+            if kind is _whole and not -2**31 <= int(value) < (2**31 if annotation == "int" else 2**63):
+                raise InputError(f"{name} is {value}, which is out of its range")
+            if kind is _text and "\0" in str(value):
+                raise InputError(f"{name} is {value!r}; a path has no NUL")
+        return function(*given, **options)
+    return cast(_F, checked)
+
+
+def _list_of(paths: Any) -> List[Any]:
+    """One, or several, as a list."""
+    return [paths] if isinstance(paths, _text) else list(paths)
 
 
 class Mesh(NamedTuple):
@@ -49,6 +91,7 @@ class Mesh(NamedTuple):
     warnings: List[str]   # what looks wrong
 
 
+@_checked
 def load_mesh(file: Path, *, scale: float = 1, y_up: bool = False, progress: Optional[Progress] = None) -> Mesh:
     """A model's surface, welded and oriented; OBJ, PLY, STL, OFF and what assimp reads."""
     return Mesh(*_limber.load_mesh(file, scale=scale, y_up=y_up, progress=progress))
@@ -77,6 +120,7 @@ class Decomposition(Sequence[Hull]):
                 f"largest {100 * self.max_overshoot:.3f} % of the diagonal>")
 
 
+@_checked
 def decompose(vertices: Any, faces: Any, *, max_convex_hull: int = 32, threshold: float = 0, concavity: float = 0,
               max_hull_vertices: int = 64, inflate: float = 0, exact: bool = False,
               progress: Optional[Progress] = None, threads: int = 0) -> Decomposition:
@@ -86,6 +130,7 @@ def decompose(vertices: Any, faces: Any, *, max_convex_hull: int = 32, threshold
         max_hull_vertices=max_hull_vertices, inflate=inflate, exact=exact, progress=progress, threads=threads))
 
 
+@_checked
 def build_cage(vertices: Any, faces: Any, hulls: Sequence[Hull] = (), *, tets: int = 1000, mode: str = "lattice",
                progress: Optional[Progress] = None, threads: int = 0) -> Cage:
     """A coarse tetrahedral mesh that encloses the surface. Modes: lattice, fast, paper (needs hulls), conform."""
@@ -102,21 +147,31 @@ def bind(vertices: Any, faces: Any, cage: Cage) -> Binding:
     return _limber.bind(vertices, faces, cage)
 
 
+@_checked
 def prepare(model: Any, faces: Any = None, *, shells: int = 32, concavity: float = 0, threshold: float = 0,
             inflate: float = 0, max_hull_vertices: int = 64, exact: bool = False, tets: int = 1000,
             mode: str = "lattice", scale: float = 1, y_up: bool = False, progress: Optional[Progress] = None,
             threads: int = 0) -> Body:
     """Hulls, cage, certificate and binding of a model: prepare("bunny.obj") or prepare(vertices, faces).
 
+    `scale`: metres a unit; `y_up`: +Y is up in what is given, as +Z is here; of files and arrays alike.
+
     The surface may get vertices: edges longer than the cage's tets are cut, so that it bends as the cage does.
     """
-    if faces is None and not isinstance(model, (str, os.PathLike)):
+    if faces is None and not isinstance(model, _text):
         raise InputError("prepare takes a file, or vertices and faces")
+    if faces is not None and (scale != 1 or y_up):
+        if not 0 < scale < float("inf"):
+            raise InputError(f"scale is {scale}; it must be above 0")
+        model = scale * np.asarray(model, dtype=np.float64)
+        if y_up and model.ndim == 2 and model.shape[1] == 3:
+            model = np.stack([model[:, 0], -model[:, 2], model[:, 1]], axis=1)
     return _limber.prepare(model, faces, shells=shells, concavity=concavity, threshold=threshold, inflate=inflate,
                            max_hull_vertices=max_hull_vertices, exact=exact, tets=tets, mode=mode, scale=scale,
                            y_up=y_up, progress=progress, threads=threads)
 
 
+@_checked
 def load_body(folder: Path) -> Body:
     """What Body.save, or `limber prepare`, has written."""
     return Body.load(folder)
@@ -143,6 +198,16 @@ def _html_of_body(body: Body) -> str:
 
 
 Body._repr_html_ = _html_of_body  # type: ignore[attr-defined]
+Body.__repr__ = lambda self: (  # type: ignore[method-assign]
+    f"<limber.Body: {len(self.vertices)} vertices, {len(self.hulls)} hulls, {len(self.cage.tets)} tets>")
+Cage.__repr__ = lambda self: (  # type: ignore[method-assign]
+    f"<limber.Cage: {len(self.tets)} tets, {len(self.vertices)} nodes>")
+Binding.__repr__ = lambda self: (  # type: ignore[method-assign]
+    f"<limber.Binding: {len(self.weights)} vertices, {self.outside} of them outside>")
+Certificate.__repr__ = lambda self: (  # type: ignore[method-assign]
+    "<limber.Certificate: " + ("holds" if self.holds else
+                               f"{self.vertices_outside} vertices outside, {self.triangles_crossing} triangles cross")
+    + ">")
 
 
 class Prepared(NamedTuple):
@@ -155,6 +220,7 @@ class Prepared(NamedTuple):
     figures: Dict[str, Any]  # its row of manifest.jsonl
 
 
+@_checked
 def prepare_many(models: Union[Path, Sequence[Path]], out: Path, *, jobs: int = 0, time_limit: float = 600,
                  memory_limit: Optional[float] = None, retry_failed: bool = False, store: Path = "",
                  shells: int = 32, concavity: float = 0, threshold: float = 0, inflate: float = 0,
@@ -254,10 +320,11 @@ class Scene:
     `set` edits it before it is read, by the keys of the scene file: {"planner.max_force_n": 30}.
     """
 
+    @_checked
     def __init__(self, file_or_name: Path, *, preset: str = "", set: Optional[Dict[str, Any]] = None,
                  data: Sequence[Path] = ()):
         sets = [f"{key}={_toml(value)}" for key, value in (set or {}).items()]
-        self._scene = _limber.Scene(os.fspath(file_or_name), preset=preset, sets=sets, data=list(data))
+        self._scene = _limber.Scene(os.fspath(file_or_name), preset=preset, sets=sets, data=_list_of(data))
         self.name: str = self._scene.name
         self.text: str = self._scene.text
         self.bodies: List[str] = self._scene.bodies
@@ -288,6 +355,7 @@ class States(NamedTuple):
 _kinds = ("none", "body", "control_point", "interpolation", "hold")
 
 
+@_checked
 def pushes(count: int, kind: str = "body", *, steps: Any, force_n: Any = 0, node: Any = -1, radius_m: Any = 0,
            target_m: Any = 0, max_force_n: Any = 0) -> np.ndarray:
     """`count` pushes of the robot, as rows of push_dtype; each argument is one for all, or one a push.
@@ -297,6 +365,22 @@ def pushes(count: int, kind: str = "body", *, steps: Any, force_n: Any = 0, node
     """
     if kind not in _kinds:
         raise InputError(f"kind is {kind!r}; it must be one of {', '.join(_kinds)}")
+    if count < 0:
+        raise InputError(f"count is {count}; it must not be negative")
+    for name, value in (("steps", steps), ("node", node)):
+        whole = np.asarray(value)
+        if whole.dtype.kind not in "iu" or (whole.size and not -2**31 <= int(whole.min()) <= int(whole.max()) < 2**31):
+            raise InputError(f"{name} must be whole numbers below 2**31, not {value!r:.60}")
+    if np.size(steps) and np.min(steps) < 1:
+        raise InputError(f"steps is {np.min(steps)}; it must be above 0")
+    for name, value in (("force_n", force_n), ("radius_m", radius_m), ("target_m", target_m),
+                        ("max_force_n", max_force_n)):
+        try:
+            finite = np.isfinite(np.asarray(value, dtype=np.float32)).all()
+        except (TypeError, ValueError):
+            finite = False
+        if not finite:
+            raise InputError(f"{name} must be numbers that are finite in float32, not {value!r:.60}")
     made = np.zeros(count, push_dtype)
     made["kind"] = _kinds.index(kind)
     made["steps"], made["force_n"], made["node"] = steps, force_n, node
@@ -307,6 +391,7 @@ def pushes(count: int, kind: str = "body", *, steps: Any, force_n: Any = 0, node
 class World:
     """A scene's bodies, ready to be stepped. Without a work folder bodies are prepared in a temporary one."""
 
+    @_checked
     def __init__(self, scene: Union[Scene, Path], work_folder: Path = "", *, progress: Optional[Progress] = None,
                  threads: int = 0):
         self.scene = scene if isinstance(scene, Scene) else Scene(scene)
@@ -320,6 +405,9 @@ class World:
     def dt_s(self) -> float:
         return self._world.dt_s
 
+    def __repr__(self) -> str:
+        return f"<limber.World {self.scene.name}: {self.nodes} nodes that move, dt {1e3 * self.dt_s:.3g} ms>"
+
     @property
     def nodes(self) -> int:
         """Of all bodies that move: rows of States.positions."""
@@ -330,11 +418,16 @@ class World:
         first, count = self._world.nodes_of(_index(body, self.scene.bodies))
         return slice(first, first + count)
 
+    @_checked
     def start(self, copies: int = 1) -> States:
         return States(*self._world.start(copies))
 
+    @_checked
     def rollout(self, states: States, pushes: np.ndarray, *, threads: int = 0) -> States:
         """Where each state is led by the push of its row. A result depends on its state and push alone."""
+        if len(states) != 4:
+            raise TypeError("rollout: states must be States, as start() and rollout() give them")
+        states = States(*states)
         return States(*self._world.rollout(states.positions, states.velocities, states.steps, states.sound, pushes,
                                            threads=threads))
 
@@ -342,14 +435,26 @@ class World:
         """(B, 3) centres of mass of the robot, metres."""
         return self._world.robot_centers(states.positions, states.velocities, states.steps, states.sound)
 
+    @_checked
     def plan(self, *, seed: Optional[int] = None, iterations: Optional[int] = None,
              time_limit: float = float("inf"), shortcut: Optional[int] = None, cost: str = "duration",
-             improve: bool = False, progress: Optional[Progress] = None, threads: int = 0) -> Plan:
-        """As `limber plan` with the same options: the same bytes. None: the scene's."""
-        return Plan(self._world.plan(seed=seed, iterations=iterations, time_limit_s=time_limit,
-                                     shortcut_rounds=shortcut, cost=cost, improve=improve, progress=progress,
-                                     threads=threads), self)
+             improve: bool = False, resume: Optional[Plan] = None,
+             keep: Optional[Callable[[Plan], Any]] = None, progress: Optional[Progress] = None,
+             threads: int = 0) -> Plan:
+        """As `limber plan` with the same options: the same bytes. None: the scene's.
 
+        `resume`: the plan to go on from. `keep` gets the plan so far where Ctrl-C, or what `progress` raises,
+        ends the search.
+        """
+        if resume is not None and not isinstance(resume, Plan):
+            raise TypeError(f"plan: resume is {resume!r:.60}; it must be a Plan or None")
+        return Plan(self._world.plan(seed=seed, iterations=iterations, time_limit_s=time_limit,
+                                     shortcut_rounds=shortcut, cost=cost, improve=improve,
+                                     earlier=None if resume is None else resume._plan,
+                                     keep=None if keep is None else lambda found: keep(Plan(found, self)),
+                                     progress=progress, threads=threads), self)
+
+    @_checked
     def simulate(self, duration: float = 5, *, progress: Optional[Progress] = None, threads: int = 0) -> Plan:
         """The scene left to itself, as `limber simulate`; seconds."""
         return Plan(self._world.simulate(duration, progress=progress, threads=threads), self)
@@ -393,6 +498,7 @@ class Plan:
         """From the start, rows of push_dtype."""
         return self._plan.pushes
 
+    @_checked
     def surface(self, body: str, frame: int) -> np.ndarray:
         """(V, 3) of the fine surface; a negative frame counts from the last."""
         count = self._plan.frame_count
@@ -432,28 +538,43 @@ class Plan:
         return _table(rows)
 
 
+def _scene_of(scene: Union[Scene, Path], preset: str, set: Optional[Dict[str, Any]], data: Sequence[Path]) -> Scene:
+    if not isinstance(scene, Scene):
+        return Scene(scene, preset=preset, set=set, data=data)
+    if preset or set or data:
+        raise InputError("preset, set and data are of the scene; give them to Scene(…)")
+    return scene
+
+
+@_checked
 def plan(scene: Union[Scene, Path], out: Optional[Path] = None, *, preset: str = "",
          set: Optional[Dict[str, Any]] = None, data: Sequence[Path] = (), seed: Optional[int] = None,
          iterations: Optional[int] = None, time_limit: float = float("inf"), shortcut: Optional[int] = None,
-         cost: str = "duration", improve: bool = False, progress: Optional[Progress] = None,
-         threads: int = 0) -> Plan:
-    """Plans a scene; with `out` in a work folder, where its bodies are kept and the plan is saved."""
-    if isinstance(scene, Scene):
-        if preset or set or data:
-            raise InputError("preset, set and data are of the scene; give them to Scene(…)")
-    else:
-        scene = Scene(scene, preset=preset, set=set, data=data)
+         cost: str = "duration", improve: bool = False, resume: bool = False,
+         progress: Optional[Progress] = None, threads: int = 0) -> Plan:
+    """Plans a scene; with `out` in a work folder, where its bodies are kept and the plan is saved.
+
+    A search that Ctrl-C ends is saved there, too, and `resume` goes on from it.
+    """
+    if resume and out is None:
+        raise InputError("resume goes on from the plan in the folder `out`, and none is named")
+    scene = _scene_of(scene, preset, set, data)
     world = World(scene, "" if out is None else out, progress=progress, threads=threads)
     found = world.plan(seed=seed, iterations=iterations, time_limit=time_limit, shortcut=shortcut, cost=cost,
-                       improve=improve, progress=progress, threads=threads)
+                       improve=improve, resume=load_plan(out) if resume and out is not None else None,
+                       keep=None if out is None else lambda so_far: so_far.save(out), progress=progress,
+                       threads=threads)
     if out is not None:
         found.save(out)
     return found
 
 
-def simulate(scene: Union[Scene, Path], out: Optional[Path] = None, *, duration: float = 5,
-             progress: Optional[Progress] = None, threads: int = 0) -> Plan:
-    """The scene left to itself, no search; seconds."""
+@_checked
+def simulate(scene: Union[Scene, Path], out: Optional[Path] = None, *, duration: float = 5, preset: str = "",
+             set: Optional[Dict[str, Any]] = None, data: Sequence[Path] = (), progress: Optional[Progress] = None,
+             threads: int = 0) -> Plan:
+    """The scene left to itself, no search; seconds. `out` as of plan()."""
+    scene = _scene_of(scene, preset, set, data)
     world = World(scene, "" if out is None else out, progress=progress, threads=threads)
     found = world.simulate(duration, progress=progress, threads=threads)
     if out is not None:
@@ -461,6 +582,7 @@ def simulate(scene: Union[Scene, Path], out: Optional[Path] = None, *, duration:
     return found
 
 
+@_checked
 def load_plan(folder: Path) -> Plan:
     """What Plan.save, or `limber plan`, has written."""
     return Plan(_limber.Plan.load(folder))
@@ -474,22 +596,30 @@ class Promise(NamedTuple):
     value: str
 
 
+@_checked
 def verify(folder: Path, *, scene: str = "", progress: Optional[Progress] = None, threads: int = 0) -> List[Promise]:
     """Every promise that limber makes of a work folder, or of a body's, checked anew from its files."""
     return [Promise(*row) for row in _limber.verify(folder, scene=scene, progress=progress, threads=threads)]
 
 
 class Film(NamedTuple):
+    """A film has other frames than its motion: its speed, its pace and what stands still make more or fewer."""
     video: Optional[str]  # None where not every frame is there
-    frames_painted: int
+    frames_painted: int   # of the film, now: with resume those that were right already are not among them
     frames_failed: int
 
 
+@_checked
 def render(folder: Path, *, size: Optional[Tuple[int, int]] = None, frames: str = "", camera: str = "main",
            name: str = "", set: Optional[Dict[str, Any]] = None, video: Path = "", resume: bool = False,
            progress: Optional[Progress] = None, threads: int = 0) -> Film:
     """Frames, and the film of them, without a display."""
-    width, height = size or (0, 0)
+    try:
+        width, height = (0, 0) if size is None else (operator.index(size[0]), operator.index(size[1]))
+        if size is not None and (len(size) != 2 or not 0 < min(width, height) <= max(width, height) < 2**31):
+            raise ValueError
+    except (TypeError, ValueError, IndexError, KeyError):
+        raise TypeError(f"render: size is {size!r:.60}; it must be (width, height) in pixels") from None
     film, painted, failed = _limber.render(
         folder, width=width, height=height, frames=frames, camera=camera, name=name,
         sets=[f"{key}={_toml(value)}" for key, value in (set or {}).items()], video=video, resume=resume,
@@ -497,12 +627,15 @@ def render(folder: Path, *, size: Optional[Tuple[int, int]] = None, frames: str 
     return Film(str(film) if str(film) not in ("", ".") else None, painted, failed)
 
 
+@_checked
 def export(folder: Path, formats: Sequence[str] = ("gltf",), *, out: Path = "",
            progress: Optional[Progress] = None, threads: int = 0) -> List[str]:
     """The motion for other programs: of "gltf", "pc2", "usd", "vtu". The file of each that is to be opened."""
-    return [str(file) for file in _limber.export(folder, list(formats), out=out, progress=progress, threads=threads)]
+    files = _limber.export(folder, _list_of(formats), out=out, progress=progress, threads=threads)
+    return [str(file) for file in files]
 
 
+@_checked
 def report(folder: Path, file: Path = "", *, progress: Optional[Progress] = None, threads: int = 0) -> str:
     """One HTML page about a work folder."""
     return str(_limber.report(folder, file=file, progress=progress, threads=threads))

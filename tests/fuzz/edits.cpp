@@ -140,8 +140,8 @@ void edit_once(Json& root, Script& script) {
       node = script.below(2) == 0;
       break;
     case 5:
-      if (Json copy = *all[std::size_t(script.below(int(all.size())))]; all.size() < 10'000)
-        node = std::move(copy);
+      if (all.size() < 500)  // a copy of all within itself doubles it
+        if (Json copy = *all[std::size_t(script.below(int(all.size())))]; true) node = std::move(copy);
       break;
     case 6:
       if (node.is_structured() && !node.empty())

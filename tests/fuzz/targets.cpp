@@ -22,6 +22,7 @@
 #include "tests/core/deflated_zip.h"
 #include "tests/core/temporary_folder.h"
 #include "tests/fuzz/edits.h"
+#include "tests/fuzz/folder.h"
 
 namespace limber::fuzz {
 
@@ -468,7 +469,8 @@ std::vector<Target> changed_targets(const std::string& binding_npz, const std::s
              validate(read_msh(file_of(edited(text, script), "changed.msh"), &label), "changed.msh");
            },
            {no_edit}},
-          {"scene_changed", read_changed_scene, {no_edit}}};
+          {"scene_changed", read_changed_scene, {no_edit}},
+          {"folder_changed", meet_changed_folder, {no_edit}}};
 }
 
 std::vector<Target> made_targets() {

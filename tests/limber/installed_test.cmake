@@ -19,6 +19,19 @@ foreach(header ${headers})
   endif()
 endforeach()
 
+# The prefix may lie elsewhere than where the build was to be installed.
+find_program(PKG_CONFIG pkg-config)
+if(PKG_CONFIG)
+  file(GLOB_RECURSE files ${WORK}/prefix/*/limber.pc)
+  list(GET files 0 file)
+  get_filename_component(folder ${file} DIRECTORY)
+  run(${CMAKE_COMMAND} -E env PKG_CONFIG_PATH=${folder} ${PKG_CONFIG} --variable=includedir limber)
+  string(STRIP "${out}" includes)
+  if(NOT EXISTS ${includes}/limber/limber.h OR NOT includes MATCHES "^${WORK}/prefix/")
+    message(FATAL_ERROR "${file} says that headers are in ${includes}")
+  endif()
+endif()
+
 # README's program beside README's script.
 file(READ ${SOURCE}/README.md readme)
 string(REGEX MATCH "```cpp\n([^`]*)```" any "${readme}")

@@ -321,9 +321,33 @@ TEST_F(Library_slow, TwoPlansSideBySideAndOneIsStopped) {
   EXPECT_EQ(limber_program({"plan", path("small.toml"), "-o", path("out"), "--seed", "5"}).code, 0);
 }
 
+TEST_F(Library_slow, ASearchThatWasCutGoesOnAsIfItHadNotBeen) {
+  const Problem problem = small_problem();
+  const Plan whole = problem.solve({.seed = 5});
+  ASSERT_GT(whole.iterations(), 1);
+  Listener hasty(20);
+  std::optional<Plan> plan = problem.solve({.seed = 5, .iterations = 1}, {.watcher = &hasty});
+  EXPECT_FALSE(plan->solved());
+  EXPECT_EQ(problem.resume(*plan, {.seed = 5}).trajectory_hash(), whole.trajectory_hash());
+  // From a folder, too, and with what made the path better counted once.
+  plan->save(path("begun"));
+  const Plan gone_on = problem.resume(Plan::load(path("begun")), {.seed = 5});
+  EXPECT_EQ(gone_on.tree_hash(), whole.tree_hash());
+  EXPECT_EQ(gone_on.trajectory_hash(), whole.trajectory_hash());
+  EXPECT_EQ(problem.resume(gone_on, {.seed = 5}).trajectory_hash(), whole.trajectory_hash());
+  EXPECT_THAT(complaint([&] { problem.resume(*plan, {.seed = 6}); }), HasSubstr("seed"));
+  EXPECT_THAT(complaint([&] { problem.resume(problem.simulate(0.1), {}); }), HasSubstr("is a simulation"));
+}
+
 TEST_F(Library_slow, AStoppedCallThrowsAndLeavesNothing) {
   Listener hasty(0);
-  EXPECT_THROW(prepare(cube(), {}, {.watcher = &hasty}), Interrupted);
+  try {
+    prepare(cube(), {}, {.watcher = &hasty});
+    ADD_FAILURE() << "was not stopped";
+  } catch (const Interrupted& stopped) {
+    EXPECT_EQ(stopped.signal_number, Interrupted::by_watcher);
+    EXPECT_STREQ(stopped.what(), "stopped, as the watcher asked");
+  }
   EXPECT_THROW(Problem(small(), path("work"), {.watcher = &hasty}), Interrupted);
   const Problem problem = small_problem();
   EXPECT_THROW(problem.rollout(problem.start(), {{.steps = 1000}}, {.watcher = &hasty}), Interrupted);

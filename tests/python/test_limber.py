@@ -134,6 +134,46 @@ class Meshes(unittest.TestCase):
             limber.decompose(CUBE, FACES, 4)  # options are keywords
         with self.assertRaises(OSError):
             limber.prepare(CUBE, FACES, tets=100).save("/proc/limber")
+        # Before any work: a model that is read in vain is not there.
+        for options, words in (({"tets": 10**9}, "tets is 1000000000; it must be in .24, 200000."),
+                               ({"tets": 10**12}, "tets is 1000000000000, which is out"), ({"shells": 0}, "hulls is 0"),
+                               ({"max_hull_vertices": 7}, "max_hull_vertices is 7"), ({"inflate": np.nan}, "inflate"),
+                               ({"concavity": -0.1}, "concavity is -0.1"), ({"mode": "lettuce"}, "mode")):
+            with self.subTest(words), self.assertRaisesRegex(limber.InputError, words):
+                limber.prepare("nothing.obj", **options)
+        flat = limber.Cage(CUBE * [1, 1, 0], [[0, 1, 2, 3]])
+        with self.assertRaisesRegex(limber.InputError, "in a plane"):
+            limber.certify(CUBE, FACES, flat)
+
+    def test_options_of_another_kind_are_named(self):
+        folder = tempfile.gettempdir()
+        for call, words in ((lambda: limber.prepare(CUBE, FACES, tets="many"), "prepare: tets is 'many'"),
+                            (lambda: limber.prepare(CUBE, FACES, tets=100.5), "tets is 100.5; it must be a whole"),
+                            (lambda: limber.prepare(CUBE, FACES, exact=1), "exact is 1; it must be True or False"),
+                            (lambda: limber.decompose(CUBE, FACES, threshold=None), "threshold is None"),
+                            (lambda: limber.plan("barriers1", seed="1"), "plan: seed is '1'"),
+                            (lambda: limber.Scene("barriers1", set=["planner.seed=1"]), "Scene: set is "),
+                            (lambda: limber.render(folder, size=160), "size is 160; it must be .width, height."),
+                            (lambda: limber.render(folder, size=(160, 90, 1)), "size is .160"),
+                            (lambda: limber.verify(3), "verify: folder is 3")):
+            with self.subTest(words), self.assertRaisesRegex(TypeError, words):
+                call()
+        with self.assertRaisesRegex(limber.InputError, "no NUL"):
+            limber.load_mesh("a\0b")
+        with self.assertRaisesRegex(limber.InputError, "no.such.folder is no folder"):
+            limber.Scene("barriers1", data="no.such.folder")
+
+    def test_units_are_those_of_files_and_arrays_alike(self):
+        with tempfile.TemporaryDirectory() as folder:
+            file = os.path.join(folder, "slab.obj")
+            slab = CUBE * [1000, 2000, 500]
+            with open(file, "w", encoding="ascii") as out:
+                out.writelines("v {} {} {}\n".format(*v) for v in slab)
+                out.writelines("f {} {} {}\n".format(*(f + 1)) for f in FACES)
+            of_file = limber.prepare(file, tets=100, scale=0.001, y_up=True)
+        of_arrays = limber.prepare(slab, FACES, tets=100, scale=0.001, y_up=True)
+        np.testing.assert_array_equal(of_file.vertices, of_arrays.vertices)
+        np.testing.assert_allclose(np.ptp(of_arrays.vertices, axis=0), np.ptp(CUBE, axis=0) * [1, 0.5, 2])
 
 
 class Scenes(unittest.TestCase):
@@ -158,7 +198,15 @@ class Scenes(unittest.TestCase):
         self.assertIn(told["trajectory_hash"], again._repr_html_())
         film = limber.render(self.path("2"), size=(64, 36), frames="0-1")
         self.assertEqual((film.frames_painted, film.frames_failed), (2, 0))
-        self.assertTrue(limber.export(self.path("2"), ["gltf"])[0].endswith(".glb"))
+        self.assertTrue(limber.export(self.path("2"), "gltf")[0].endswith(".glb"))
+        with self.assertRaisesRegex(limber.InputError, "no format is named"):
+            limber.export(self.path("2"), [])
+        with self.assertRaisesRegex(OSError, "there is no folder"):  # before any frame
+            limber.render(self.path("2"), size=(64, 36), video=self.path("none/film.mp4"),
+                          progress=lambda *event: self.fail(event))
+        with self.assertRaisesRegex(limber.InputError, "mp4"):
+            limber.render(self.path("2"), size=(64, 36), frames="0", video=self.path("film.doc"),
+                          progress=lambda *event: self.fail(event))
 
     def test_the_path_is_what_its_pushes_do(self):
         world = world_of("barriers1", preset="fast")
@@ -196,6 +244,16 @@ class Scenes(unittest.TestCase):
             world.rollout(world.start(40), forces)
         with self.assertRaisesRegex(limber.InputError, "kind"):
             limber.pushes(1, "shove", steps=1)
+        for options, words in (({"steps": 1.7}, "steps must be whole"), ({"steps": 2**31}, "steps must be whole"),
+                               ({"steps": 0}, "steps is 0"), ({"steps": 1, "node": 0.5}, "node must be whole"),
+                               ({"steps": 1, "force_n": np.inf}, "force_n must be numbers"),
+                               ({"steps": 1, "radius_m": "wide"}, "radius_m must be numbers")):
+            with self.subTest(words), self.assertRaisesRegex(limber.InputError, words):
+                limber.pushes(2, **options)
+        with self.assertRaisesRegex(limber.InputError, "copies is 2147483647; it must be in .0, "):
+            world.start(2**31 - 1)
+        with self.assertRaisesRegex(TypeError, "must be States"):
+            world.rollout((shoved.positions, shoved.velocities), limber.pushes(2, steps=2))
         with self.assertRaisesRegex(limber.InputError, "no body 'bunny'"):
             world.nodes_of("bunny")
 
@@ -218,6 +276,36 @@ class Scenes(unittest.TestCase):
             world.plan(seed=1, iterations=10**8)
         timer.join()
         self.assertEqual(world.rollout(world.start(), limber.pushes(1, steps=1)).steps[0], 1)
+
+    def test_a_search_that_is_cut_is_kept_and_goes_on(self):
+        whole = limber.plan("barriers1", preset="fast", seed=2)
+        told = []
+
+        def enough(stage, done, total, note):
+            told.append(stage)
+            if stage == "plan" and done > 0:
+                raise KeyError("enough")
+        for resume in range(2000):  # each time one step further at least: the first progress that is told ends it
+            try:
+                found = limber.plan("barriers1", self.path("cut"), preset="fast", seed=2, resume=resume > 0,
+                                    progress=enough if resume < 2 else None)
+                break
+            except KeyError:
+                self.assertFalse(limber.load_plan(self.path("cut")).solved)
+        self.assertIn("plan", told)
+        self.assertEqual((found.tree_hash, found.trajectory_hash), (whole.tree_hash, whole.trajectory_hash))
+        self.assertEqual(found.iterations, whole.iterations)
+
+        world = limber.World(limber.Scene("barriers1", preset="fast"))
+        some = world.plan(seed=2, iterations=20)
+        self.assertEqual(some.iterations, 20)
+        self.assertEqual(world.plan(seed=2, resume=some).tree_hash, whole.tree_hash)
+        with self.assertRaisesRegex(limber.InputError, "another world"):
+            limber.World("squeeze").plan(resume=some)
+        with self.assertRaisesRegex(limber.InputError, "seed"):
+            world.plan(seed=3, resume=some)
+        with self.assertRaisesRegex(limber.InputError, "none is named"):
+            limber.plan("barriers1", resume=True)
 
     def test_other_threads_run_meanwhile(self):
         world = world_of("barriers1")

@@ -75,8 +75,7 @@ ExportedMotion export_motion(const ExportOptions& options) {
                              path.frames_per_second,
                              parse_frames(options.frames, count, &left_out)};
   if (left_out > 0)
-    log::warn("--frames {}: {} frames beyond the last, {}, are left out", options.frames, left_out,
-              count - 1);
+    log::warn("frames {}: {} frames beyond the last, {}, are left out", options.frames, left_out, count - 1);
   const fs::path out = options.out.value_or(options.folder / "export");
   const bool recorded = can_update_manifest(options.folder);
   if (!recorded)

@@ -15,7 +15,7 @@ int even_step(const std::vector<int>& frames) {
   for (std::size_t i = 1; i < frames.size(); ++i)
     if (frames[i] - frames[i - 1] != step)
       throw InputError(
-          fmt::format("--frames: a point cache has frames evenly apart, but {} follows {} where the first "
+          fmt::format("frames: a point cache has frames evenly apart, but {} follows {} where the first "
                       "step is {}; choose a single range such as {}-{}:{}",
                       frames[i], frames[i - 1], step, frames.front(), frames.back(), step));
   return step;

@@ -60,7 +60,7 @@ std::vector<Range> ranges_of(const std::string& text, const char* what, const ch
 std::vector<int> parse_frames(const std::string& text, int count, int* left_out) {
   std::set<int> frames;
   int beyond = 0;
-  std::vector<Range> ranges = ranges_of(text, "--frames", "a frame");
+  std::vector<Range> ranges = ranges_of(text, "frames", "a frame");
   if (text.empty()) ranges.push_back({0, count - 1, 1});
   for (const Range& range : ranges)
     for (std::int64_t f = range.first; f <= range.last; f += range.step) {
@@ -71,7 +71,7 @@ std::vector<int> parse_frames(const std::string& text, int count, int* left_out)
     }
   if (frames.empty())
     throw InputError(
-        fmt::format("--frames {}: names no frame of this motion, which has 0 … {}", text, count - 1));
+        fmt::format("frames {}: names no frame of this motion, which has 0 … {}", text, count - 1));
   if (left_out) *left_out = beyond;
   return {frames.begin(), frames.end()};
 }
@@ -102,7 +102,7 @@ std::pair<int, int> parse_size(const std::string& text) {
   const auto size = pair_of(text, 'x');
   if (!size || std::min(size->first, size->second) < 16 || std::max(size->first, size->second) > 8192)
     throw InputError(
-        fmt::format("--size {}: is not WIDTHxHEIGHT with both in 16 … 8192, like 1920x1080", text));
+        fmt::format("size {}: is not WIDTHxHEIGHT with both in 16 … 8192, like 1920x1080", text));
   return *size;
 }
 

@@ -125,7 +125,7 @@ std::string suffix_of(const RenderOptions& options) {
                                                       : options.camera;
   for (const char c : name)
     if (!std::isalnum(static_cast<unsigned char>(c)) && c != '_' && c != '-')
-      throw InputError(fmt::format("--as {}: a name has letters, digits, _ and - only", name));
+      throw InputError(fmt::format("{}: a film's name has letters, digits, _ and - only", name));
   return name.empty() ? "" : "-" + name;
 }
 
@@ -148,7 +148,7 @@ RenderedFilm render(const RenderOptions& options) {
   int left_out = 0;
   std::vector<int> wanted = chunk_of(parse_frames(options.frames, frame_count, &left_out), options.chunk);
   if (left_out > 0)
-    log::warn("--frames {}: {} frames beyond the last, {}, are left out", options.frames, left_out,
+    log::warn("frames {}: {} frames beyond the last, {}, are left out", options.frames, left_out,
               frame_count - 1);
   const fs::path folder = options.folder / ("frames" + suffix);
   make_folder(folder);
@@ -172,7 +172,7 @@ RenderedFilm render(const RenderOptions& options) {
   };
   bool will_be_complete = true;
   for (int f = 0; f < frame_count && will_be_complete; ++f) will_be_complete = comes_or_is_there(f);
-  if (will_be_complete) render::require_film_possible(film.frames_per_second, video);
+  if (will_be_complete || options.video) render::require_film_possible(film.frames_per_second, video);
   events::tell({{"event", "frames"}, {"wanted", wanted.size()}, {"kept", wanted.size() - missing.size()}});
   const double cpu_before = cpu_seconds();
   const std::vector<Failure> failures = paint_all(shot, missing, files);

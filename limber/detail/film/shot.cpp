@@ -65,7 +65,7 @@ Shot::Shot(const scenes::Scene& scene, const std::string& camera, const plan::Pl
     if (candidate.name == camera) camera_ = &candidate;
   }
   if (!camera_)
-    throw InputError(fmt::format("--camera {}: the scene has no such camera; there are: {}", camera,
+    throw InputError(fmt::format("camera {}: the scene has no such camera; there are: {}", camera,
                                  fmt::join(names, ", ")));
   const int views = scene.film.side_by_side ? 2 : 1;
   look_.width = size_px.first / views, look_.height = size_px.second;

@@ -47,6 +47,9 @@ struct Plan::Impl {
   Json extra = {};
   Json summary = {};  // of a plan that was read; else null
 
+  explicit Impl(Problem of, plan::Plan found, Json more = {})
+      : problem(std::move(of)), plan(std::move(found)), extra(std::move(more)) {}
+
   mutable std::once_flag measured = {};
   mutable detail::MotionFigures figures = {};
   const detail::MotionFigures& motion_figures() const;
