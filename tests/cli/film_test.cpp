@@ -211,6 +211,103 @@ TEST_F(Filmed_slow, WhoMovesTheFirstCameraPaintsAllFramesAnew) {
   EXPECT_EQ(painted("[-3, -4, 2]"), frames);
 }
 
+// What an adversary does to a film, the rest of the folder being as it was: each is named, and so is the
+// film.
+TEST_F(Filmed_slow, EveryFalseWordOfAFilmIsNamed) {
+  ASSERT_EQ(limber_program({"render", out(), "--size", "64x48"}).code, exit_done);
+  ASSERT_EQ(limber_program({"render", out(), "--size", "64x48", "--as", "deep", "--passes", "depth", "--bits",
+                            "16", "--frames", "0-3", "--set", "film.clock=false", "--set", "film.caption="})
+                .code,
+            exit_done);
+  const Result good = limber_program({"verify", out(), "--film"});
+  ASSERT_EQ(good.code, exit_done) << good.out;
+  EXPECT_THAT(good.out, HasSubstr("film-deep: frames that are painted again have the same pixels"));
+
+  const fs::path work = out(), keep = out("keep");
+  fs::copy(work, keep, fs::copy_options::recursive);
+  const auto named = [&](const std::string& what, const std::string& promise, const auto& change) {
+    fs::remove_all(work);
+    fs::copy(keep, work, fs::copy_options::recursive);
+    change();
+    const Result result = limber_program({"verify", out(), "--film", "--repaint", std::to_string(frames)});
+    EXPECT_EQ(result.code, 1) << what << '\n' << result.out << result.err;
+    std::istringstream lines(result.out);
+    bool broken = false;
+    for (std::string line; std::getline(lines, line);)
+      broken =
+          broken || (line.find("BROKEN") != std::string::npos && line.find(promise) != std::string::npos);
+    EXPECT_TRUE(broken) << what << '\n' << result.out;
+  };
+  const auto told = [&](const std::string& pointer, const Json& value, const char* stage = "render") {
+    named(std::string(stage) + pointer, "manifest.json tells of this film", [&] {
+      Json manifest = read_json(work / "manifest.json");
+      manifest.at(stage)[Json::json_pointer(pointer)] = value;
+      write_json(work / "manifest.json", manifest);
+    });
+  };
+  told("/frames", frames + 1), told("/wanted", frames + 1), told("/painted", frames + 1), told("/failed", 1);
+  told("/failed", -1), told("/trajectory_hash", std::string(16, '0')), told("/time/seconds", 1);
+  told("/time/motion_s", 1), told("/time/left_out_s", 1), told("/time/speed", {2, 2}),
+      told("/quality", "best");
+  told("/camera", "near"), told("/bits", 12), told("/passes", {"beauty"}, "render-deep"), told("/sets", 7);
+  told("/size", "large"), told("/sheet", nullptr);
+
+  const auto number = [](int frame) { return fmt::format("{:04}.png", frame); };
+  const std::string says = "each frame says", pixels = "painted again",
+                    film = "made again from its frames: the", sheet = "contact sheet";
+  const auto entry = [&](const std::string& key, const Json& value, const std::string& promise,
+                         const std::string& stage = "render") {
+    named(stage + " with other " + key, promise, [&] {
+      Json manifest = read_json(work / "manifest.json");
+      manifest.at(stage)[key] = value;
+      write_json(work / "manifest.json", manifest);
+    });
+  };
+  entry("size", {64, 64}, says), entry("sets", {"film.forces=true"}, says), entry("bits", 16, says);
+  entry("sets", {"film.look=dark"}, says, "render-deep"), entry("passes", Json::array(), says, "render-deep");
+  named("no frame 2", says, [&] { fs::remove(work / "frames" / number(2)); });
+  named("a frame for another", says, [&] {
+    fs::copy_file(work / "frames" / number(1), work / "frames" / number(2),
+                  fs::copy_options::overwrite_existing);
+  });
+  named("no pass", says, [&] { fs::remove(work / "frames-deep" / "0001.depth.png"); });
+  // Another's pixels under the hash of what should be seen.
+  named("the first frame's pixels", pixels, [&] {
+    const fs::path last = work / "frames" / number(frames - 1);
+    render::Image8 picture = render::read_png(last);
+    picture.rgb[3 * 64 * 24 + 3 * 32] ^= 8;
+    render::write_png(last, picture, {{"limber-hash", *render::frame_hash(last)}});
+  });
+  named("the second frame's pixels", pixels, [&] {
+    const fs::path second = work / "frames" / number(1);
+    render::Image8 picture = render::read_png(second);
+    picture.rgb[0] ^= 1;
+    render::write_png(second, picture, {{"limber-hash", *render::frame_hash(second)}});
+  });
+  named("a pass' depths", pixels, [&] {
+    const fs::path pass = work / "frames-deep" / "0003.depth.png";
+    const std::string hash = *render::frame_hash(pass);
+    render::Raster16 depths = render::read_png_16(pass);
+    depths.levels[64 * 24 + 32] ^= 256;
+    render::write_png(pass, depths, {{"limber-hash", hash}});
+  });
+  named("no film", film, [&] { fs::remove(work / "film.mp4"); });
+  named("another film", film, [&] { fs::resize_file(work / "film.mp4", 100); });
+  named("no sheet", sheet, [&] { fs::remove(work / "sheet.png"); });
+  named("another sheet", sheet, [&] {
+    fs::copy_file(work / "frames" / number(0), work / "sheet.png", fs::copy_options::overwrite_existing);
+  });
+  // No film, and nothing to look at.
+  fs::remove_all(work);
+  fs::copy(keep, work, fs::copy_options::recursive);
+  Json manifest = read_json(work / "manifest.json");
+  manifest.erase("render"), manifest.erase("render-deep");
+  write_json(work / "manifest.json", manifest);
+  const Result none = limber_program({"verify", out(), "--film"});
+  EXPECT_EQ(none.code, exit_bad_input);
+  EXPECT_THAT(none.err, HasSubstr("limber render"));
+}
+
 class SlowMotion_slow : public Filmed {
   std::string text() const override {
     std::string edited = replaced("frames_per_second = 5\n", "frames_per_second = 5\nspeed = 0.5\n");

@@ -28,14 +28,6 @@ struct Failure {
   std::string why;
 };
 
-// Where the pictures of a frame are: 0007.png, and of its passes 0007.depth.png and so on.
-struct FrameFiles {
-  fs::path folder;
-  fs::path of(int frame, const std::string& pass = "") const {
-    return folder / fmt::format("{:04}{}{}.png", frame, pass.empty() ? "" : ".", pass);
-  }
-};
-
 // The frame's own file last: where it is good, its passes are there.
 void write(const Picture& picture, const FrameFiles& files, int frame, const std::string& hash) {
   const auto put = [&](const std::string& pass, const auto& any) {
@@ -131,18 +123,67 @@ std::string suffix_of(const RenderOptions& options) {
 
 }  // namespace
 
-RenderedFilm render(const RenderOptions& options) {
-  const std::string suffix = suffix_of(options);
-  PlanFolder planned = read_plan_folder(options.folder);
+Filming::Filming(const RenderOptions& options)
+    : suffix(suffix_of(options)),
+      files{options.folder / ("frames" + suffix)},
+      output{options.bits, options.passes},
+      planned(read_plan_folder(options.folder)) {
   planned.scene = filmed_as(planned.scene, options.sets);
-  const scenes::Scene& scene = planned.scene;
-  const auto [bodies, world] = read_world_of(planned, options.folder);
-  const std::vector<SurfaceMesh> scenery = read_scenery(scene, options.folder);
-  const scenes::FilmSpec& film = scene.film;
-  const auto size =
-      options.size.empty() ? std::pair(film.width_px, film.height_px) : parse_size(options.size);
-  const Output output{options.bits, options.passes};
-  const Shot shot(scene, options.camera, planned.plan, world, bodies, scenery, size, output);
+  of_plan = read_world_of(planned, options.folder);
+  scenery = read_scenery(planned.scene, options.folder);
+  const scenes::FilmSpec& film = planned.scene.film;
+  size_px = options.size.empty() ? std::pair(film.width_px, film.height_px) : parse_size(options.size);
+  shot.emplace(planned.scene, options.camera, planned.plan, of_plan.world, of_plan.bodies, scenery, size_px,
+               output);
+}
+
+bool Filming::is_good(int frame) const {
+  const std::string hash = shot->hash_of(frame);
+  return render::frame_hash(files.of(frame)) == hash &&
+         std::all_of(output.passes.begin(), output.passes.end(), [&](const std::string& pass) {
+           return render::frame_hash(files.of(frame, pass)) == hash;
+         });
+}
+
+std::vector<fs::path> Filming::paths() const {
+  std::vector<fs::path> paths;
+  for (int f = 0; f < shot->frames(); ++f) paths.push_back(files.of(f));
+  return paths;
+}
+
+render::Image8 Filming::sheet() const {
+  const scenes::FilmSpec& film = planned.scene.film;
+  std::vector<fs::path> shown;
+  std::vector<std::string> captions;
+  for (const int of_motion :
+       render::spread_over(shot->frames_of_motion(), film.sheet_columns * film.sheet_rows)) {
+    const int f = shot->frames_before() + of_motion;
+    shown.push_back(files.of(f));
+    captions.push_back(fmt::format("{:.2f} s", shot->time_s(f)));
+  }
+  return render::contact_sheet(shown, captions, {.columns = film.sheet_columns});
+}
+
+RenderedFilm Filming::told(const RenderOptions& options) const {
+  return {.frames = shot->frames(),
+          .size_px = size_px,
+          .camera = options.camera,
+          .sets = options.sets,
+          .passes = options.passes,
+          .bits = options.bits,
+          .time = shot->time_told(),
+          .trajectory_hash = hex(plan::hash_of(planned.plan.trajectory)),
+          .folder = files.folder,
+          .film = {},
+          .sheet = {}};
+}
+
+RenderedFilm render(const RenderOptions& options) {
+  const Filming filming(options);
+  const std::string& suffix = filming.suffix;
+  const scenes::FilmSpec& film = filming.planned.scene.film;
+  const Shot& shot = *filming.shot;
+  const FrameFiles& files = filming.files;
   const int frame_count = shot.frames();
 
   int left_out = 0;
@@ -150,19 +191,11 @@ RenderedFilm render(const RenderOptions& options) {
   if (left_out > 0)
     log::warn("frames {}: {} frames beyond the last, {}, are left out", options.frames, left_out,
               frame_count - 1);
-  const fs::path folder = options.folder / ("frames" + suffix);
-  make_folder(folder);
+  make_folder(files.folder);
   const FolderLock lock(options.folder, FolderLock::shared);
-  remove_abandoned(folder), remove_abandoned(options.folder);
-  const FrameFiles files{folder};
-  const auto is_good = [&](int frame) {
-    const std::string hash = shot.hash_of(frame);
-    return render::frame_hash(files.of(frame)) == hash &&
-           std::all_of(options.passes.begin(), options.passes.end(), [&](const std::string& pass) {
-             return render::frame_hash(files.of(frame, pass)) == hash;
-           });
-  };
-  if (!options.passes.empty()) write_json(folder / "passes.json", shot.key_of_passes());
+  remove_abandoned(files.folder), remove_abandoned(options.folder);
+  const auto is_good = [&](int frame) { return filming.is_good(frame); };
+  if (!options.passes.empty()) write_json(files.folder / "passes.json", shot.key_of_passes());
 
   std::vector<int> missing = wanted;
   if (options.resume) std::erase_if(missing, is_good);
@@ -180,34 +213,16 @@ RenderedFilm render(const RenderOptions& options) {
   throw_if_stopped();
   for (const Failure& failure : failures) log::warn("frame {}: {}", failure.frame, failure.why);
 
-  RenderedFilm result{.frames = frame_count,
-                      .wanted = wanted.size(),
-                      .painted = missing.size() - failures.size(),
-                      .failed = failures.size(),
-                      .size_px = size,
-                      .camera = options.camera,
-                      .time = shot.time_told(),
-                      .trajectory_hash = hex(plan::hash_of(planned.plan.trajectory)),
-                      .cpu_s = cpu_s,
-                      .folder = folder,
-                      .film = {},
-                      .sheet = {}};
-  std::vector<fs::path> paths;
-  for (int f = 0; f < frame_count; ++f) paths.push_back(files.of(f));
+  RenderedFilm result = filming.told(options);
+  result.wanted = wanted.size();
+  result.painted = missing.size() - failures.size(), result.failed = failures.size();
+  result.cpu_s = cpu_s;
   bool complete = true;
   for (int f = 0; f < frame_count && complete; ++f) complete = is_good(f);
   if (complete) {
     const fs::path sheet = options.folder / ("sheet" + suffix + ".png");
-    std::vector<fs::path> shown;
-    std::vector<std::string> captions;
-    for (const int of_motion :
-         render::spread_over(shot.frames_of_motion(), film.sheet_columns * film.sheet_rows)) {
-      const int f = shot.frames_before() + of_motion;
-      shown.push_back(files.of(f));
-      captions.push_back(fmt::format("{:.2f} s", shot.time_s(f)));
-    }
-    render::write_png(sheet, render::contact_sheet(shown, captions, {.columns = film.sheet_columns}));
-    render::make_film(paths, film.frames_per_second, video);
+    render::write_png(sheet, filming.sheet());
+    render::make_film(filming.paths(), film.frames_per_second, video);
     events::tell({{"event", "film"}, {"file", video.string()}});
     // Frames of an earlier, longer motion would only confuse.
     for (int f = frame_count; fs::remove(files.of(f)); ++f) {
@@ -225,6 +240,9 @@ Json json_of(const RenderedFilm& film) {
             {"failed", film.failed},
             {"size", {film.size_px.first, film.size_px.second}},
             {"camera", film.camera},
+            {"sets", film.sets},
+            {"passes", film.passes},
+            {"bits", film.bits},
             {"time",
              {{"seconds", film.time.seconds},
               {"motion_s", film.time.motion_s},

@@ -1,6 +1,8 @@
 // Films of work folders.
 #pragma once
 
+#include <fmt/format.h>
+
 #include "limber/detail/film/shot.h"
 #include "limber/detail/plan/plan.h"
 
@@ -26,12 +28,42 @@ struct RenderedFilm {
   std::size_t wanted = 0, painted = 0, failed = 0;
   std::pair<int, int> size_px;
   std::string camera;
+  std::vector<std::string> sets, passes;  // as they were asked for
+  int bits = 8;
   TimeTold time;
   std::string trajectory_hash;
   double cpu_s = 0;
   fs::path folder;                      // of the frames
   std::optional<fs::path> film, sheet;  // where every frame is there
 };
+// Where the pictures of a frame are: 0007.png, and of its passes 0007.depth.png and so on.
+struct FrameFiles {
+  fs::path folder;
+  fs::path of(int frame, const std::string& pass = "") const {
+    return folder / fmt::format("{:04}{}{}.png", frame, pass.empty() ? "" : ".", pass);
+  }
+};
+
+// What a film is made of: a folder's plan under the scene that it is filmed as, and the shot of it.
+struct Filming {
+  explicit Filming(const RenderOptions&);  // throws InputError
+  Filming(const Filming&) = delete;
+  Filming& operator=(const Filming&) = delete;
+  bool is_good(int frame) const;        // its files are there, and say the hash of what they should show
+  std::vector<fs::path> paths() const;  // of all frames
+  render::Image8 sheet() const;         // of frames that are there
+  RenderedFilm told(const RenderOptions&) const;  // but for what was painted, and written
+
+  std::string suffix;  // of its names in the folder
+  FrameFiles files;
+  Output output;
+  PlanFolder planned;
+  BodiesAndWorld of_plan;
+  std::vector<SurfaceMesh> scenery;
+  std::pair<int, int> size_px;
+  std::optional<Shot> shot;
+};
+
 // A frame that fails does not stop the others. Throws InputError, DiskError, and Interrupted with the frames
 // that are finished kept.
 RenderedFilm render(const RenderOptions&);

@@ -3,6 +3,7 @@
 #include "core/error.h"
 #include "core/hash.h"
 #include "core/progress.h"
+#include "limber/detail/verify/check_films.h"
 #include "limber/detail/verify/verify_body.h"
 #include "limber/detail/verify/verify_plan.h"
 #include "limber/detail/world/scene_world.h"
@@ -83,14 +84,15 @@ Verified verify(const VerifyOptions& options) {
     const fem::World world = build_world(planned.scene, bodies);
     MotionFigures figures;
     Verified verified = verify_plan(folder, planned, bodies, world, figures, depth);
+    if (options.film) check_films(folder, options.repaint, verified.promises);
     if (options.observables) write_observables(*options.observables, world, figures);
     return verified;
   }
   if (fs::exists(folder / "report.json")) {
-    if (options.observables || scene_is_named)
+    if (options.observables || options.film || scene_is_named)
       throw InputError(
-          fmt::format("{}: holds no plan, so there is nothing to observe, and no scene; leave --observables "
-                      "and --scene out",
+          fmt::format("{}: holds no plan, so there is nothing to observe, no film and no scene; leave "
+                      "--observables, --film and --scene out",
                       folder.string()));
     Promises table;
     check_body("body", read_body(folder), folder, std::nullopt, options.remake, table);

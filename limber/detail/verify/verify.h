@@ -44,6 +44,8 @@ struct VerifyOptions {
   std::optional<fs::path> observables;  // of a work folder: also a CSV with the figures of every frame
   SceneOptions scene;                   // the one that the plan must be of; none where its `scene` is empty
   bool remake = false;                  // of large bodies shells are made again, too
+  bool film = false;                    // films, too
+  int repaint = 5;                      // frames of each that are painted again
 };
 // Of a work folder, or of one that prepare has written. Throws InputError where it is neither.
 Verified verify(const VerifyOptions&);

@@ -1,0 +1,146 @@
+#include "limber/detail/verify/check_films.h"
+
+#include "core/error.h"
+#include "core/progress.h"
+#include "limber/detail/film/render.h"
+#include "limber/detail/interface/work_folder.h"
+#include "limber/detail/plan/manifest.h"
+#include "render/film.h"
+#include "render/png_file.h"
+
+namespace limber::detail {
+
+namespace {
+
+// The options that a film's entry tells, of the kinds that they must be.
+RenderOptions options_of(const fs::path& folder, const std::string& suffix, const Json& entry) {
+  RenderOptions options;
+  options.folder = folder;
+  options.camera = entry.at("camera").get<std::string>();
+  options.sets = entry.at("sets").get<std::vector<std::string>>();
+  options.passes = entry.at("passes").get<std::vector<std::string>>();
+  options.bits = entry.at("bits").get<int>();
+  options.size = fmt::format("{}x{}", entry.at("size").at(0).get<int>(), entry.at("size").at(1).get<int>());
+  if (!suffix.empty() && suffix != "-" + options.camera) options.name = suffix.substr(1);
+  for (const std::string& pass : options.passes)
+    if (std::find(pass_names.begin(), pass_names.end(), pass) == pass_names.end())
+      throw InputError(fmt::format("there is no pass \"{}\"", pass));
+  if (options.bits != 8 && options.bits != 16)
+    throw InputError(fmt::format("{} bits a channel: they are 8 or 16", options.bits));
+  return options;
+}
+
+// What the entry says otherwise than the film is, or could not be; empty: nothing.
+std::string false_word(const Json& entry, Json is) {
+  const auto count = [&](const char* key) { return entry.at(key).get<std::int64_t>(); };
+  if (count("failed") < 0 || count("painted") < 0 || count("painted") + count("failed") > count("wanted") ||
+      count("wanted") > count("frames"))
+    return "it counts more frames than there are";
+  for (const char* key : {"wanted", "painted", "failed", "cpu_s", "folder"})  // what was done, and where
+    is[key] = entry.at(key);
+  if (entry.contains("film") != entry.contains("sheet")) return "a film has a contact sheet";
+  for (const char* key : {"film", "sheet"})
+    if (entry.contains(key)) is[key] = entry.at(key).get<std::string>();
+  for (const auto& [key, value] : is.items())
+    if (entry.at(key) != value)
+      return fmt::format("{} is {}, and not {}", key, value.dump(), entry.at(key).dump());
+  return entry.size() == is.size() ? "" : "it holds more than limber writes there";
+}
+
+// Which file of a frame, painted anew, is another; empty: none.
+std::string other_picture(const Filming& filming, Shot::Painter& painter, int frame, const fs::path& again) {
+  const Picture picture = painter.paint(frame);
+  const auto differs = [&](const std::string& pass, const auto& any) {
+    std::visit([&](const auto& image) { render::write_png(again, image); }, any);
+    return render::read_png_16(again) != render::read_png_16(filming.files.of(frame, pass));
+  };
+  if (differs("", picture.frame)) return filming.files.of(frame).filename().string();
+  for (const auto& [pass, image] : picture.passes)
+    if (differs(pass, image)) return filming.files.of(frame, pass).filename().string();
+  return "";
+}
+
+// Where the folder was moved, its files went with it.
+fs::path found(const fs::path& folder, const fs::path& told) {
+  return fs::exists(told) ? told : folder / told.filename();
+}
+
+void check_film(const fs::path& folder, const std::string& suffix, const Json& entry, int repaint,
+                Promises& table) {
+  const RenderOptions options = options_of(folder, suffix, entry);
+  const Filming filming(options);
+  const std::string name = "film" + suffix + ": ";
+  const std::string wrong = false_word(entry, json_of(filming.told(options)));
+  table.row(name + "manifest.json tells of this film", wrong.empty(), wrong);
+
+  const int count = filming.shot->frames();
+  const bool is_whole = entry.contains("film");
+  std::vector<int> good, bad;
+  for (int f = 0; f < count; ++f) {
+    throw_if_stopped();
+    if (filming.is_good(f))
+      good.push_back(f);
+    else if (is_whole || fs::exists(filming.files.of(f)))
+      bad.push_back(f);
+  }
+  table.row(name + "each frame says that it shows what it should", bad.empty() && !good.empty(),
+            good.empty() ? "there is none"
+            : bad.empty()
+                ? fmt::format("{} of {} frames", good.size(), count)
+                : fmt::format("{} do not; the first is {}", bad.size(), filming.files.of(bad[0]).string()));
+  if (!bad.empty() || good.empty()) return;
+
+  std::string other;
+  std::vector<int> painted;
+  const WorkFolder scratch("");
+  Shot::Painter painter(*filming.shot);
+  for (const int i : render::spread_over(int(good.size()), repaint)) {
+    throw_if_stopped();
+    painted.push_back(good[std::size_t(i)]);
+    if (other.empty()) other = other_picture(filming, painter, painted.back(), scratch.path() / "again.png");
+  }
+  table.row(name + "frames that are painted again have the same pixels", other.empty(),
+            other.empty() ? painted.size() < good.size()
+                                ? fmt::format("{} of them: {}", painted.size(), fmt::join(painted, ", "))
+                                : "all of them"
+                          : other + " has others (another OSMesa may paint otherwise)");
+  if (!is_whole) return;
+
+  const fs::path film = found(folder, entry.at("film").get<std::string>());
+  const fs::path again = scratch.path() / ("again" + film.extension().string());
+  render::make_film(filming.paths(), filming.planned.scene.film.frames_per_second, again);
+  const bool film_is = fs::exists(film) && read_file(film) == read_file(again);
+  table.row(name + "made again from its frames: the same bytes", film_is,
+            film_is ? film.filename().string()
+                    : film.string() + " has others, or is not there (another ffmpeg makes others)");
+  const fs::path sheet = found(folder, entry.at("sheet").get<std::string>());
+  const bool sheet_is = fs::exists(sheet) && render::read_png(sheet) == filming.sheet();
+  table.row(name + "contact sheet made again from its frames: the same pixels", sheet_is,
+            sheet.filename().string());
+}
+
+}  // namespace
+
+void check_films(const fs::path& folder, int repaint, Promises& table) {
+  constexpr std::string_view stage = "render";
+  const Json manifest = read_manifest(folder);
+  int films = 0;
+  for (const auto& [key, entry] : manifest.items()) {
+    if (key != stage && !key.starts_with(std::string(stage) + "-")) continue;
+    ++films;
+    const std::string suffix = key.substr(stage.size());
+    try {
+      check_film(folder, suffix, entry, repaint, table);
+    } catch (const Json::exception&) {
+      table.row("film" + suffix + ": manifest.json tells of this film", false,
+                "it does not tell what a film is made by; an older limber's did not: render it again");
+    } catch (const InputError& error) {
+      table.row("film" + suffix + ": manifest.json tells of this film", false, error.what());
+    }
+  }
+  if (films == 0)
+    throw InputError(
+        fmt::format("{}: manifest.json tells of no film; make one with limber render", folder.string()));
+}
+
+}  // namespace limber::detail
