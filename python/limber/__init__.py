@@ -28,6 +28,7 @@ from html import escape as _escape
 from typing import Any, Callable, Dict, List, NamedTuple, Optional, Sequence, Tuple, TypeVar, Union, cast
 
 import numpy as np
+from numpy.typing import NDArray
 
 from . import _limber
 from ._limber import (Binding, Body, Cage, Certificate, DiskError, InputError, InternalError, __version__,
@@ -42,7 +43,8 @@ __all__ = [
 
 Path = Union[str, "os.PathLike[str]"]
 Progress = Callable[[str, int, int, str], Any]
-Hull = Tuple[np.ndarray, np.ndarray]
+Array = NDArray[Any]
+Hull = Tuple[Array, Array]
 _F = TypeVar("_F", bound=Callable[..., Any])
 
 _text = (str, os.PathLike)
@@ -85,8 +87,8 @@ def _list_of(paths: Any) -> List[Any]:
 
 
 class Mesh(NamedTuple):
-    vertices: np.ndarray  # (V, 3) float64, metres
-    faces: np.ndarray     # (F, 3) int32, counter-clockwise seen from outside
+    vertices: Array  # (V, 3) float64, metres
+    faces: Array     # (F, 3) int32, counter-clockwise seen from outside
     mended: List[str]     # what was done, as sentences
     warnings: List[str]   # what looks wrong
 
@@ -102,7 +104,7 @@ class Decomposition(Sequence[Hull]):
 
     def __init__(self, told: Dict[str, Any]):
         self.hulls: List[Hull] = told["hulls"]
-        self.neighbours: np.ndarray = told["neighbours"]          # (n, 2): hulls that share a cut
+        self.neighbours: Array = told["neighbours"]          # (n, 2): hulls that share a cut
         self.stopped_by: str = told["stopped_by"]                 # "count", "concavity", "gain", "exact"
         self.mean_overshoot: float = told["mean_overshoot"]       # over the model's diagonal
         self.max_overshoot: float = told["max_overshoot"]
@@ -112,7 +114,7 @@ class Decomposition(Sequence[Hull]):
     def __len__(self) -> int:
         return len(self.hulls)
 
-    def __getitem__(self, i):  # type: ignore[no-untyped-def, override]
+    def __getitem__(self, i):  # type: ignore[no-untyped-def]
         return self.hulls[i]
 
     def __repr__(self) -> str:
@@ -198,16 +200,19 @@ def _html_of_body(body: Body) -> str:
 
 
 Body._repr_html_ = _html_of_body  # type: ignore[attr-defined]
-Body.__repr__ = lambda self: (  # type: ignore[method-assign]
-    f"<limber.Body: {len(self.vertices)} vertices, {len(self.hulls)} hulls, {len(self.cage.tets)} tets>")
-Cage.__repr__ = lambda self: (  # type: ignore[method-assign]
-    f"<limber.Cage: {len(self.tets)} tets, {len(self.vertices)} nodes>")
-Binding.__repr__ = lambda self: (  # type: ignore[method-assign]
-    f"<limber.Binding: {len(self.weights)} vertices, {self.outside} of them outside>")
-Certificate.__repr__ = lambda self: (  # type: ignore[method-assign]
-    "<limber.Certificate: " + ("holds" if self.holds else
-                               f"{self.vertices_outside} vertices outside, {self.triangles_crossing} triangles cross")
-    + ">")
+def _shows(words: Callable[[Any], str]) -> Callable[[Any], str]:
+    def __repr__(self: Any) -> str:
+        return f"<limber.{type(self).__name__}: {words(self)}>"
+    return __repr__
+
+
+for _named, _words in (
+        (Body, lambda body: f"{len(body.vertices)} vertices, {len(body.hulls)} hulls, {len(body.cage.tets)} tets"),
+        (Cage, lambda cage: f"{len(cage.tets)} tets, {len(cage.vertices)} nodes"),
+        (Binding, lambda bound: f"{len(bound.weights)} vertices, {bound.outside} of them outside"),
+        (Certificate, lambda told: "holds" if told.holds else
+         f"{told.vertices_outside} vertices outside, {told.triangles_crossing} triangles cross")):
+    setattr(_named, "__repr__", _shows(_words))
 
 
 class Prepared(NamedTuple):
@@ -346,10 +351,10 @@ def _toml(value: Any) -> str:
 
 class States(NamedTuple):
     """States of a world, one a row; time = steps × World.dt_s."""
-    positions: np.ndarray   # (B, N, 3) float32, metres
-    velocities: np.ndarray  # (B, N, 3) float32, metres a second
-    steps: np.ndarray       # (B,) int64
-    sound: np.ndarray       # (B,) bool; False: the dynamics diverged, now or before, and the state means nothing
+    positions: Array   # (B, N, 3) float32, metres
+    velocities: Array  # (B, N, 3) float32, metres a second
+    steps: Array       # (B,) int64
+    sound: Array       # (B,) bool; False: the dynamics diverged, now or before, and the state means nothing
 
 
 _kinds = ("none", "body", "control_point", "interpolation", "hold")
@@ -357,7 +362,7 @@ _kinds = ("none", "body", "control_point", "interpolation", "hold")
 
 @_checked
 def pushes(count: int, kind: str = "body", *, steps: Any, force_n: Any = 0, node: Any = -1, radius_m: Any = 0,
-           target_m: Any = 0, max_force_n: Any = 0) -> np.ndarray:
+           target_m: Any = 0, max_force_n: Any = 0) -> Array:
     """`count` pushes of the robot, as rows of push_dtype; each argument is one for all, or one a push.
 
     "body": force_n on the whole robot. "control_point": the same near `node` alone, within radius_m.
@@ -376,7 +381,7 @@ def pushes(count: int, kind: str = "body", *, steps: Any, force_n: Any = 0, node
     for name, value in (("force_n", force_n), ("radius_m", radius_m), ("target_m", target_m),
                         ("max_force_n", max_force_n)):
         try:
-            finite = np.isfinite(np.asarray(value, dtype=np.float32)).all()
+            finite = bool(np.isfinite(np.asarray(value, dtype=np.float32)).all())
         except (TypeError, ValueError):
             finite = False
         if not finite:
@@ -423,7 +428,7 @@ class World:
         return States(*self._world.start(copies))
 
     @_checked
-    def rollout(self, states: States, pushes: np.ndarray, *, threads: int = 0) -> States:
+    def rollout(self, states: States, pushes: Array, *, threads: int = 0) -> States:
         """Where each state is led by the push of its row. A result depends on its state and push alone."""
         if len(states) != 4:
             raise TypeError("rollout: states must be States, as start() and rollout() give them")
@@ -431,7 +436,7 @@ class World:
         return States(*self._world.rollout(states.positions, states.velocities, states.steps, states.sound, pushes,
                                            threads=threads))
 
-    def robot_centers(self, states: States) -> np.ndarray:
+    def robot_centers(self, states: States) -> Array:
         """(B, 3) centres of mass of the robot, metres."""
         return self._world.robot_centers(states.positions, states.velocities, states.steps, states.sound)
 
@@ -448,10 +453,13 @@ class World:
         """
         if resume is not None and not isinstance(resume, Plan):
             raise TypeError(f"plan: resume is {resume!r:.60}; it must be a Plan or None")
+        def keep_so_far(found: "_limber.Plan") -> None:
+            if keep is not None:
+                keep(Plan(found, self))
         return Plan(self._world.plan(seed=seed, iterations=iterations, time_limit_s=time_limit,
                                      shortcut_rounds=shortcut, cost=cost, improve=improve,
                                      earlier=None if resume is None else resume._plan,
-                                     keep=None if keep is None else lambda found: keep(Plan(found, self)),
+                                     keep=keep_so_far,
                                      progress=progress, threads=threads), self)
 
     @_checked
@@ -489,29 +497,29 @@ class Plan:
         return self._states
 
     @property
-    def frames(self) -> np.ndarray:
+    def frames(self) -> Array:
         """(f, N, 3) positions of the nodes of all bodies that move."""
         return self.states.positions
 
     @property
-    def pushes(self) -> np.ndarray:
+    def pushes(self) -> Array:
         """From the start, rows of push_dtype."""
         return self._plan.pushes
 
     @_checked
-    def surface(self, body: str, frame: int) -> np.ndarray:
+    def surface(self, body: str, frame: int) -> Array:
         """(V, 3) of the fine surface; a negative frame counts from the last."""
         count = self._plan.frame_count
         return self._plan.surface(_index(body, self._bodies), frame + count if frame < 0 else frame)
 
-    def faces(self, body: str) -> np.ndarray:
+    def faces(self, body: str) -> Array:
         """(F, 3) of the fine surface, rows of surface()."""
         return self._plan.world.bodies[_index(body, self._bodies)].faces
 
     @property
     def summary(self) -> Dict[str, Any]:
         """What `limber plan --json` prints."""
-        return json.loads(self._plan.summary_json())
+        return json.loads(self._plan.summary_json())  # type: ignore[no-any-return]
 
     def save(self, folder: Path) -> None:
         """plan.npz and all that `limber plan -o` leaves in a work folder, bodies included."""
@@ -562,7 +570,7 @@ def plan(scene: Union[Scene, Path], out: Optional[Path] = None, *, preset: str =
     world = World(scene, "" if out is None else out, progress=progress, threads=threads)
     found = world.plan(seed=seed, iterations=iterations, time_limit=time_limit, shortcut=shortcut, cost=cost,
                        improve=improve, resume=load_plan(out) if resume and out is not None else None,
-                       keep=None if out is None else lambda so_far: so_far.save(out), progress=progress,
+                       keep=lambda so_far: None if out is None else so_far.save(out), progress=progress,
                        threads=threads)
     if out is not None:
         found.save(out)

@@ -163,6 +163,13 @@ class Meshes(unittest.TestCase):
         with self.assertRaisesRegex(limber.InputError, "no.such.folder is no folder"):
             limber.Scene("barriers1", data="no.such.folder")
 
+    def test_what_is_printed_says_what_it_is(self):
+        body = limber.prepare(CUBE, FACES, tets=100)
+        self.assertEqual(repr(body.certificate), "<limber.Certificate: holds>")
+        self.assertEqual(repr(body.cage), f"<limber.Cage: {len(body.cage.tets)} tets, {len(body.cage.vertices)} nodes>")
+        self.assertIn(" 1 hulls, ", repr(body))
+        self.assertIn(" 0 of them outside", repr(body.binding))
+
     def test_units_are_those_of_files_and_arrays_alike(self):
         with tempfile.TemporaryDirectory() as folder:
             file = os.path.join(folder, "slab.obj")
