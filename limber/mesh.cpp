@@ -9,9 +9,9 @@
 #include "limber/detail/body/model_content.h"
 #include "limber/detail/body/prepare.h"
 #include "limber/detail/body/preview.h"
+#include "limber/detail/body/work_folder.h"
 #include "limber/detail/interface/arrays.h"
 #include "limber/detail/interface/body.h"
-#include "limber/detail/interface/work_folder.h"
 #include "limber/detail/interface/working_for.h"
 
 namespace limber {

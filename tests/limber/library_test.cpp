@@ -89,7 +89,8 @@ TEST_F(Library, WhatIsWrongIsNamed) {
   Mesh broken = cube();
   broken.faces[3][1] = 17;
   EXPECT_THAT(complaint([&] { decompose(broken); }), HasSubstr("17"));
-  EXPECT_THAT(complaint([&] { decompose(cube(), {.max_convex_hull = 0}); }), HasSubstr("at least 1"));
+  EXPECT_THAT(complaint([&] { decompose(cube(), {.max_convex_hull = 0}); }),
+              HasSubstr("must be in [1, 1000]"));
   EXPECT_THAT(complaint([&] { build_cage(cube(), {}, {.mode = "lettuce"}); }), HasSubstr("\"lattice\""));
   EXPECT_THAT(complaint([&] { build_cage(cube(), {}, {.tets = 3}); }), HasSubstr("24"));
   EXPECT_THAT(complaint([&] { prepare(cube(), {.tets = 0}); }), HasSubstr("24"));

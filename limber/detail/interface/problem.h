@@ -5,7 +5,7 @@
 #include <mutex>
 #include <vector>
 
-#include "limber/detail/interface/work_folder.h"
+#include "limber/detail/body/work_folder.h"
 #include "limber/detail/plan/plan.h"
 #include "limber/detail/world/scene_world.h"
 #include "limber/scene.h"

@@ -2,8 +2,8 @@
 
 #include "core/error.h"
 #include "core/progress.h"
+#include "limber/detail/body/work_folder.h"
 #include "limber/detail/film/render.h"
-#include "limber/detail/interface/work_folder.h"
 #include "limber/detail/plan/manifest.h"
 #include "render/film.h"
 #include "render/png_file.h"

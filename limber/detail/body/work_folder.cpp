@@ -1,4 +1,4 @@
-#include "limber/detail/interface/work_folder.h"
+#include "limber/detail/body/work_folder.h"
 
 #include <fmt/format.h>
 #include <stdlib.h>

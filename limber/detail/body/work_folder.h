@@ -1,4 +1,4 @@
-// Where a call of the interface works that is told no folder.
+// Where a call works that is told no folder.
 #pragma once
 
 #include <filesystem>
