@@ -30,12 +30,14 @@ void DescribedCommands::add_result_commands() {
   verify_command.add_flag("--remake", verify_options.remake,
                           "make the convex shells of large bodies (over 20,000 triangles) again, too, and "
                           "compare; else they are only checked against what shells must be");
-  verify_command.add_flag("--film", verify_options.film,
-                          "films, too: every frame says what it shows, some are painted again, film and "
-                          "contact sheet are made again from the frames");
+  CLI::Option* const film =
+      verify_command.add_flag("--film", verify_options.film,
+                              "films, too: every frame says what it shows, some are painted again, film and "
+                              "contact sheet are made again from the frames");
   verify_command
       .add_option("--repaint", verify_options.repaint,
                   "frames of each film that --film paints again, spread evenly, 1 … 1000000")
+      ->needs(film)
       ->check(CLI::Range(1, 1'000'000))
       ->capture_default_str();
   verify_command.callback([&] { chosen = [&] { return cli::verify(verify_options); }; });

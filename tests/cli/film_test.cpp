@@ -297,6 +297,13 @@ TEST_F(Filmed_slow, EveryFalseWordOfAFilmIsNamed) {
   named("another sheet", sheet, [&] {
     fs::copy_file(work / "frames" / number(0), work / "sheet.png", fs::copy_options::overwrite_existing);
   });
+  // Of a folder that was copied, its own film is looked at, not that of where it came from.
+  fs::remove_all(work);
+  fs::copy(keep, work, fs::copy_options::recursive);
+  EXPECT_EQ(limber_program({"verify", keep.string(), "--film"}).code, exit_done);
+  fs::remove(keep / "film.mp4");
+  EXPECT_EQ(limber_program({"verify", keep.string(), "--film"}).code, 1);
+  fs::copy_file(work / "film.mp4", keep / "film.mp4");
   // No film, and nothing to look at.
   fs::remove_all(work);
   fs::copy(keep, work, fs::copy_options::recursive);

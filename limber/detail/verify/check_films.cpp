@@ -60,9 +60,11 @@ std::string other_picture(const Filming& filming, Shot::Painter& painter, int fr
   return "";
 }
 
-// Where the folder was moved, its files went with it.
-fs::path found(const fs::path& folder, const fs::path& told) {
-  return fs::exists(told) ? told : folder / told.filename();
+// What was written beside the frames' folder is here, wherever that was then: another folder's film is no
+// word for this one's.
+fs::path found(const fs::path& folder, const Json& entry, const char* key) {
+  const fs::path told = entry.at(key).get<std::string>(), frames = entry.at("folder").get<std::string>();
+  return told.parent_path() == frames.parent_path() ? folder / told.filename() : told;
 }
 
 void check_film(const fs::path& folder, const std::string& suffix, const Json& entry, int repaint,
@@ -106,17 +108,16 @@ void check_film(const fs::path& folder, const std::string& suffix, const Json& e
                           : other + " has others (another OSMesa may paint otherwise)");
   if (!is_whole) return;
 
-  const fs::path film = found(folder, entry.at("film").get<std::string>());
+  const fs::path film = found(folder, entry, "film");
   const fs::path again = scratch.path() / ("again" + film.extension().string());
   render::make_film(filming.paths(), filming.planned.scene.film.frames_per_second, again);
   const bool film_is = fs::exists(film) && read_file(film) == read_file(again);
-  table.row(name + "made again from its frames: the same bytes", film_is,
-            film_is ? film.filename().string()
-                    : film.string() + " has others, or is not there (another ffmpeg makes others)");
-  const fs::path sheet = found(folder, entry.at("sheet").get<std::string>());
+  table.row(
+      name + "made again from its frames: the same bytes", film_is,
+      film_is ? film.string() : film.string() + " has others, or is not there (another ffmpeg makes others)");
+  const fs::path sheet = found(folder, entry, "sheet");
   const bool sheet_is = fs::exists(sheet) && render::read_png(sheet) == filming.sheet();
-  table.row(name + "contact sheet made again from its frames: the same pixels", sheet_is,
-            sheet.filename().string());
+  table.row(name + "contact sheet made again from its frames: the same pixels", sheet_is, sheet.string());
 }
 
 }  // namespace
