@@ -4,9 +4,11 @@
 #include <array>
 #include <cmath>
 #include <map>
+#include <optional>
 #include <utility>
 #include <vector>
 
+#include "core/progress.h"
 #include "meshing/detail/edges.h"
 
 namespace limber::meshing {
@@ -77,6 +79,53 @@ OldCorners of_piece(const std::array<int, 3>& piece, const std::array<int, 3>& v
   return of;
 }
 
+struct CutSurface {
+  std::vector<Vec3> points;
+  std::vector<std::array<int, 3>> triangles;
+  std::vector<OldCorners> old_corners;  // of triangles, where they are wanted
+};
+
+// Nothing where it would take more new vertices than that: the cuts of a needle leave needles, whose sides
+// nobody counts beforehand.
+std::optional<CutSurface> cut_to(const SurfaceMesh& surface, double longest_m, int max_new_vertices,
+                                 bool with_old_corners) {
+  CutSurface now, next;
+  for (Eigen::Index i = 0; i < surface.positions.rows(); ++i)
+    now.points.emplace_back(surface.positions.row(i));
+  const std::size_t max_points = now.points.size() + std::size_t(max_new_vertices);
+  for (Eigen::Index i = 0; i < surface.triangles.rows(); ++i)
+    now.triangles.push_back({surface.triangles(i, 0), surface.triangles(i, 1), surface.triangles(i, 2)});
+  for (int t = 0; with_old_corners && t < int(now.triangles.size()); ++t)
+    now.old_corners.push_back({t, Eigen::Matrix3d::Identity()});
+
+  for (bool cut_some = true; cut_some;) {
+    throw_if_stopped();
+    std::map<Edge, int> middles;
+    next.triangles.clear();
+    next.old_corners.clear();
+    cut_some = false;
+    for (std::size_t t = 0; t < now.triangles.size(); ++t) {
+      const std::array<int, 3>& v = now.triangles[t];
+      std::array<int, 3> m{-1, -1, -1};
+      for (std::size_t k = 0; k < 3; ++k) {
+        const int a = v[k], b = v[(k + 1) % 3];
+        if (length(now.points, a, b) <= longest_m) continue;
+        const auto [at, fresh] = middles.try_emplace(std::minmax(a, b), int(now.points.size()));
+        if (fresh) now.points.push_back(0.5 * (now.points[std::size_t(a)] + now.points[std::size_t(b)]));
+        m[k] = at->second, cut_some = true;
+      }
+      const std::size_t first = next.triangles.size();
+      cut(now.points, v, m, next.triangles);
+      for (std::size_t i = first; with_old_corners && i < next.triangles.size(); ++i)
+        next.old_corners.push_back(of_piece(next.triangles[i], v, m, now.old_corners[t]));
+    }
+    if (now.points.size() > max_points) return std::nullopt;
+    now.triangles.swap(next.triangles);
+    now.old_corners.swap(next.old_corners);
+  }
+  return now;
+}
+
 }  // namespace
 
 double longest_edge(const SurfaceMesh& surface, int tets, const SplitSettings& settings) {
@@ -86,46 +135,16 @@ double longest_edge(const SurfaceMesh& surface, int tets, const SplitSettings& s
 SurfaceMesh split_long_edges(const SurfaceMesh& surface, double longest_m, const SplitSettings& settings,
                              CornerMap* corners) {
   while (vertices_needed(surface, longest_m) > settings.max_new_vertices) longest_m *= 2;
-  std::vector<Vec3> points;
-  for (Eigen::Index i = 0; i < surface.positions.rows(); ++i) points.emplace_back(surface.positions.row(i));
-  std::vector<std::array<int, 3>> triangles, cut_ones;
-  std::vector<OldCorners> old_corners,
-      old_corners_of_cut;  // of triangles and cut_ones, where they are wanted
-  for (Eigen::Index i = 0; i < surface.triangles.rows(); ++i)
-    triangles.push_back({surface.triangles(i, 0), surface.triangles(i, 1), surface.triangles(i, 2)});
-  for (int t = 0; corners && t < int(triangles.size()); ++t)
-    old_corners.push_back({t, Eigen::Matrix3d::Identity()});
-
-  for (bool cut_some = true; cut_some; triangles.swap(cut_ones)) {
-    std::map<Edge, int> middles;
-    cut_ones.clear();
-    cut_some = false;
-    old_corners_of_cut.clear();
-    for (std::size_t t = 0; t < triangles.size(); ++t) {
-      const std::array<int, 3>& v = triangles[t];
-      std::array<int, 3> m{-1, -1, -1};
-      for (std::size_t k = 0; k < 3; ++k) {
-        const int a = v[k], b = v[(k + 1) % 3];
-        if (length(points, a, b) <= longest_m) continue;
-        const auto [at, fresh] = middles.try_emplace(std::minmax(a, b), int(points.size()));
-        if (fresh) points.push_back(0.5 * (points[std::size_t(a)] + points[std::size_t(b)]));
-        m[k] = at->second, cut_some = true;
-      }
-      const std::size_t first = cut_ones.size();
-      cut(points, v, m, cut_ones);
-      for (std::size_t i = first; corners && i < cut_ones.size(); ++i)
-        old_corners_of_cut.push_back(of_piece(cut_ones[i], v, m, old_corners[t]));
-    }
-    old_corners.swap(old_corners_of_cut);
-  }
-  SurfaceMesh out{Points(points.size(), 3), Triangles(triangles.size(), 3)};
-  for (std::size_t i = 0; i < points.size(); ++i) out.positions.row(Eigen::Index(i)) = points[i];
-  for (std::size_t i = 0; i < triangles.size(); ++i)
-    out.triangles.row(Eigen::Index(i)) << triangles[i][0], triangles[i][1], triangles[i][2];
+  std::optional<CutSurface> cut;
+  for (; !cut; longest_m *= 2) cut = cut_to(surface, longest_m, settings.max_new_vertices, corners);
+  SurfaceMesh out{Points(cut->points.size(), 3), Triangles(cut->triangles.size(), 3)};
+  for (std::size_t i = 0; i < cut->points.size(); ++i) out.positions.row(Eigen::Index(i)) = cut->points[i];
+  for (std::size_t i = 0; i < cut->triangles.size(); ++i)
+    out.triangles.row(Eigen::Index(i)) << cut->triangles[i][0], cut->triangles[i][1], cut->triangles[i][2];
   if (!corners) return out;
   corners->triangle.clear();
   corners->weights.resize(3 * out.triangles.rows(), 3);
-  for (const OldCorners& old : old_corners) {
+  for (const OldCorners& old : cut->old_corners) {
     corners->weights.middleRows<3>(3 * Eigen::Index(corners->triangle.size())) = old.weights;
     corners->triangle.push_back(old.triangle);
   }

@@ -133,57 +133,58 @@ Box box_of(const std::array<Vec3, N>& corners, const detail::Axes& axes) {
   return box;
 }
 
-std::vector<detail::TrianglePiece> pieces_along(const detail::Axes& axes, const Points& positions,
-                                                const Triangles& triangles) {
-  const Points turned = axes.along(positions);
-  std::vector<detail::TrianglePiece> pieces = detail::pieces_of(turned, triangles);
-  const double rounding = axes.rounding(largest_coordinate(bounding_box(turned)));
-  for (detail::TrianglePiece& piece : pieces) widen(piece.box, rounding);
-  return pieces;
-}
-
-std::vector<Box> boxes_of(const std::vector<detail::TrianglePiece>& pieces) {
-  std::vector<Box> boxes;
-  for (const detail::TrianglePiece& piece : pieces) boxes.push_back(piece.box);
-  return boxes;
-}
-
 Tri corners(const Points& positions, const Triangles& triangles, int f) {
   return {positions.row(triangles(f, 0)), positions.row(triangles(f, 1)), positions.row(triangles(f, 2))};
 }
 
-// Rejects boxes along the axes that lie beyond one of the tet's faces; a rounding margin keeps it from
-// rejecting too much.
-struct TetRejects {
-  Box box;
-  std::array<Vec3, 4> normal;      // outwards
-  std::array<double, 4> farthest;  // n·x of the face, plus the margin
-
+// Rejects boxes along the axes that lie beyond one of the tet's faces, and, where needles lie along turned
+// axes, those that a plane through an edge of the tet and along an axis parts from it: without, each needle
+// of a bundle is asked about a tet that passes it askew. A rounding margin keeps it from rejecting too much.
+class TetRejects {
+ public:
   TetRejects(const detail::Axes& axes, const Tet& tet) {
     const Tet t = along(axes, tet);
-    box = box_of(t, axes);
+    box_ = box_of(t, axes);
     static constexpr int face[4][3] = {{1, 3, 2}, {0, 2, 3}, {0, 3, 1}, {0, 1, 2}};
-    const double size = largest_coordinate(box);
     for (int i = 0; i < 4; ++i) {
       const Vec3& a = t[face[i][0]];
-      Vec3 n = (t[face[i][1]] - a).cross(t[face[i][2]] - a);
-      if (n.dot(t[i] - a) > 0) n = -n;
-      normal[i] = n;
-      farthest[i] =
-          std::max({n.dot(t[0]), n.dot(t[1]), n.dot(t[2]), n.dot(t[3])}) + 1e-13 * n.cwiseAbs().sum() * size;
+      const Vec3 n = (t[face[i][1]] - a).cross(t[face[i][2]] - a);
+      add(n.dot(t[i] - a) > 0 ? Vec3(-n) : n, t);
     }
+    for (int i = 0; axes.turned() && i < 4; ++i)
+      for (int j = 0; j < i; ++j)
+        for (int axis = 0; axis < 3; ++axis) {
+          const Vec3 n = (t[i] - t[j]).cross(Vec3::Unit(axis));
+          add(n, t), add(-n, t);
+        }
   }
+  // Of the other box only what lies in the tet's own counts: of a needle's box, which is long, a short part.
   bool operator()(const Box& other) const {
-    if (disjoint(box, other)) return true;
-    for (int i = 0; i < 4; ++i) {
-      const Vec3& n = normal[i];
-      const double nearest = n.x() * (n.x() > 0 ? other.lower.x() : other.upper.x()) +
-                             n.y() * (n.y() > 0 ? other.lower.y() : other.upper.y()) +
-                             n.z() * (n.z() > 0 ? other.lower.z() : other.upper.z());
-      if (nearest > farthest[i]) return true;
+    const Vec3 lower = box_.lower.cwiseMax(other.lower), upper = box_.upper.cwiseMin(other.upper);
+    if ((lower.array() > upper.array()).any()) return true;
+    for (int i = 0; i < count_; ++i) {
+      const Vec3& n = bounds_[i].normal;
+      const double nearest = n.x() * (n.x() > 0 ? lower.x() : upper.x()) +
+                             n.y() * (n.y() > 0 ? lower.y() : upper.y()) +
+                             n.z() * (n.z() > 0 ? lower.z() : upper.z());
+      if (nearest > bounds_[i].farthest) return true;
     }
     return false;
   }
+
+ private:
+  struct Bound {
+    Vec3 normal;
+    double farthest;  // normal·x of the tet, plus the margin
+  };
+  void add(const Vec3& n, const Tet& t) {
+    bounds_[count_++] = {n, std::max({n.dot(t[0]), n.dot(t[1]), n.dot(t[2]), n.dot(t[3])}) +
+                                1e-13 * n.cwiseAbs().sum() * largest_coordinate(box_)};
+  }
+
+  Box box_;
+  std::array<Bound, 4 + 2 * 6 * 3> bounds_;
+  int count_ = 0;
 };
 
 // Which triangles a question was put to; now and then it forgets one, and that is asked again.
@@ -227,8 +228,8 @@ SurfaceTree::SurfaceTree(const Points& positions, const Triangles& triangles)
     : positions_(positions),
       triangles_(triangles),
       axes_(positions, triangles),
-      pieces_(pieces_along(axes_, positions, triangles)),
-      tree_(boxes_of(pieces_)) {}
+      pieces_(detail::pieces_along(axes_, positions, triangles)),
+      tree_(detail::boxes_of(pieces_)) {}
 
 bool SurfaceTree::meets_triangle(const Vec3& a, const Vec3& b, const Vec3& c) const {
   throw_if_stopped();

@@ -1,6 +1,7 @@
 #include "meshing/detail/coarsen.h"
 
 #include <algorithm>
+#include <optional>
 #include <set>
 
 #include "meshing/detail/edit_tets.h"
@@ -11,7 +12,12 @@ namespace {
 class Coarsener {
  public:
   Coarsener(const CageModel& model, const SurfaceMesh& surface, const TetLimits& limits, const TetMesh& mesh)
-      : model_(model), surface_(surface), limits_(limits), tets_(mesh), on_boundary_(tets_.positions.size()) {
+      : model_(model),
+        surface_(surface),
+        limits_(limits),
+        tets_(mesh),
+        on_boundary_(tets_.positions.size()),
+        glued_(tets_.tets.size()) {
     for (int v : vertices_of(boundary_triangles(mesh.tets))) on_boundary_[v] = true;
   }
 
@@ -128,11 +134,23 @@ class Coarsener {
       const auto& [a, b, c, d] = after.back();
       if (!keeps_limits(limits_, a, b, c, d)) return false;
     }
-    int glued = 0;
-    for (const auto& corners : after) glued += is_glued(model_, surface_, corners);
-    if (glued == 0) return true;
-    for (int t : tets_.star[v]) glued -= is_glued(model_, surface_, tets_.corners(t));
-    return glued <= 0;
+    int glued = 0, glued_before = -1;
+    for (const auto& corners : after) {
+      if (!is_glued(model_, surface_, corners)) continue;
+      if (glued_before < 0) glued_before = glued_round(v);
+      if (++glued > glued_before) return false;
+    }
+    return true;
+  }
+
+  int glued_round(int v) const {
+    int count = 0;
+    for (int t : tets_.star[v]) {
+      std::optional<bool>& glued = glued_[t];
+      if (!glued) glued = is_glued(model_, surface_, tets_.corners(t));
+      count += *glued;
+    }
+    return count;
   }
 
   void apply(int v, int w) {
@@ -147,6 +165,7 @@ class Coarsener {
     auto& star = tets_.star[w];
     for (int t : tets_.star[v]) {
       std::replace(tets_.tets[t].begin(), tets_.tets[t].end(), v, w);
+      glued_[t].reset();
       star.insert(std::lower_bound(star.begin(), star.end(), t), t);
     }
     tets_.star[v].clear();
@@ -157,6 +176,7 @@ class Coarsener {
   TetLimits limits_;
   EditTets tets_;
   std::vector<bool> on_boundary_;
+  mutable std::vector<std::optional<bool>> glued_;  // of each tet, once it was asked
 };
 
 }  // namespace

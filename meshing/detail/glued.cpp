@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <array>
 #include <map>
+#include <tuple>
+#include <utility>
 
 #include "meshing/detail/edges.h"
 
@@ -60,25 +62,39 @@ bool holds_strangers(const CageModel& model, const SurfaceMesh& surface, const T
   const std::array<FacePlane, 4> planes = planes_of(corners);
   const auto at = [&](int v) { return Vec3(surface.positions.row(v)); };
 
-  UnionFind pieces(int(triangles.size()));
-  std::map<std::array<int, 2>, int> first_of_edge;
+  struct Side {  // of a triangle, from one of its ends to the other
+    int low, high, triangle, from;
+  };
+  std::vector<Side> sides;
+  sides.reserve(3 * triangles.size());
   for (int i = 0; i < int(triangles.size()); ++i)
     for (int k = 0; k < 3; ++k) {
       const int v = surface.triangles(triangles[i], k), w = surface.triangles(triangles[i], (k + 1) % 3);
-      const auto [found, is_new] = first_of_edge.try_emplace({std::min(v, w), std::max(v, w)}, i);
-      Vec3 a = at(v), b = at(w);
-      if (!is_new && clip(planes, a, b)) pieces.join(found->second, i);
+      sides.push_back({std::min(v, w), std::max(v, w), i, v});
     }
-  std::map<int, std::vector<Vec3>> points;  // of each piece, within the tet
-  for (int i = 0; i < int(triangles.size()); ++i) {
-    const auto row = surface.triangles.row(triangles[i]);
-    for (const Vec3& p : clip(planes, {at(row[0]), at(row[1]), at(row[2])}))
-      points[pieces.root(i)].push_back(p);
+  std::sort(sides.begin(), sides.end(), [](const Side& a, const Side& b) {
+    return std::tie(a.low, a.high, a.triangle) < std::tie(b.low, b.high, b.triangle);
+  });
+  UnionFind pieces(int(triangles.size()));
+  for (std::size_t i = 1; i < sides.size(); ++i) {
+    const Side &before = sides[i - 1], &side = sides[i];
+    Vec3 a = at(side.from), b = at(side.low + side.high - side.from);
+    if (before.low == side.low && before.high == side.high && clip(planes, a, b))
+      pieces.join(before.triangle, side.triangle);
   }
-  if (points.size() < 2) return false;
+  std::vector<std::pair<int, int>> triangle_of_piece;
+  for (int i = 0; i < int(triangles.size()); ++i) triangle_of_piece.push_back({pieces.root(i), i});
+  std::sort(triangle_of_piece.begin(), triangle_of_piece.end());
+  if (triangle_of_piece.front().first == triangle_of_piece.back().first) return false;
   // Where a model is all threads: the first few tell, and each pair costs a winding number.
   constexpr std::size_t max_pieces = 12;
-  if (points.size() > max_pieces) points.erase(std::next(points.begin(), max_pieces), points.end());
+  std::map<int, std::vector<Vec3>> points;  // of each piece, within the tet
+  for (const auto& [piece, i] : triangle_of_piece) {
+    if (points.size() == max_pieces && piece != points.rbegin()->first) break;
+    const auto row = surface.triangles.row(triangles[i]);
+    for (const Vec3& p : clip(planes, {at(row[0]), at(row[1]), at(row[2])})) points[piece].push_back(p);
+  }
+  if (points.size() < 2) return false;
 
   UnionFind bodies(int(triangles.size()));
   constexpr std::size_t samples = 80;  // of a piece

@@ -12,10 +12,6 @@ namespace limber::meshing::detail {
 
 namespace {
 
-double squared_distance_to_box(const Box& box, const Vec3& p) {
-  return (box.lower - p).cwiseMax(p - box.upper).cwiseMax(0.0).squaredNorm();
-}
-
 double squared_distance_to_segment(const Vec3& a, const Vec3& b, const Vec3& p) {
   const Vec3 along = b - a;
   const double length2 = along.squaredNorm();
@@ -40,8 +36,10 @@ double squared_distance(const std::array<Vec3, 3>& triangle, const Vec3& p) {
 }  // namespace
 
 SurfaceDistance::SurfaceDistance(const Points& positions, const Triangles& triangles)
-    : bvh_(build_triangle_bvh(positions, triangles, 4)) {
-  for (int t : bvh_.order)
+    : axes_(positions, triangles),
+      pieces_(pieces_along(axes_, positions, triangles)),
+      tree_(boxes_of(pieces_)) {
+  for (Eigen::Index t = 0; t < triangles.rows(); ++t)
     corners_.push_back(
         {positions.row(triangles(t, 0)), positions.row(triangles(t, 1)), positions.row(triangles(t, 2))});
 }
@@ -49,26 +47,11 @@ SurfaceDistance::SurfaceDistance(const Points& positions, const Triangles& trian
 double SurfaceDistance::at(const Vec3& point) const {
   throw_if_stopped();
   double best = 1e300;
-  std::array<std::pair<double, int>, 64> stack;
-  std::size_t depth = 0;
-  stack[depth++] = {0.0, 0};
-  while (depth > 0) {
-    const auto [near, n] = stack[--depth];
-    if (near >= best) continue;
-    const auto& node = bvh_.nodes[std::size_t(n)];
-    if (node.leaf()) {
-      for (int i = node.begin; i < node.end; ++i)
-        best = std::min(best, squared_distance(corners_[std::size_t(i)], point));
-      continue;
-    }
-    std::pair<double, int> left = {squared_distance_to_box(bvh_.nodes[std::size_t(node.left)].box, point),
-                                   node.left};
-    std::pair<double, int> right = {squared_distance_to_box(bvh_.nodes[std::size_t(node.right)].box, point),
-                                    node.right};
-    if (left.first < right.first) std::swap(left, right);
-    stack[depth++] = left;
-    stack[depth++] = right;  // the nearer one is opened first
-  }
+  tree_.nearest(axes_.along(point), best, [&](int piece) {
+    best =
+        std::min(best, squared_distance(corners_[std::size_t(pieces_[std::size_t(piece)].triangle)], point));
+    return best * (1 + 1e-9);  // the slack leaves nothing to the rounding of boxes
+  });
   return std::sqrt(best);
 }
 

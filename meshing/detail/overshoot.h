@@ -1,10 +1,12 @@
 // How far shells stand off the model that they enclose.
 #pragma once
 
+#include <array>
 #include <vector>
 
 #include "core/mesh.h"
-#include "meshing/detail/triangle_bvh.h"
+#include "meshing/detail/box_tree.h"
+#include "meshing/detail/triangle_pieces.h"
 
 namespace limber::meshing::detail {
 
@@ -15,8 +17,10 @@ class SurfaceDistance {
   double at(const Vec3& point) const;
 
  private:
-  TriangleBvh bvh_;
-  std::vector<std::array<Vec3, 3>> corners_;  // in the order of the leaves
+  Axes axes_;
+  std::vector<TrianglePiece> pieces_;  // along the axes
+  BoxTree tree_;                       // of the pieces
+  std::vector<std::array<Vec3, 3>> corners_;
 };
 
 // The planes of a shell: (F × 4), unit normal and offset: normal·x + offset ≤ 0 inside. Slivers, whose plane

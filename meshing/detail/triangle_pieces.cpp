@@ -114,4 +114,21 @@ Points Axes::along(const Points& positions) const {
   return turned_ ? Points(positions * turn_.transpose()) : positions;
 }
 
+std::vector<TrianglePiece> pieces_along(const Axes& axes, const Points& positions,
+                                        const Triangles& triangles) {
+  const Points turned = axes.along(positions);
+  std::vector<TrianglePiece> pieces = pieces_of(turned, triangles);
+  const Box all = bounding_box(turned);
+  const double rounding = axes.rounding(all.lower.cwiseAbs().cwiseMax(all.upper.cwiseAbs()).maxCoeff());
+  for (TrianglePiece& piece : pieces)
+    piece.box.lower.array() -= rounding, piece.box.upper.array() += rounding;
+  return pieces;
+}
+
+std::vector<Box> boxes_of(const std::vector<TrianglePiece>& pieces) {
+  std::vector<Box> boxes;
+  for (const TrianglePiece& piece : pieces) boxes.push_back(piece.box);
+  return boxes;
+}
+
 }  // namespace limber::meshing::detail

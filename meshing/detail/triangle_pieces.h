@@ -35,4 +35,8 @@ class Axes {
   bool turned_ = false;
 };
 
+// Pieces whose boxes lie along the axes, wide enough for what rounding does to a point that is turned.
+std::vector<TrianglePiece> pieces_along(const Axes&, const Points& positions, const Triangles&);
+std::vector<Box> boxes_of(const std::vector<TrianglePiece>&);
+
 }  // namespace limber::meshing::detail

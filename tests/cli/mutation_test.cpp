@@ -1014,7 +1014,10 @@ class Mutations_slow : public testing::Test {
   // Each mutant is refused, by the promise or complaint that is said.
   static void expect_named(const List& list, const std::vector<std::string>& more = {}) {
     const fs::path bad = shared_->path() / "bad";
+    std::size_t row = 0, made = 0;
     for (const Mutation& mutation : list) {
+      if (!mine(row++)) continue;
+      ++made;
       SCOPED_TRACE(mutation.what);
       fs::remove_all(bad);
       fs::copy(good(), bad, fs::copy_options::recursive);
@@ -1037,7 +1040,7 @@ class Mutations_slow : public testing::Test {
       EXPECT_NE(found.find(mutation.named), std::string::npos)
           << "wanted: " << mutation.named << "\nfound: " << (found.empty() ? result.out : found);
     }
-    fmt::print("{} mutants\n", list.size());
+    fmt::print("{} mutants\n", made);
   }
 
  private:

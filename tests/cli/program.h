@@ -4,6 +4,8 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cstdio>
+#include <cstdlib>
 #include <fstream>
 #include <string>
 #include <utility>
@@ -31,6 +33,16 @@ inline Result limber_program(std::vector<std::string> arguments) {
   const int code = cli::run_command_line(int(argv.size()), argv.data());
   const std::string out = testing::internal::GetCapturedStdout();
   return {code, out, testing::internal::GetCapturedStderr()};
+}
+
+// LIMBER_MUTANTS=K/N leaves to this process every Nth row of a list of mutants, from the Kth on (K from 0):
+// so N processes take the list between them.
+inline bool mine(std::size_t row) {
+  const char* share = std::getenv("LIMBER_MUTANTS");
+  unsigned k = 0, n = 1;
+  if (share && (std::sscanf(share, "%u/%u", &k, &n) != 2 || k >= n))
+    throw InputError(std::string("LIMBER_MUTANTS is no K/N: ") + share);
+  return row % n == k;
 }
 
 // A soft cube of 40 tets pushes itself past a soft block that leaves half the way free.

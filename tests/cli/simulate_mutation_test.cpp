@@ -447,7 +447,10 @@ class SimulationMutations_slow : public testing::Test {
   // Each mutant is refused, by the promise or complaint that is said.
   static void expect_named(const char* name, const List& list) {
     const fs::path bad = folder("bad");
+    std::size_t row = 0, made = 0;
     for (const Mutation& mutation : list) {
+      if (!mine(row++)) continue;
+      ++made;
       SCOPED_TRACE(mutation.what);
       fs::remove_all(bad);
       fs::copy(folder(name), bad, fs::copy_options::recursive);
@@ -468,7 +471,7 @@ class SimulationMutations_slow : public testing::Test {
       EXPECT_NE(found.find(mutation.named), std::string::npos)
           << "wanted: " << mutation.named << "\nfound: " << (found.empty() ? result.out : found);
     }
-    fmt::print("{} mutants\n", list.size());
+    fmt::print("{} mutants\n", made);
   }
 
  private:

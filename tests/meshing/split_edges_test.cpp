@@ -2,6 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <numbers>
+
 #include "core/hash.h"
 #include "meshing/import.h"
 #include "tests/meshing/made_meshes.h"
@@ -63,8 +66,29 @@ TEST(SplitEdges, TakesWhatIsNoManifoldAndEnds) {
   EXPECT_EQ(on_edge, 17);
 
   const SurfaceMesh bounded = split_long_edges(fins, 1e-7, {.max_new_vertices = 5'000});
-  EXPECT_LT(bounded.positions.rows(), 2 * 5'000);
+  EXPECT_LE(bounded.positions.rows(), 5 + 5'000);
   EXPECT_GT(bounded.positions.rows(), 500);
+}
+
+// A rod of needles: cuts of a needle leave needles, which are cut again, many times as often as their sides'
+// length would say.
+TEST(SplitEdges, ARodOfNeedlesKeepsToTheBoundToo) {
+  constexpr int sides = 600;
+  SurfaceMesh rod{Points(2 * sides, 3), Triangles(2 * sides, 3)};
+  for (int i = 0; i < sides; ++i) {
+    const double turn = 2 * std::numbers::pi * i / sides;
+    rod.positions.row(i) << 0.01 * std::cos(turn), 0.01 * std::sin(turn), 0;
+    rod.positions.row(sides + i) << 0.01 * std::cos(turn), 0.01 * std::sin(turn), 10;
+    const int next = (i + 1) % sides;
+    rod.triangles.row(2 * i) << i, next, sides + next;
+    rod.triangles.row(2 * i + 1) << i, sides + next, sides + i;
+  }
+  for (const double longest_m : {0.3, 0.02, 1e-6}) {
+    const SurfaceMesh split = split_long_edges(rod, longest_m, {.max_new_vertices = 40'000});
+    EXPECT_LE(split.positions.rows(), 2 * sides + 40'000) << longest_m;
+    EXPECT_GT(split.positions.rows(), 2 * sides + 5'000) << longest_m;
+    EXPECT_NEAR(area(split), area(rod), 1e-12) << longest_m;
+  }
 }
 
 // Solids of one shape ask for edges of the same share of those of their cage, however large and fine it is.
