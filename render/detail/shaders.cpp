@@ -278,7 +278,7 @@ void main() {
   vec2 ground_place = (vec2(dot(ground_x, faced), dot(ground_y, faced)) - ground_lower) * ground_scale;
   float nearness = exp2(-max(dot(up, position) - ground_height, 0.0) / (1.5 * faced_m));
   float open = 1.0 - nearness * texture(ground_sky_map, ground_place).r;
-  vec3 bounce = ground_color * (0.6 * ground_key * key_light + 0.6 * sky_light) * open;
+  vec3 bounce = ground_color * (0.9 * ground_key * key_light + 0.9 * sky_light) * open;
   vec3 ambient = diffuse * mix(bounce, sky_light, 0.5 + 0.5 * n_up);
   // What is mirrored: ground, a sky that is brighter towards the horizon, and a soft box opposite the key light; the rougher, the
   // more blurred.
