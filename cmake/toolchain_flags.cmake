@@ -4,7 +4,7 @@ add_compile_options(-ffp-contract=off -Wall -Wextra -Wpedantic -Wshadow -Wnon-vi
 add_compile_options(-Wno-maybe-uninitialized -Wno-array-bounds -Wno-stringop-overflow -Wno-stringop-overread)
 if(LIMBER_UNITY)
   set(CMAKE_UNITY_BUILD ON)
-  set(CMAKE_UNITY_BUILD_BATCH_SIZE 8)
+  set(CMAKE_UNITY_BUILD_BATCH_SIZE 16)
   # A name of one file is not hidden by a local one of another in its batch; a file in a batch is no header, and its
   # unnamed namespace its own; and inlined concatenations of strings trip GCC 12's false positives (bug 105651).
   add_compile_options(-Wno-shadow -Wno-subobject-linkage -Wno-restrict)
