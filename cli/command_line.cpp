@@ -6,6 +6,7 @@
 // (described_commands.h).
 #include "cli/command_line.h"
 
+#include <fmt/ranges.h>
 #include <CLI/CLI.hpp>
 
 #include <algorithm>
@@ -32,8 +33,8 @@ void print(const Outcome& outcome, bool json) {
     throw DiskError("stdout: writing the result failed");
 }
 
-// The first word that is no command or option, and what was meant; else empty.
-std::string misspelt(const CLI::App& program, int argc, const char* const* argv) {
+// The first word that is no command or option, and what was meant, or that a command is missing; else empty.
+std::string wrong_word(const CLI::App& program, int argc, const char* const* argv) {
   const auto told = [](const std::string& word, const std::string& what,
                        const std::vector<std::string>& known, const char* help) {
     const std::string meant = nearest(word, known);
@@ -63,7 +64,10 @@ std::string misspelt(const CLI::App& program, int argc, const char* const* argv)
     command = commands[std::size_t(found - known.begin())];
     name += " " + word;
   }
-  return "";
+  std::vector<std::string> commands;
+  for (const CLI::App* one : command->get_subcommands({})) commands.push_back(one->get_name());
+  if (commands.empty()) return "";
+  return fmt::format("{} needs a command, one of {}; see {} --help", name, fmt::join(commands, ", "), name);
 }
 
 // To people on stderr, to who listens to --progress as the last event, and with --json as the document.
@@ -99,17 +103,17 @@ int run_command_line(int argc, const char* const* argv) {
     program.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
     const bool wrong = error.get_exit_code() != int(CLI::ExitCodes::Success);
-    const std::string meant = wrong ? misspelt(program, argc, argv) : "";
-    if (meant.empty())
+    const std::string why = wrong ? wrong_word(program, argc, argv) : "";
+    if (why.empty())
       program.exit(error);
     else
-      fmt::print(stderr, "limber: {}\n", meant);
+      fmt::print(stderr, "limber: {}\n", why);
     if (!wrong) return exit_done;
     const bool json = std::any_of(argv, argv + argc, [](std::string_view word) { return word == "--json"; });
     if (json)
       fmt::print(
           "{}\n",
-          text_of(Json{{"error", meant.empty() ? error.what() : meant}, {"exit_code", exit_bad_input}}, 2));
+          text_of(Json{{"error", why.empty() ? error.what() : why}, {"exit_code", exit_bad_input}}, 2));
     return exit_bad_input;
   }
 

@@ -19,6 +19,7 @@
 #include "core/error.h"
 #include "core/progress.h"
 #include "render/detail/line_quads.h"
+#include "render/detail/outward.h"
 #include "render/detail/renderer_impl.h"
 
 namespace limber::render {
@@ -229,6 +230,7 @@ int Renderer::add_mesh(const Triangles& triangles, const Points& rest_positions,
   impl_->meshes.push_back({look, GpuMesh(triangles, rest_positions, look.crease_angle_deg, appearance)});
   Mesh& made = impl_->meshes.back();
   made.materials = appearance.materials;
+  made.outward = look.seen && detail::looks_outward(rest_positions, triangles);
   std::map<std::pair<int, bool>, ImageOnCard> on_card;  // an image once, as colors and as numbers
   const auto put = [&](int image, bool colors) {
     if (image < 0) return ImageOnCard{};

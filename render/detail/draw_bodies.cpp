@@ -193,6 +193,15 @@ void detail::stand_back_for_edges(const Mesh& mesh, int samples_per_pixel_side) 
 
 // ---- the stage ----
 
+// Of a body that looks outward nobody sees the back, unless it is cut open or the eye may be in it; its back
+// triangles are half of all.
+bool Renderer::Impl::hides_its_back(const Mesh& mesh) const {
+  const Box& box = mesh.card.box();
+  const bool outside =
+      (camera.eye.array() < box.lower.array()).any() || (camera.eye.array() > box.upper.array()).any();
+  return mesh.outward && clip_planes.empty() && outside;
+}
+
 // Clears all targets and draws what is opaque, colours and depth; with `passes` also normal, scalar and
 // number of the mesh of every sample, into targets of their own. What is drawn nowhere keeps alpha 0, no
 // object (−1) and no scalar (NaN).
@@ -203,6 +212,7 @@ void Renderer::Impl::draw_opaque(bool passes) {
   glDepthMask(GL_TRUE);
   glEnable(GL_DEPTH_TEST);
   glDisable(GL_BLEND);
+  glCullFace(GL_BACK);
   const float nothing[4] = {0, 0, 0, 0}, no_scalar[4] = {0, 0, 0, NAN}, far[1] = {1};
   const int no_object[4] = {-1, 0, 0, 0};
   if (settings.multisampling) {
@@ -219,8 +229,10 @@ void Renderer::Impl::draw_opaque(bool passes) {
   for (Mesh& mesh : meshes) {
     if (!mesh.look.seen || mesh.transparent()) continue;
     stand_back_for_edges(mesh, settings.multisampling ? 1 : settings.supersampling);
+    (hides_its_back(mesh) ? glEnable : glDisable)(GL_CULL_FACE);
     draw_mesh(mesh, passes ? "#define PASSES\n" : "", [](const Program&) {});
   }
+  glDisable(GL_CULL_FACE);
   glDisable(GL_POLYGON_OFFSET_FILL);
   plane_defines({});
 }

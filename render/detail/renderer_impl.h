@@ -43,6 +43,7 @@ struct Mesh {
   Eigen::VectorXd occlusion = {};                            // empty: none
   std::vector<SurfaceMaterial> materials = {};               // empty: no appearance
   std::vector<ImageOnCard> images = {}, normal_images = {};  // a material; 0: none
+  bool outward = false;                                      // as looks_outward() says, at rest
 
   // A veil: drawn into the lists of layers (detail/draw_veils.cpp), not with the opaque bodies.
   bool transparent() const { return look.opacity < 1; }
@@ -132,6 +133,7 @@ struct Renderer::Impl {
   Passes finish_passes();
 
   // The planes that cut a mesh: the user's, and the ground's where the mesh reaches below it.
+  bool hides_its_back(const Mesh&) const;
   std::vector<Plane> planes_of(const Mesh&) const;
   // Programs for what is drawn next, with all their uniforms.
   const Program& use_mesh(const Mesh&, const std::string& defines, const DrawnMesh::Batch* = nullptr);

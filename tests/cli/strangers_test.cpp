@@ -238,6 +238,13 @@ TEST_F(Program, AMistypedCommandOrOptionIsNamedWithWhatWasMeant) {
     EXPECT_NE(limber_program(as_json).json().at("error").get<std::string>().find(told), std::string::npos);
   }
   EXPECT_NE(limber_program({"plan", "x"}).err.find("--out is required"), std::string::npos);
+  for (const auto& [words, told] : std::vector<std::pair<std::vector<std::string>, std::string>>{
+           {{}, "limber needs a command, one of prepare, plan, "},
+           {{"scene"}, "limber scene needs a command, one of "}}) {
+    const Result result = limber_program(words);
+    EXPECT_EQ(result.code, exit_bad_input);
+    EXPECT_NE(result.err.find(told), std::string::npos) << result.err;
+  }
 }
 
 // Without a settle nobody has looked whether the robot rests.
