@@ -40,6 +40,8 @@ enum class BodyKind {
   kinematic   // moves as one piece by its keyframes: it pushes, and nothing pushes it
 };
 
+inline constexpr double min_stiffness_share = 0.05, max_stiffness_share = 4;  // that build_world finds
+
 struct BodySpec {
   std::string name;
   TetMesh cage;  // the rest shape, where the body starts
@@ -59,6 +61,8 @@ struct BodySpec {
   // At the start, of a body that is pushed; it turns about its centre of mass. Held nodes do not move.
   Vec3 velocity_m_s = Vec3::Zero(), angular_velocity_rad_s = Vec3::Zero();
   Track track = {};  // kinematic
+  // Body::stiffness_share of a body of this spec, which spares build_world to find it; 0: not known.
+  double stiffness_share = 0;
 };
 
 struct WorldSpec {

@@ -247,6 +247,7 @@ struct FilmSpec {
   FilmEnd end = FilmEnd::path;
   FilmLook look = FilmLook::studio;
   std::optional<Vec3> background_srgb;  // nothing: the look's
+  std::optional<double> ground_m;       // height; nothing: the bounds' floor, or the lowest of the scenery
   bool bounds_lines = true;             // draw the edges of the bounds as pale lines
   bool transparent = false;             // neither ground nor background
   std::string caption;                  // UTF-8

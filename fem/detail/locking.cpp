@@ -29,6 +29,7 @@
 #include <utility>
 
 #include "core/random.h"
+#include "core/threads.h"
 
 namespace limber::fem::detail {
 namespace {
@@ -386,6 +387,11 @@ class Level {
         tets(mesh, fixed, of_tet),
         from_coarse(over_axes(tets.from_mesh() * to_mesh, tets.freedoms(), coarse)) {}
 
+  // From now on conjugate gradients are shown the way by that level, whose tets this one's are cut from.
+  void stand_on(const Level& below) {
+    below_ = &below;
+    from_below_ = over_axes(below.tets.to_refined(tets), tets.freedoms(), below.tets.freedoms());
+  }
   // From now on all is solved by elimination. For thousands of freedoms.
   bool eliminate(double hold) {
     Sparse stiffness = tets.stiffness();
@@ -398,13 +404,11 @@ class Level {
   // diagonal, and by the solution of what is coarser, brought down and up again. That is the level below,
   // whose tets this one's are cut from, or else the cage. A residual of a thousandth is enough, since the
   // error of f·u falls with its square.
-  double compliance(const Vector& load, double hold, const Solver& cage, const Level* below) const {
+  double compliance(const Vector& load, double hold, const Solver& cage) const {
     constexpr int most = 2000;
     if (whole_) return load.dot(whole_->solve(load));
-    const Sparse from = below
-                            ? over_axes(below->tets.to_refined(tets), tets.freedoms(), below->tets.freedoms())
-                            : from_coarse;
-    const Solver& coarser = below ? *below->whole_ : cage;
+    const Sparse& from = below_ ? from_below_ : from_coarse;
+    const Solver& coarser = below_ ? *below_->whole_ : cage;
     const Vector diagonal = tets.diagonal();
     const double enough = 1e-3 * load.norm();
     Vector u = Vector::Zero(load.size()), r = load, p;
@@ -422,29 +426,44 @@ class Level {
 
  private:
   std::unique_ptr<Solver> whole_;
+  const Level* below_ = nullptr;
+  Sparse from_below_;  // what may move of that → of this
 };
 
-// Takes rigid motions out of a force field (N × 3 at the cage's nodes) until its load moves nothing as a
-// whole: the sums of its forces and torques vanish. A free body could not balance it otherwise. With no
-// rigid motions given, nothing is taken out.
-Points balanced(const Level& level, const Freedoms& coarse, const std::vector<Points>& rigid,
-                const Points& field) {
-  const int count = int(rigid.size());
-  const auto load = [&](const Points& f) -> Vector {
-    return level.from_coarse.transpose() * level.tets.load(level.to_mesh * f);
-  };
-  Eigen::MatrixXd of_rigid(count, count);
-  Vector of_field(count);
-  for (int i = 0; i < count; ++i) {
-    const Vector motion = coarse.from_nodes(rigid[i]);
-    for (int j = 0; j < count; ++j) of_rigid(i, j) = motion.dot(load(rigid[j]));
-    of_field[i] = motion.dot(load(field));
+// Takes rigid motions out of force fields (N × 3 at the cage's nodes) until their loads move nothing as a
+// whole: the sums of forces and torques vanish. A free body could not balance them otherwise. With no rigid
+// motions given, nothing is taken out.
+class Balance {
+ public:
+  Balance(const Level& level, const Freedoms& coarse, const std::vector<Points>& rigid)
+      : level_(level), rigid_(rigid) {
+    const Eigen::Index count = Eigen::Index(rigid.size());
+    for (const Points& motion : rigid) motions_.push_back(coarse.from_nodes(motion));
+    of_rigid_.resize(count, count);
+    for (Eigen::Index j = 0; j < count; ++j) {
+      const Vector pushed = load(rigid[std::size_t(j)]);
+      for (Eigen::Index i = 0; i < count; ++i) of_rigid_(i, j) = motions_[std::size_t(i)].dot(pushed);
+    }
   }
-  const Vector drift = of_rigid.ldlt().solve(of_field);
-  Points rest = field;
-  for (int i = 0; i < count; ++i) rest -= drift[i] * rigid[i];
-  return rest;
-}
+  Points operator()(const Points& field) const {
+    const Vector pushed = load(field);
+    Vector of_field(of_rigid_.rows());
+    for (std::size_t i = 0; i < rigid_.size(); ++i) of_field[Eigen::Index(i)] = motions_[i].dot(pushed);
+    const Vector drift = of_rigid_.ldlt().solve(of_field);
+    Points rest = field;
+    for (std::size_t i = 0; i < rigid_.size(); ++i) rest -= drift[Eigen::Index(i)] * rigid_[i];
+    return rest;
+  }
+
+ private:
+  Vector load(const Points& field) const {
+    return level_.from_coarse.transpose() * level_.tets.load(level_.to_mesh * field);
+  }
+  const Level& level_;
+  const std::vector<Points>& rigid_;
+  std::vector<Vector> motions_;
+  Eigen::MatrixXd of_rigid_;  // work of a motion against another's load
+};
 
 }  // namespace
 
@@ -475,6 +494,7 @@ double locking_share(const TetMesh& rest, const std::vector<bool>& fixed, const 
   }
 
   std::vector<Level> levels;
+  levels.reserve(2);  // the second points to the first
   Sparse same(nodes, nodes);
   same.setIdentity();
   levels.emplace_back(rest, same, fixed, of_tet, coarse);
@@ -485,29 +505,40 @@ double locking_share(const TetMesh& rest, const std::vector<bool>& fixed, const 
     levels.emplace_back(refined(rest, middles), interpolation(middles, nodes),
                         fixed_with_middles(fixed, middles), of_part, coarse);
     if (!levels.front().eliminate(hold)) return 1;
+    levels.back().stand_on(levels.front());
   }
 
-  double coarse_sum = 0, reference_sum = 0;
-  for (const Points& field : fields) {
-    double coarse_gives = 0, reference_gives = 0, before = 0;
-    const Level* below = nullptr;
-    for (const Level& level : levels) {
-      const Points force = balanced(level, coarse, rigid, field);
+  std::vector<Balance> balance;
+  for (const Level& level : levels) balance.emplace_back(level, coarse, rigid);
+  struct Gives {
+    double coarse = 0, reference = 0;
+  };
+  std::vector<Gives> gives(fields.size());
+  parallel_for(int(fields.size()), [&](int f) {
+    const Points& field = fields[std::size_t(f)];
+    Gives& now = gives[std::size_t(f)];
+    double before = 0;
+    for (std::size_t l = 0; l < levels.size(); ++l) {
+      const Level& level = levels[l];
+      const Points force = balance[l](field);
       const Vector load = level.tets.load(level.to_mesh * force);
       const Vector on_coarse = level.from_coarse.transpose() * load;
       const double size = on_coarse.dot(coarse.from_nodes(force));
-      before = std::exchange(reference_gives, level.compliance(load, hold, solver, below) / size);
-      below = &level;
-      coarse_gives = on_coarse.dot(solver.solve(on_coarse)) / size;
+      before = std::exchange(now.reference, level.compliance(load, hold, solver) / size);
+      now.coarse = on_coarse.dot(solver.solve(on_coarse)) / size;
     }
-    if (levels.size() > 1) reference_gives += still_missing * (reference_gives - before);
-    // The softest decide.
-    const double weight = std::pow(reference_gives, 3);
-    coarse_sum += weight * coarse_gives, reference_sum += weight * reference_gives;
+    if (levels.size() > 1) now.reference += still_missing * (now.reference - before);
+  });
+  Gives sum;
+  for (const Gives& one : gives) {  // the softest decide
+    const double weight = std::pow(one.reference, 3);
+    sum.coarse += weight * one.coarse, sum.reference += weight * one.reference;
   }
-  const double share = coarse_sum / reference_sum;
+  const double share = sum.coarse / sum.reference;
   // Rounded, so that no other rounding on the way shows.
-  return std::isfinite(share) ? std::clamp(std::round(512 * share) / 512, 0.05, 4.0) : 1;
+  return std::isfinite(share)
+             ? std::clamp(std::round(512 * share) / 512, min_stiffness_share, max_stiffness_share)
+             : 1;
 }
 
 }  // namespace limber::fem::detail

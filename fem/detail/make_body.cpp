@@ -54,7 +54,7 @@ Body make_body(const BodySpec& spec) {
   body.density_from_tet_kg_m3 = spec.density_from_tet_kg_m3;
   body.density_from_tet_kg_m3.resize(tets, body.material.density_kg_m3);
   body.mass_kg = body.material.density_kg_m3 * body.rest_volume_m3;
-  body.stiffness_share = 1;
+  body.stiffness_share = spec.stiffness_share;
   body.elastic_dt_limit_s = std::numeric_limits<double>::infinity();
   const auto& x = body.cage.positions;
   for (int t = 0; t < body.cage.tets.rows(); ++t) {

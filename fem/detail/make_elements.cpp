@@ -164,6 +164,8 @@ ElementTables<double> make_elements(const Body& body) {
 void find_stiffness_shares(std::vector<Body>& bodies) {
   parallel_for(int(bodies.size()), [&](int b) {
     Body& body = bodies[std::size_t(b)];
+    if (body.stiffness_share > 0) return;
+    body.stiffness_share = 1;
     if (!body.moving || body.kind != BodyKind::deformable || !body.material.mesh_independent) return;
     std::vector<Lame> of_tet;
     for (int t = 0; t < body.cage.tets.rows(); ++t) of_tet.push_back(lame_of(body, t));

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <numbers>
 #include <numeric>
+#include <span>
+#include <utility>
 
 #include "core/threads.h"
 #include "meshing/detail/point_grid.h"
@@ -15,19 +17,34 @@ namespace {
 
 constexpr double probes_a_disc = 1.5, candidates_a_disc = 5;  // a square of the least spacing
 constexpr int max_candidates = 400'000;
+constexpr int chunk = 256;         // of what threads take at a time
 constexpr double same_side = 0.2;  // cosine of normals, below which points are not of one side of a sheet
 const double crease_cosine = std::cos(std::numbers::pi / 6), corner_cosine = std::cos(std::numbers::pi / 6);
+
+// body(0 … count − 1), in threads.
+template <class Body>
+void in_chunks(int count, Body body) {
+  parallel_for((count + chunk - 1) / chunk, [&](int c) {
+    for (int i = c * chunk; i < std::min(count, (c + 1) * chunk); ++i) body(i);
+  });
+}
+
+std::vector<SurfaceSpot> first_of(const SurfaceSpots& sequence, int count) {
+  std::vector<SurfaceSpot> spots(static_cast<std::size_t>(count));
+  in_chunks(count, [&](int i) { spots[std::size_t(i)] = sequence.at(std::uint32_t(i)); });
+  return spots;
+}
 
 // How far apart samples may be, by how far the surface falls away below the tangent plane.
 class SpacingMap {
  public:
-  SpacingMap(const SurfaceSpots& sequence, int count, const Box& box, const SampleSpacing& limits)
-      : limits_(limits), grid_(box, 0.5 * limits.max_flat_m), fine_grid_(box, limits.min_m) {
+  SpacingMap(std::vector<SurfaceSpot> spots, const Box& box, const SampleSpacing& limits)
+      : limits_(limits),
+        spots_(std::move(spots)),
+        grid_(box, 0.5 * limits.max_flat_m),
+        fine_grid_(box, limits.min_m) {
     std::vector<std::pair<int, int>> order;
-    for (int i = 0; i < count; ++i) {
-      spots_.push_back(sequence.at(std::uint32_t(i)));
-      order.emplace_back(grid_.cell_of(spots_.back().position), i);
-    }
+    for (const SurfaceSpot& s : spots_) order.emplace_back(grid_.cell_of(s.position), int(order.size()));
     std::sort(order.begin(), order.end());  // neighbours in space are neighbours in memory
     std::vector<SurfaceSpot> sorted;
     cells_.resize(std::size_t(grid_.cells()));
@@ -106,12 +123,7 @@ class SpacingMap {
  private:
   template <class Body>
   void for_all(Body body) const {
-    constexpr std::size_t chunk = 256;
-    parallel_for(int((spots_.size() + chunk - 1) / chunk), [&](int c) {
-      for (std::size_t i = std::size_t(c) * chunk; i < std::min(spots_.size(), std::size_t(c + 1) * chunk);
-           ++i)
-        body(i);
-    });
+    in_chunks(int(spots_.size()), [&](int i) { body(std::size_t(i)); });
   }
 
   struct Cell {
@@ -192,28 +204,25 @@ std::vector<SurfaceSpot> spots_that_stick_out(const SurfaceMesh& surface, const 
 }
 
 // Of each candidate's share of the surface, to the nearest sample of its side.
-void share_area(const SurfaceSpots& sequence, int count, double area, const PointGrid& grid, double reach,
+void share_area(std::span<const SurfaceSpot> candidates, double area, const PointGrid& grid, double reach,
                 std::vector<SurfaceSample>& samples) {
-  std::vector<int> nearest(static_cast<std::size_t>(count));
-  constexpr int chunk = 256;
-  parallel_for((count + chunk - 1) / chunk, [&](int c) {
-    for (int i = c * chunk; i < std::min(count, (c + 1) * chunk); ++i) {
-      const SurfaceSpot spot = sequence.at(std::uint32_t(i));
-      int found = -1;
-      for (double radius = reach; found < 0; radius *= 2) {
-        double least = 1e300;
-        grid.any_within(spot.position, radius, [&](int n, double squared_distance) {
-          const bool other_side = samples[std::size_t(n)].normal.dot(spot.normal) < 0;
-          const double cost = squared_distance + (other_side ? radius * radius : 0);
-          if (cost < least || (cost == least && n < found)) least = cost, found = n;
-          return false;
-        });
-      }
-      nearest[std::size_t(i)] = found;
+  std::vector<int> nearest(candidates.size());
+  in_chunks(int(candidates.size()), [&](int i) {
+    const SurfaceSpot& spot = candidates[std::size_t(i)];
+    int found = -1;
+    for (double radius = reach; found < 0; radius *= 2) {
+      double least = 1e300;
+      grid.any_within(spot.position, radius, [&](int n, double squared_distance) {
+        const bool other_side = samples[std::size_t(n)].normal.dot(spot.normal) < 0;
+        const double cost = squared_distance + (other_side ? radius * radius : 0);
+        if (cost < least || (cost == least && n < found)) least = cost, found = n;
+        return false;
+      });
     }
+    nearest[std::size_t(i)] = found;
   });
   // Each sample counts as a candidate too: none stands for nothing.
-  const double share = area / double(std::size_t(count) + samples.size());
+  const double share = area / double(candidates.size() + samples.size());
   for (SurfaceSample& s : samples) s.area_m2 = share;
   for (int n : nearest) samples[std::size_t(n)].area_m2 += share;
 }
@@ -229,13 +238,14 @@ std::vector<SurfaceSample> sample_surface(const SurfaceMesh& surface, const Seen
   const double discs = seen.area_m2 / (spacing.min_m * spacing.min_m);
   const int probes = int(std::clamp(probes_a_disc * discs, 1000.0, 0.25 * max_candidates)),
             candidates = int(std::clamp(candidates_a_disc * discs, 4000.0, 1.0 * max_candidates));
-  const SpacingMap map(sequence, probes, box, spacing);
+  const SpacingMap map(first_of(sequence, probes), box, spacing);
 
   std::vector<SurfaceSpot> spots = spots_that_stick_out(surface, seen.seen, spacing.min_m / 3);
   const std::size_t sticking_out = spots.size();
-  for (int i = 0; i < candidates; ++i) spots.push_back(sequence.at(std::uint32_t(i)));
-  std::vector<double> wanted;
-  for (const SurfaceSpot& s : spots) wanted.push_back(map.at(s));
+  const std::vector<SurfaceSpot> spread = first_of(sequence, candidates);
+  spots.insert(spots.end(), spread.begin(), spread.end());
+  std::vector<double> wanted(spots.size());
+  in_chunks(int(spots.size()), [&](int i) { wanted[std::size_t(i)] = map.at(spots[std::size_t(i)]); });
 
   // What is not on a piece that was judged itself, or where pieces may be hidden in part, is judged where it
   // is taken.
@@ -268,7 +278,8 @@ std::vector<SurfaceSample> sample_surface(const SurfaceMesh& surface, const Seen
     }
     if (int(samples.size()) > most) continue;
     if (samples.empty()) return {};
-    share_area(sequence, std::min(candidates, 100'000), seen.area_m2, grid, spacing.min_m, samples);
+    share_area(std::span(spread).first(std::size_t(std::min(candidates, 100'000))), seen.area_m2, grid,
+               spacing.min_m, samples);
     return samples;
   }
 }

@@ -18,6 +18,7 @@ class SurfaceSpots {
  private:
   const std::vector<SurfacePiece>& pieces_;
   std::vector<double> areas_;  // seen, of all pieces up to this
+  std::vector<Vec3> normals_;
 };
 
 }  // namespace limber::meshing::detail

@@ -128,6 +128,7 @@ FilmSpec read_film(const Node& table) {
                                                     {"clinical", FilmLook::clinical},
                                                     {"paper", FilmLook::paper}});
   if (table.find("background")) film.background_srgb = as_color(text(table, "background"));
+  if (table.find("ground_m")) film.ground_m = number(table, "ground_m");
   film.bounds_lines = flag(table, "bounds_lines");
   film.transparent = flag(table, "transparent");
   film.caption = text(table, "caption");

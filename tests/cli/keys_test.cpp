@@ -330,6 +330,7 @@ const std::vector<Row> rows{
     {"film.end_card.text", "film.end_card.text=B", film, "film.end_card={ text = \"A\" }"},
     {"film.end_card.duration_s", "film.end_card.duration_s=1", film, "film.end_card={ text = \"A\" }"},
     {"film.end_card.ground", "film.end_card.ground=plain", film, "film.end_card={ text = \"A\" }"},
+    {"film.ground_m", "film.ground_m=-0.5", film},
     {"film.background", "film.background=\"#123456\"", film},
     {"film.bounds_lines", "film.bounds_lines=false", film},
     {"film.transparent", "film.transparent=true", film},

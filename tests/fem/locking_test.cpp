@@ -109,6 +109,23 @@ TEST(Locking_slow, ACantileverSagsAsABeam) {
     }
 }
 
+// A share that is told is taken, and the world is the same as where it is found.
+TEST(Locking, AShareThatIsKnownIsTaken) {
+  Material material;
+  material.mesh_independent = true;
+  BodySpec body{"cube", cube({0, 0, 0}, 1, 3), material, {}};
+  const World found = build_world(alone(body));
+  ASSERT_LT(found.bodies[0].stiffness_share, 0.95);
+  body.stiffness_share = found.bodies[0].stiffness_share;
+  const World told = build_world(alone(body));
+  EXPECT_EQ(told.bodies[0].stiffness_share, found.bodies[0].stiffness_share);
+  EXPECT_EQ(told.dt_s, found.dt_s);
+  body.stiffness_share = 4;
+  const World stiffer = build_world(alone(body));
+  EXPECT_EQ(stiffer.bodies[0].stiffness_share, 4);
+  EXPECT_LT(stiffer.dt_s, found.dt_s);
+}
+
 // The finer the mesh, the less there is to mend.
 TEST(Locking_slow, FineMeshesNeedLess) {
   for (const MaterialModel model : both_models) {

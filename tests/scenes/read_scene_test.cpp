@@ -873,6 +873,7 @@ std::string all_of(const Scene& s) {
   for (const BodySpec& body : s.scenery) t += fmt::format(" {} {}", body.triangles, int(body.look));
   t += fmt::format(" {} {} {} {} {} {} {} {}", int(f.look), int(f.pace), f.slowest, f.quickest,
                    f.length_s.value_or(-1), int(f.end), f.panes, f.outlines);
+  t += fmt::format(" {}", f.ground_m.value_or(-1));
   if (f.inset) t += fmt::format(" {} {}", f.inset->camera, f.inset->size);
   for (const auto& card : {f.title, f.end_card})
     if (card) t += fmt::format(" {} {} {}", fmt::join(card->lines, "|"), card->duration_s, card->plain);

@@ -73,7 +73,7 @@ Shot::Shot(const scenes::Scene& scene, const std::string& camera, const plan::Pl
   double ground_m = scene.bounds_m.lower.z();
   for (const SurfaceMesh& mesh : scenery)
     ground_m = std::min(ground_m, bounding_box(mesh.positions).lower.z());
-  look_.ground_height_m = ground_m;
+  look_.ground_height_m = scene.film.ground_m.value_or(ground_m);
   look_.transparent_background = scene.film.transparent;
   find_controls();
   const bool panes = scene.film.panes && world.walls;

@@ -25,6 +25,7 @@ std::uint64_t Shot::hash_of_look() const {
   Hasher hasher;
   hasher.text(version).value(generation).value(look_.width).value(look_.height).value(int(film.look));
   if (film.background_srgb) hasher.matrix(*film.background_srgb);
+  if (film.ground_m) hasher.text("ground").value(*film.ground_m);
   hasher.matrix(look_.stage.lower).matrix(look_.stage.upper).matrix(scene_.bounds_m.lower);
   hasher.matrix(scene_.bounds_m.upper);
   // These follow from the camera of the first frame, or of all: a frame's own camera does not tell them.

@@ -100,6 +100,7 @@ Json facts_of_motion(const plan::Plan& plan, const fem::World& world, const Moti
             {"frames", path.frames.size()},
             {"tree_hash", hex(plan::hash_of(plan.tree))},
             {"trajectory_hash", hex(plan::hash_of(path))}};
+  if (const auto shares = stiffness_shares_of(world); !shares.empty()) json["stiffness_shares"] = shares;
   if (is_unmeasured(plan)) return json;
   Json volumes;
   for (std::size_t b = 0; b < world.bodies.size(); ++b)

@@ -46,6 +46,15 @@ void require_summary(const PlanFolder& planned, const fs::path& file) {
         planned.summary.at("shortcut"),
         {{"cost", ""}, {"rounds", -1}, {"accepted", -1}, {"cpu_s", 0.5}, {"before", costs}, {"after", costs}},
         Keys::all, file.string() + ": given.summary.shortcut", remedy);
+  if (planned.summary.contains("stiffness_shares"))
+    for (const auto& [body, share] : planned.summary.at("stiffness_shares").items()) {
+      kinds_of(share, 0.5, "summary.stiffness_shares");
+      if (!(share.get<double>() >= fem::min_stiffness_share &&
+            share.get<double>() <= fem::max_stiffness_share))
+        throw InputError(fmt::format(
+            "{}: given.summary.stiffness_shares.{} is {}; it must be in [{}, {}]; {}", file.string(), body,
+            share.dump(), fem::min_stiffness_share, fem::max_stiffness_share, remedy));
+    }
   if (begins_elsewhere(planned))
     require_like(planned.summary.at("from"), {{"folder", ""}, {"frame", -1}, {"trajectory_hash", ""}},
                  Keys::all, file.string() + ": given.summary.from",
@@ -161,9 +170,14 @@ void require_of_world(const plan::Plan& plan, const fem::World& world, const fs:
   plan::require_frame_times(plan.trajectory, world.dt_s, file);
 }
 
-fem::World world_of(const PlanFolder& planned, const std::vector<PreparedBody>& bodies) {
-  if (begins_elsewhere(planned)) return build_world(planned.scene, bodies);
-  return build_world(planned.scene, bodies, State(planned.plan.tree.states[0]).positions);
+fem::World world_of(const PlanFolder& planned, const std::vector<PreparedBody>& bodies,
+                    StiffnessShares which) {
+  std::map<std::string, double> shares;
+  if (which == StiffnessShares::told && planned.summary.contains("stiffness_shares"))
+    planned.summary.at("stiffness_shares").get_to(shares);
+  const State start = planned.plan.tree.states[0];
+  return build_world(planned.scene, bodies,
+                     begins_elsewhere(planned) ? std::vector<float>() : start.positions, shares);
 }
 
 std::vector<PreparedBody> read_caged_bodies_of(const PlanFolder& planned, const fs::path& folder) {

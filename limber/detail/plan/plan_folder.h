@@ -61,8 +61,12 @@ std::string odd_entry(const fs::path& folder, const PlanFolder&, const std::vect
 // would reach beyond its nodes, or replay without end.
 void require_of_world(const plan::Plan&, const fem::World&, const fs::path& folder);
 
+// Where a world has its bodies' shares of stiffness from: the summary, for what shows a motion; or they are
+// found anew, for what judges it.
+enum class StiffnessShares { told, found };
 // The world of its scene, begun as the plan begins: bodies that overlap there are not parted once more.
-fem::World world_of(const PlanFolder&, const std::vector<PreparedBody>&);
+fem::World world_of(const PlanFolder&, const std::vector<PreparedBody>&,
+                    StiffnessShares = StiffnessShares::told);
 
 // The bodies of the plan's scene. Throws InputError when a cage has changed since the plan was made.
 std::vector<PreparedBody> read_caged_bodies_of(const PlanFolder&, const fs::path& folder);

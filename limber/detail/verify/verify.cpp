@@ -69,8 +69,11 @@ Verified verify(const VerifyOptions& options) {
     const PlanFolder planned = read_plan_folder(folder);
     const std::vector<PreparedBody> bodies = read_caged_bodies_of(planned, folder);
     const VerifyDepth depth{trusted, options.remake};
+    std::map<std::string, double> shares;  // found once, for both worlds
     try {
-      require_of_world(planned.plan, world_of(planned, bodies), folder);
+      const fem::World begun = world_of(planned, bodies, StiffnessShares::found);
+      shares = stiffness_shares_of(begun);
+      require_of_world(planned.plan, begun, folder);
     } catch (const InputError&) {
       // A body that is not the scene's weighs something else, and then nothing of the plan fits: what is to
       // be named is the body.
@@ -81,7 +84,7 @@ Verified verify(const VerifyOptions& options) {
       if (table.all_kept()) throw;
       return {std::move(table), {}, {}};
     }
-    const fem::World world = build_world(planned.scene, bodies);
+    const fem::World world = build_world(planned.scene, bodies, {}, shares);
     MotionFigures figures;
     Verified verified = verify_plan(folder, planned, bodies, world, figures, depth);
     if (options.film) check_films(folder, options.repaint, verified.promises);

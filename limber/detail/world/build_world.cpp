@@ -208,9 +208,17 @@ bool all_touched_at_cages(const scenes::Scene& scene) {
                      [](const scenes::BodySpec& body) { return body.contact == scenes::Contact::cage; });
 }
 
+std::map<std::string, double> stiffness_shares_of(const fem::World& world) {
+  std::map<std::string, double> shares;
+  for (const fem::Body& body : world.bodies)
+    if (body.moving && body.kind == fem::BodyKind::deformable) shares[body.name] = body.stiffness_share;
+  return shares;
+}
+
 // Complaints of fem name a body, not its place in the text.
 fem::World build_world(const scenes::Scene& scene, const std::vector<PreparedBody>& prepared,
-                       const std::vector<float>& start_positions) {
+                       const std::vector<float>& start_positions,
+                       const std::map<std::string, double>& stiffness_shares) {
   fem::WorldSpec spec;
   for (std::size_t b = 0; b < prepared.size(); ++b) {
     const scenes::BodySpec& body = scene.bodies[b];
@@ -232,6 +240,8 @@ fem::World build_world(const scenes::Scene& scene, const std::vector<PreparedBod
     fem_body.max_volume_change = body.max_volume_change;
     if (body.max_stretch && *body.max_stretch < scenes::any_stretch) fem_body.max_stretch = *body.max_stretch;
     set_parts(body, prepared[b], share, fem_body);
+    if (const auto known = stiffness_shares.find(body.name); known != stiffness_shares.end())
+      fem_body.stiffness_share = known->second;
     spec.bodies.push_back(std::move(fem_body));
   }
   set_script(scene, prepared, spec);

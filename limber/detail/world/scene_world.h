@@ -80,8 +80,13 @@ std::vector<PreparedBody> read_bodies(const scenes::Scene&, const fs::path& work
 
 GoalRules goal_rules_of(const scenes::Scene&);
 
-// start_positions as fem::WorldSpec has them.
+// By body name, of soft bodies that move.
+std::map<std::string, double> stiffness_shares_of(const fem::World&);
+
+// start_positions as fem::WorldSpec has them; stiffness_shares by body name, of bodies of which they are
+// known.
 fem::World build_world(const scenes::Scene&, const std::vector<PreparedBody>&,
-                       const std::vector<float>& start_positions = {});
+                       const std::vector<float>& start_positions = {},
+                       const std::map<std::string, double>& stiffness_shares = {});
 
 }  // namespace limber::detail
