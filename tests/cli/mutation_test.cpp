@@ -335,6 +335,15 @@ List of_the_summary(const Json& summary) {
                     m.planned.summary["quality"] = "best";
                     m.write_summary();
                   }});
+  for (const Json& shares : {Json::array({1.0}), Json(1.0), Json{{"ball", 100.0}}, Json{{"ball", "1"}}})
+    list.push_back({"shares of stiffness " + shares.dump(), "stiffness_shares", [=](Mutant& m) {
+                      m.planned.summary["stiffness_shares"] = shares;
+                      m.write_summary();
+                    }});
+  list.push_back({"shares of stiffness of nobody", "what the plan tells of itself", [](Mutant& m) {
+                    m.planned.summary["stiffness_shares"]["ghost"] = 1.0;
+                    m.write_summary();
+                  }});
   list.push_back(
       {"a summary of shortcuts that were not", "what the plan tells of itself", [](Mutant& m) {
          const Json costs{

@@ -46,15 +46,18 @@ void require_summary(const PlanFolder& planned, const fs::path& file) {
         planned.summary.at("shortcut"),
         {{"cost", ""}, {"rounds", -1}, {"accepted", -1}, {"cpu_s", 0.5}, {"before", costs}, {"after", costs}},
         Keys::all, file.string() + ": given.summary.shortcut", remedy);
-  if (planned.summary.contains("stiffness_shares"))
-    for (const auto& [body, share] : planned.summary.at("stiffness_shares").items()) {
+  if (planned.summary.contains("stiffness_shares")) {
+    const Json& shares = planned.summary.at("stiffness_shares");
+    kinds_of(shares, Json::object(), "summary.stiffness_shares");
+    for (const auto& [body, share] : shares.items()) {
       kinds_of(share, 0.5, "summary.stiffness_shares");
-      if (!(share.get<double>() >= fem::min_stiffness_share &&
-            share.get<double>() <= fem::max_stiffness_share))
+      const double value = share.get<double>();
+      if (!(value >= fem::min_stiffness_share && value <= fem::max_stiffness_share))
         throw InputError(fmt::format(
             "{}: given.summary.stiffness_shares.{} is {}; it must be in [{}, {}]; {}", file.string(), body,
             share.dump(), fem::min_stiffness_share, fem::max_stiffness_share, remedy));
     }
+  }
   if (begins_elsewhere(planned))
     require_like(planned.summary.at("from"), {{"folder", ""}, {"frame", -1}, {"trajectory_hash", ""}},
                  Keys::all, file.string() + ": given.summary.from",
