@@ -106,13 +106,34 @@ namespace {
 std::string sample_defines(const RenderSettings& settings) {
   if (settings.multisampling)
     return "#define SAMPLER sampler2DMS\n#define INTEGER_SAMPLER isampler2DMS\n#define SAMPLES 4\n"
-           "#define SAMPLES_A_TEXEL 4\n#define SAMPLE gl_SampleID\n"
            "#define FETCH(samples, pixel, i) texelFetch(samples, pixel, i)\n";
   return fmt::format(
       "#define SAMPLER sampler2D\n#define INTEGER_SAMPLER isampler2D\n#define SAMPLES {1}\n"
-      "#define SAMPLES_A_TEXEL 1\n#define SAMPLE 0\n"
       "#define FETCH(samples, pixel, i) texelFetch(samples, pixel * {0} + ivec2(i % {0}, i / {0}), 0)\n",
       settings.supersampling, settings.supersampling * settings.supersampling);
+}
+
+// How the lists of layers are shared: four samples of a pixel have one list (a rasterizer of four samples a
+// pixel then draws veils), else each sample has its own.
+std::string list_defines(const RenderSettings& settings, const std::optional<SamplePlaces>& four) {
+  std::string defines = fmt::format("#define SAMPLES_A_LIST {}\n", four ? 4 : 1);
+  if (!four) return defines + "#define LIST ivec2(gl_FragCoord.xy)\n#define SAMPLE 1u\n";
+  const auto table = [](const auto& write) {
+    return fmt::format("({}, {}, {}, {})[i]\n", write(0), write(1), write(2), write(3));
+  };
+  const auto quarter = [&](int i) { return ((*four)[i].x() > 0 ? 1 : 0) + ((*four)[i].y() > 0 ? 2 : 0); };
+  const bool texel = settings.multisampling;
+  defines += texel ? "#define LIST ivec2(gl_FragCoord.xy)\n#define SAMPLE (1u << gl_SampleID)\n"
+                   : "#define LIST (ivec2(gl_FragCoord.xy) >> 1)\n"
+                     "#define SAMPLE (1u << ((int(gl_FragCoord.x) & 1) | (int(gl_FragCoord.y) & 1) << 1))\n";
+  defines += "#define DEPTH_SAMPLE(i) int[4]" +
+             table([&](int i) { return fmt::format("{}", texel ? i : quarter(i)); });
+  defines += "#define DEPTH_PLACE(i) vec2[4]" + table([&](int i) {
+               const Eigen::Vector2d place =
+                   texel ? (*four)[i] : Eigen::Vector2d((*four)[i].array().sign() * 0.25);
+               return fmt::format("vec2({}, {})", place.x(), place.y());
+             });
+  return defines;
 }
 
 }  // namespace
@@ -130,7 +151,9 @@ Renderer::Impl::Impl(const RenderSettings& l)
     : settings(l),
       samples(sample_defines(l)),
       targets(l.width, l.height, sample_grid(l)),
-      lists(sample_grid(l)) {
+      four_samples(l.multisampling || l.supersampling == 2 ? detail::four_samples() : std::nullopt),
+      with_lists(samples + list_defines(l, four_samples) + detail::layer_lists),
+      lists(four_samples ? l.width : sample_grid(l).width, four_samples ? l.height : sample_grid(l).height) {
   settings.up.normalize();
   settings.toward_key.normalize();
   ground = ground_frame(settings.up, settings.ground_height_m.value_or(0));

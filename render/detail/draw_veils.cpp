@@ -1,11 +1,16 @@
 // Veils (bodies of opacity below 1) and lines, laid over what is opaque.
 //
-// All that a sample shows half transparent goes into a list of its own, with its depth: Carpenter's A-buffer
-// (1984), as linked lists on the card (Yang et al. 2010; detail/layer_lists.h). Each list is then laid over
-// its sample front to back. So any number of veils, inside or through one another, is in order in each
-// sample, and triangles are drawn once. (Depth peeling, which draws all of them twice a layer, took twice as
-// long.) Lines are quads of constant width on the screen with a soft edge (detail/line_quads.h). Where there
-// are veils, what of a line lies before one is put into the list just before the nearest veil behind it.
+// All that a pixel shows half transparent goes into a list of its own, with its depth and the samples that it
+// covers: Carpenter's A-buffer (1984), as linked lists on the card (Yang et al. 2010; detail/layer_lists.h).
+// Each list is then laid over the samples front to back. So any number of veils, inside or through one
+// another, is in order in each sample, and triangles are drawn once. (Depth peeling, which draws all of them
+// twice a layer, took twice as long.) A triangle is shaded once a pixel, by a rasterizer of four samples a
+// pixel that draws into nothing; the shader itself asks which samples something opaque hides. (Shading each
+// sample took twice as long.) That is so with four samples a pixel; with another number of them each sample
+// has a list of its own and is shaded.
+//
+// Lines are quads of constant width on the screen with a soft edge (detail/line_quads.h). Where there are
+// veils, what of a line lies before one is put into the list just before the nearest veil behind it.
 // Method: docs/rendering.md, 7 and 9.
 //
 // Colours are premultiplied, so what lies in front is added as color + (1 − alpha) · what is behind.
@@ -19,7 +24,6 @@
 
 namespace limber::render {
 
-using detail::layer_lists;
 using detail::line_corner_floats;
 using detail::line_quads;
 using detail::Screen;
@@ -48,33 +52,52 @@ Renderer::Impl::Rectangle Renderer::Impl::place_of_veils() const {
           std::min(sample(upper.y(), grid.height) + 1, grid.height)};
 }
 
-// Veils, and the lines before some of them, by lists of layers: whatever is not hidden by the opaque is
-// shaded once, and each sample's list is put over the sample front to back.
+// Puts what the veils show in these rows of lists into them, whatever is not hidden by the opaque.
+void Renderer::Impl::put_veils(int first_row, int rows) {
+  const bool a_pixel = four_samples.has_value();
+  glBindFramebuffer(GL_FRAMEBUFFER, a_pixel ? targets.four_samples_frame() : targets.samples_frame);
+  if (a_pixel) glViewport(0, 0, settings.width, settings.height);
+  glScissor(0, first_row, lists.columns(), rows);
+  glDepthMask(GL_FALSE);
+  glColorMask(GL_FALSE, GL_FALSE, GL_FALSE, GL_FALSE);
+  for (const Mesh& mesh : meshes) {
+    if (!mesh.drawn() || !mesh.transparent()) continue;
+    stand_back_for_edges(mesh, a_pixel || settings.multisampling ? 1 : settings.supersampling);
+    draw_mesh(mesh, "#define VEILED\n" + with_lists, [&](const Program& program) {
+      lists.set_uniforms(program);
+      if (!a_pixel) return;
+      program.set("opaque_depth", 7);
+      targets.samples_depth.bind(7);
+    });
+  }
+  glDisable(GL_POLYGON_OFFSET_FILL);
+  glColorMask(GL_TRUE, GL_TRUE, GL_TRUE, GL_TRUE);
+  plane_defines({});
+  glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT);
+  const SampleGrid grid = sample_grid(settings);
+  glBindFramebuffer(GL_FRAMEBUFFER, targets.samples_frame);
+  glViewport(0, 0, grid.width, grid.height);
+}
+
+// Veils, and the lines before some of them, by lists of layers: each list is put over the samples front to
+// back.
 //
 // Lists are made for a band of rows at a time, for OpenGL allows no buffer as large as many layers of a large
-// picture need (128 MB here: 8 million layers of samples). How many layers a band has is known only after
+// picture need (128 MB here: 8 million layers of pixels). How many layers a band has is known only after
 // they were put. Where they found no room, the buffer is made larger and the band drawn again; where it
 // cannot be larger, the band is halved.
 void Renderer::Impl::draw_veils() {
-  const SampleGrid grid = sample_grid(settings);
   const Rectangle place = place_of_veils();
-  glBindFramebuffer(GL_FRAMEBUFFER, targets.samples_frame);
   glEnable(GL_SCISSOR_TEST);
+  const int height = lists.rows(), row_samples = sample_grid(settings).height / height;
   int rows = lists.max_rows();
-  for (int row = 0; row < grid.height;) {
-    rows = std::min(rows, grid.height - row);
-    glScissor(0, row, grid.width, rows);
+  for (int row = 0; row < height;) {
+    rows = std::min(rows, height - row);
     lists.clear(row, rows);
-    glDepthMask(GL_FALSE);
+    put_veils(row, rows);
+    const int top = row * row_samples, bottom = (row + rows) * row_samples;
+    glScissor(0, top, sample_grid(settings).width, bottom - top);
     glColorMask(GL_FALSE, GL_FALSE, GL_FALSE, GL_FALSE);
-    for (const Mesh& mesh : meshes) {
-      if (!mesh.drawn() || !mesh.transparent()) continue;
-      stand_back_for_edges(mesh, settings.multisampling ? 1 : settings.supersampling);
-      draw_mesh(mesh, samples + veiled, [&](const Program& program) { lists.set_uniforms(program); });
-    }
-    glDisable(GL_POLYGON_OFFSET_FILL);
-    plane_defines({});
-    glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT);
     draw_lines(LinePass::put);
     glColorMask(GL_TRUE, GL_TRUE, GL_TRUE, GL_TRUE);
     if (lists.wanted() > lists.room()) {
@@ -86,13 +109,13 @@ void Renderer::Impl::draw_veils() {
     }  // hundreds of layers all along one row: what has no room is left out
     draw_lines(LinePass::draw_rest);
 
-    const int first = std::max(row, place.top), last = std::min(row + rows, place.bottom);
+    const int first = std::max(top, place.top), last = std::min(bottom, place.bottom);
     glScissor(place.left, first, std::max(place.right - place.left, 0), std::max(last - first, 0));
     glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT);
     glDisable(GL_DEPTH_TEST);
     glEnable(GL_BLEND);
     glBlendFunc(GL_ONE, GL_ONE_MINUS_SRC_ALPHA);
-    const Program& p = layers_programs.with(samples + layer_lists);
+    const Program& p = layers_programs.with(with_lists);
     p.use();
     lists.set_uniforms(p);
     glBindVertexArray(empty_array);
@@ -114,7 +137,7 @@ void Renderer::Impl::draw_lines(LinePass pass) {
   glEnable(GL_BLEND);
   glBlendFunc(GL_ONE, GL_ONE_MINUS_SRC_ALPHA);
   glDepthMask(GL_FALSE);
-  const Program& p = line_programs.with(pass == LinePass::draw_all ? "" : samples + veiled);
+  const Program& p = line_programs.with(pass == LinePass::draw_all ? "" : "#define VEILED\n" + with_lists);
   p.use();
   if (pass != LinePass::draw_all) {
     lists.set_uniforms(p);

@@ -11,20 +11,16 @@ namespace {
 
 constexpr std::size_t fragment_bytes = 16, word_bytes = 4;
 
-std::size_t words_a_row(const SampleGrid& grid) {
-  return std::size_t(grid.width) * std::size_t(std::max(grid.per_pixel, 1));
-}
-
 }  // namespace
 
-LayerLists::LayerLists(const SampleGrid& grid) : grid_(grid) {
+LayerLists::LayerLists(int columns, int rows) : columns_(columns), rows_(rows) {
   GLint64 largest = 0;
   glGetInteger64v(GL_MAX_SHADER_STORAGE_BLOCK_SIZE, &largest);
   largest_buffer_ = std::min(std::size_t(largest), std::size_t(1) << 30);
 }
 
 int LayerLists::max_rows() const {
-  return int(std::min(std::size_t(grid_.height), largest_buffer_ / word_bytes / words_a_row(grid_) - 1));
+  return int(std::min(std::size_t(rows_), largest_buffer_ / word_bytes / std::size_t(columns_) - 1));
 }
 
 void LayerLists::clear(int first_row, int rows) {
@@ -32,18 +28,18 @@ void LayerLists::clear(int first_row, int rows) {
   if (heads_ == 0) glGenBuffers(1, &heads_);
   glBindBufferBase(GL_SHADER_STORAGE_BUFFER, 0, heads_);
   if (rows > rows_with_heads_) {
-    const std::size_t words = 1 + words_a_row(grid_) * std::size_t(rows);
+    const std::size_t words = 1 + std::size_t(columns_) * std::size_t(rows);
     glBufferData(GL_SHADER_STORAGE_BUFFER, GLsizeiptr(word_bytes * words), nullptr, GL_DYNAMIC_DRAW);
     rows_with_heads_ = rows;
   }
   const GLuint none = 0;
   glClearBufferData(GL_SHADER_STORAGE_BUFFER, GL_R32UI, GL_RED_INTEGER, GL_UNSIGNED_INT, &none);
-  if (room_ == 0) make_room(words_a_row(grid_));
+  if (room_ == 0) make_room(std::size_t(columns_));
   glBindBufferBase(GL_SHADER_STORAGE_BUFFER, 1, fragments_);
 }
 
 void LayerLists::set_uniforms(const Program& p) const {
-  p.set("columns", grid_.width);
+  p.set("columns", columns_);
   p.set("first_row", first_row_);
 }
 

@@ -1,23 +1,24 @@
-// Of each sample a list of what is drawn there half transparent, with its depth: an A-buffer (Carpenter 1984)
-// as linked lists (Yang et al., Real-time concurrent linked list construction on the GPU, 2010). What
-// shaders put and read with is in shaders.cpp. A list holds rows of samples; many layers in a large
-// picture do not fit at once, and are then drawn band by band.
+// Of each pixel, or of each sample, a list of what is drawn there half transparent, with its depth and the
+// samples of the pixel that it covers: an A-buffer (Carpenter 1984) as linked lists (Yang et al., Real-time
+// concurrent linked list construction on the GPU, 2010). What shaders put and read with is in shaders.cpp.
+// Many layers in a large picture do not fit at once, and are then drawn band by band.
 #pragma once
 
 #include <cstddef>
 
 #include "render/detail/program.h"
-#include "render/detail/targets.h"
 
 namespace limber::render::detail {
 
 class LayerLists {
  public:
-  explicit LayerLists(const SampleGrid&);
+  LayerLists(int columns, int rows);
 
-  // Empty lists for so many rows of texels; 1 … max_rows().
+  // Empty lists for so many rows; 1 … max_rows().
   void clear(int first_row, int rows);
   int max_rows() const;
+  int columns() const { return columns_; }
+  int rows() const { return rows_; }
   void set_uniforms(const Program&) const;  // of a program that puts or reads, in use
 
   // How many were put since they were cleared; those beyond the room are not in any list.
@@ -28,8 +29,7 @@ class LayerLists {
   bool make_room(std::size_t fragments);
 
  private:
-  SampleGrid grid_;
-  int first_row_ = 0, rows_with_heads_ = 0;
+  int columns_, rows_, first_row_ = 0, rows_with_heads_ = 0;
   std::size_t largest_buffer_, room_ = 0;
   unsigned heads_ = 0, fragments_ = 0;
 };

@@ -101,6 +101,7 @@ using detail::Program;
 using detail::RowReader;
 using detail::sample_grid;
 using detail::SampleGrid;
+using detail::SamplePlaces;
 using detail::ShadeMap;
 using detail::shadow_size;
 using detail::stand_back_for_edges;
@@ -125,6 +126,7 @@ struct Renderer::Impl {
     int left, top, right, bottom;  // right and bottom are beyond
   };
   Rectangle place_of_veils() const;
+  void put_veils(int first_row, int rows);
   void draw_veils();
   // Where there are veils: first what lies before one is put into the lists, then the rest is drawn.
   enum class LinePass { draw_all, put, draw_rest };
@@ -152,8 +154,9 @@ struct Renderer::Impl {
   Variants passes_programs{detail::whole_picture_vertex_shader, detail::passes_fragment_shader};
   Variants layers_programs{detail::whole_picture_vertex_shader, detail::layers_fragment_shader};
   std::string samples;  // defines by which a shader reads the samples of a pixel
-  const std::string veiled = std::string("#define VEILED\n") + detail::layer_lists;
   Targets targets;
+  const std::optional<SamplePlaces> four_samples;  // of veils' rasterizer, where one list serves a pixel
+  const std::string with_lists;                    // defines and texts by which a shader uses the lists
   LayerLists lists;
   unsigned empty_array, line_array, line_buffer;  // the first for whole pictures, whose shader has no input
   std::vector<Mesh> meshes;

@@ -2,22 +2,21 @@
 
 namespace limber::render::detail {
 
-// A list a sample of what is drawn there half transparent: detail/layer_lists.h.
+// A list a pixel (or a sample) of what is drawn there half transparent: detail/layer_lists.h.
 const char* const layer_lists = R"(
 #ifdef FRAGMENT
-struct Fragment { uint red_green, blue_alpha; float depth; uint next; };
+struct Fragment { uint red_green, blue_alpha; float depth; uint next_samples; };
 layout(std430, binding = 0) buffer Heads { uint count; uint heads[]; };   // 1 + the place of the last one put; 0: none
 layout(std430, binding = 1) buffer Fragments { Fragment fragments[]; };
-uniform int columns, first_row;  // of the texels that have lists
-uint list() {
-  ivec2 texel = ivec2(gl_FragCoord.xy);
-  return uint(((texel.y - first_row) * columns + texel.x) * SAMPLES_A_TEXEL + SAMPLE);
-}
-void put(vec4 color, float depth) {
+uniform int columns, first_row;  // of the lists
+uint list(ivec2 place) { return uint((place.y - first_row) * columns + place.x); }
+uint after(uint i) { return fragments[i - 1u].next_samples >> 4; }
+bool covers(uint i, uint samples) { return (fragments[i - 1u].next_samples & samples) != 0u; }
+void put(ivec2 where, uint samples, vec4 color, float depth) {
   uint place = atomicAdd(count, 1u);
   if (place >= uint(fragments.length())) return;
-  uint next = atomicExchange(heads[list()], place + 1u);
-  fragments[place] = Fragment(packHalf2x16(color.rg), packHalf2x16(color.ba), depth, next);
+  uint next = atomicExchange(heads[list(where)], place + 1u);
+  fragments[place] = Fragment(packHalf2x16(color.rg), packHalf2x16(color.ba), depth, next << 4 | samples);
 }
 #endif
 )";
@@ -27,6 +26,9 @@ layout(location = 0) in vec3 position_in;
 layout(location = 1) in vec3 normal_in;
 #ifdef TINTED
 layout(location = 2) in vec4 tint_in;
+#ifdef VEILED
+centroid
+#endif
 out vec4 tint;
 #endif
 #ifdef PASSES
@@ -53,6 +55,9 @@ uniform float shadow_offset_m;   // along the normal: about a texel of the shado
 #if PLANES > 0
 uniform vec4 planes[PLANES];     // what is below one is cut off
 out float gl_ClipDistance[PLANES];
+#endif
+#ifdef VEILED
+centroid
 #endif
 out vec3 position, normal, shadow_place;
 void main() {
@@ -86,8 +91,14 @@ void main() {
 // Key: Lambert and GGX with Schlick's approximations (Karis, SIGGRAPH 2013 course). Ambient: a sky above, the
 // ground below.
 const char* const mesh_fragment_shader = R"(
+#ifdef VEILED
+centroid                         // a pixel is shaded once, where the triangle covers it
+#endif
 in vec3 position, normal, shadow_place;
 #ifdef TINTED
+#ifdef VEILED
+centroid
+#endif
 in vec4 tint;                    // colour, and the share of the sky that is open
 #endif
 #ifdef PAINTED
@@ -141,10 +152,23 @@ uniform float shadow_softness, least_shadow, most_shadow;  // radius of the half
 uniform sampler2DShadow shadow_map;
 uniform sampler2D shadow_depth;  // the same, not compared
 uniform sampler2D ground_sky_map;
-#ifdef VEILED
+#ifndef VEILED
+layout(location = 0) out vec4 color;
+#elif SAMPLES_A_LIST == 1
 layout(early_fragment_tests) in;
 #else
-layout(location = 0) out vec4 color;
+uniform SAMPLER opaque_depth;
+
+// Of the samples of this pixel that the triangle covers those that nothing opaque hides.
+uint seen() {
+  vec2 slope = vec2(dFdx(gl_FragCoord.z), dFdy(gl_FragCoord.z));
+  uint covered = uint(gl_SampleMaskIn[0]), result = 0u;
+  for (int i = 0; i < 4; ++i) {
+    float depth = gl_FragCoord.z + dot(slope, DEPTH_PLACE(i)), opaque = FETCH(opaque_depth, ivec2(gl_FragCoord.xy), DEPTH_SAMPLE(i)).r;
+    if ((covered >> i & 1u) != 0u && depth < opaque) result |= 1u << DEPTH_SAMPLE(i);
+  }
+  return result;
+}
 #endif
 
 // A direction for each sample: Jimenez' interleaved gradient noise (2014), once round a diamond.
@@ -312,7 +336,12 @@ void main() {
 #endif
 #ifdef VEILED
   float covered = sheet == 1 ? 1.0 - pow(1.0 - opacity, 1.0 / n_v) : opacity;  // Beer and Lambert
-  put(vec4(light * covered, covered), gl_FragCoord.z);
+#if SAMPLES_A_LIST == 1
+  put(ivec2(gl_FragCoord.xy), 1u, vec4(light * covered, covered), gl_FragCoord.z);
+#else
+  uint samples = seen();
+  if (samples != 0u) put(ivec2(gl_FragCoord.xy), samples, vec4(light * covered, covered), gl_FragCoord.z);
+#endif
 #else
   color = vec4(light, 1.0);
 #endif
@@ -339,26 +368,38 @@ void main() {
 )";
 const char* const depth_fragment_shader = "void main() {}";
 
+// The list is walked for the nearest four of those not shown yet, kept in order of depth, until none is left.
 // Of equal depth, what was put later is in front: a list begins with the last.
 const char* const layers_fragment_shader = R"(
 out vec4 color;
 void main() {
-  uint head = heads[list()];
+  uint head = heads[list(LIST)];
   if (head == 0u) discard;
   color = vec4(0.0);
   float shown_depth = -1.0;
   uint shown = head + 1u;
   for (;;) {
-    uint nearest = 0u;
-    float depth = 2.0;
-    for (uint i = head; i != 0u; i = fragments[i - 1u].next) {
-      float d = fragments[i - 1u].depth;
-      if (d < depth && (d > shown_depth || (d == shown_depth && i < shown))) nearest = i, depth = d;
+    vec4 depths = vec4(2.0);
+    uvec4 nearest = uvec4(0u);
+    for (uint i = head; i != 0u;) {
+      uint next = fragments[i - 1u].next_samples;
+      float depth = fragments[i - 1u].depth;
+      bool left = depth > shown_depth || (depth == shown_depth && i < shown);
+      if ((next & SAMPLE) == 0u || !left) depth = 2.0;
+      bvec4 behind = lessThan(vec4(depth), depths);
+      depths = vec4(behind.x ? depth : depths.x, behind.x ? depths.x : behind.y ? depth : depths.y,
+                    behind.y ? depths.y : behind.z ? depth : depths.z, behind.z ? depths.z : behind.w ? depth : depths.w);
+      nearest = uvec4(behind.x ? i : nearest.x, behind.x ? nearest.x : behind.y ? i : nearest.y,
+                      behind.y ? nearest.y : behind.z ? i : nearest.z, behind.z ? nearest.z : behind.w ? i : nearest.w);
+      i = next >> 4;
     }
-    if (nearest == 0u) break;
-    Fragment f = fragments[nearest - 1u];
-    color += (1.0 - color.a) * vec4(unpackHalf2x16(f.red_green), unpackHalf2x16(f.blue_alpha));
-    shown = nearest, shown_depth = depth;
+    for (; nearest.x != 0u; nearest = uvec4(nearest.yzw, 0u)) {
+      uvec2 halves = uvec2(fragments[nearest.x - 1u].red_green, fragments[nearest.x - 1u].blue_alpha);
+      color += (1.0 - color.a) * vec4(unpackHalf2x16(halves.x), unpackHalf2x16(halves.y));
+      shown = nearest.x;
+    }
+    if (depths.w == 2.0) break;
+    shown_depth = depths.w;
   }
 }
 )";
@@ -384,9 +425,9 @@ void main() {
 #ifdef VEILED
   // Just before the nearest veil behind it. Lines that are there already have the depth of their veil.
   float veil = 2.0;
-  for (uint i = heads[list()]; i != 0u; i = fragments[i - 1u].next)
-    if (fragments[i - 1u].depth > gl_FragCoord.z) veil = min(veil, fragments[i - 1u].depth);
-  if (putting == 1 && veil < 2.0 && cover > 0.0) put(color, veil);
+  for (uint i = heads[list(LIST)]; i != 0u; i = after(i))
+    if (covers(i, SAMPLE) && fragments[i - 1u].depth > gl_FragCoord.z) veil = min(veil, fragments[i - 1u].depth);
+  if (putting == 1 && veil < 2.0 && cover > 0.0) put(LIST, SAMPLE, color, veil);
   if (veil < 2.0) color = vec4(0.0);
 #endif
 }

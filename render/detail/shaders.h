@@ -5,7 +5,10 @@
 // share of the sky), PAINTED (a color of its own for what is drawn), and with it CORNER_COLORS, IMAGE and
 // NORMAL_IMAGE, TRANSLUCENT, GRAINED (has its place at rest), PASSES, FLAT_INSIDE. Of mesh and lines:
 // VEILED (what is drawn goes into lists: layer_lists.h). How samples are read: SAMPLER, INTEGER_SAMPLER,
-// SAMPLES (a pixel), FETCH(sampler, pixel, i); of a texel, SAMPLES_A_TEXEL and SAMPLE (the one being drawn).
+// SAMPLES (a pixel), FETCH(sampler, pixel, i). How they share lists: SAMPLES_A_LIST; of the sample being
+// drawn, LIST (the place of its list) and SAMPLE (its bit there); where a list has four, DEPTH_SAMPLE(i) (the
+// sample in whose quarter of the pixel the rasterizer's i-th lies) and DEPTH_PLACE(i) (where that one's depth
+// was taken, in pixels from the middle of the pixel).
 #pragma once
 
 namespace limber::render::detail {

@@ -4,6 +4,7 @@
 #include <GL/glcorearb.h>
 
 #include <span>
+#include <utility>
 
 #include "core/error.h"
 #include "render/detail/grain.h"
@@ -144,6 +145,45 @@ unsigned Targets::resolved_frame() {
   if (resolved_frame_ == 0)
     resolved_frame_ = new_framebuffer({new_target(GL_RGBA16F, {grid_.width, grid_.height, 0})}, {});
   return resolved_frame_;
+}
+
+namespace {
+
+// Framebuffers without attachments have no samples in Mesa 22.3, so there is one that nothing is written to.
+struct FourSamples {
+  GLuint frame = 0, unused = 0;
+  FourSamples(int width, int height) {
+    glGenFramebuffers(1, &frame);
+    glBindFramebuffer(GL_FRAMEBUFFER, frame);
+    glGenRenderbuffers(1, &unused);
+    glBindRenderbuffer(GL_RENDERBUFFER, unused);
+    glRenderbufferStorageMultisample(GL_RENDERBUFFER, 4, GL_R8, width, height);
+    glFramebufferRenderbuffer(GL_FRAMEBUFFER, GL_COLOR_ATTACHMENT0, GL_RENDERBUFFER, unused);
+    const GLenum status = glCheckFramebufferStatus(GL_FRAMEBUFFER);
+    LIMBER_CHECK(status == GL_FRAMEBUFFER_COMPLETE, status);
+  }
+};
+
+}  // namespace
+
+unsigned Targets::four_samples_frame() {
+  if (four_samples_frame_ == 0) four_samples_frame_ = FourSamples(width_, height_).frame;
+  return four_samples_frame_;
+}
+
+std::optional<SamplePlaces> four_samples() {
+  const FourSamples one(1, 1);
+  SamplePlaces places;
+  int quarters = 0;
+  for (unsigned i = 0; i < 4; ++i) {
+    GLfloat at[2] = {0, 0};
+    glGetMultisamplefv(GL_SAMPLE_POSITION, i, at);
+    places[i] = Eigen::Vector2d(at[0] - 0.5, at[1] - 0.5);
+    quarters |= 1 << ((at[0] > 0.5 ? 1 : 0) + (at[1] > 0.5 ? 2 : 0));
+  }
+  glDeleteFramebuffers(1, &one.frame);
+  glDeleteRenderbuffers(1, &one.unused);
+  return quarters == 15 ? std::optional(places) : std::nullopt;
 }
 
 void fill(const Texture& texture, int columns, int rows, const float* values) {

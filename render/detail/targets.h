@@ -2,6 +2,10 @@
 // when they are first asked for.
 #pragma once
 
+#include <Eigen/Core>
+#include <array>
+#include <optional>
+
 namespace limber::render::detail {
 
 struct Texture {
@@ -15,6 +19,11 @@ struct SampleGrid {
   int width = 0, height = 0;  // of the textures
   int per_pixel = 0;          // 0: one a texel
 };
+
+// Where a rasterizer of four samples a pixel takes them, in pixels from the middle of the pixel.
+using SamplePlaces = std::array<Eigen::Vector2d, 4>;
+// None where they do not lie each in another quarter of the pixel.
+std::optional<SamplePlaces> four_samples();
 
 class Targets {
  public:
@@ -50,12 +59,15 @@ class Targets {
   // Where several samples a texel are averaged.
   unsigned resolved_frame();
 
+  // Nothing but a rasterizer of four samples a pixel, for what goes into lists (layer_lists.h).
+  unsigned four_samples_frame();
+
  private:
   int width_, height_;
   SampleGrid grid_;
   Passes passes_{};
   Texture grains_[2];
-  unsigned resolved_frame_ = 0;
+  unsigned resolved_frame_ = 0, four_samples_frame_ = 0;
 };
 
 // A channel a texel, replaced as a whole.

@@ -467,6 +467,37 @@ TEST(Renderer, VeilsAreSortedWithinEachPixel) {
   }
 }
 
+// A veil that enters something opaque is seen up to there, to a sample: where the line of entry passes
+// between the samples of a pixel, half of them show it.
+TEST(Renderer, AVeilIsSeenUpToWhereItEntersSomethingOpaque) {
+  const Camera camera = camera_from({0, -5, 0});
+  const MeshLook veil{"veil", {0.2, 0.9, 0.3}, 0.5, 0, 0.4}, solid{"solid", {0.7, 0.3, 0.3}};
+  for (const auto& [supersampling, multisampling] :
+       {std::pair{2, false}, std::pair{2, true}, std::pair{1, false}, std::pair{4, false}}) {
+    RenderSettings look = small_look();
+    look.multisampling = multisampling, look.supersampling = supersampling;
+    look.transparent_background = true;
+    look.stage.include(Vec3(-2, -2, -2)), look.stage.include(Vec3(2, 2, 2));
+    const double pixel = 10 * std::tan(camera.fov_deg * std::numbers::pi / 360) / look.height;
+    const double entry = 10.4 * pixel;  // of the pixel from 10 to 11 right of the middle
+    const SurfaceMesh slanting =
+        quad_mesh({entry - 1, -1, -1}, {entry + 1, 1, -1}, {entry + 1, 1, 1}, {entry - 1, -1, 1});
+    const Image behind = picture_of(upright_quad(0), look, camera, solid);
+    const Image before = picture_of(slanting, look, camera, veil);
+    Renderer renderer(look);
+    add(renderer, slanting, veil);
+    add(renderer, upright_quad(0), solid);
+    const Image image = renderer.draw(camera);
+    const auto seen = [&](int x) {  // share of the veil's samples
+      const Eigen::Vector4d none = rgba(behind, x, 120), all = over(rgba(before, x, 120), none);
+      return (rgba(image, x, 120) - none).dot(all - none) / (all - none).squaredNorm();
+    };
+    EXPECT_NEAR(seen(169), 1, 0.03) << supersampling << multisampling;
+    EXPECT_NEAR(seen(170), supersampling == 1 ? 0 : 0.5, 0.03) << supersampling << multisampling;
+    EXPECT_EQ(rgba(image, 171, 120), rgba(behind, 171, 120)) << supersampling << multisampling;
+  }
+}
+
 // Each one is seen, also where they are too many to be held for the whole picture at once.
 TEST(Renderer, EveryLayerOfVeilsCounts) {
   constexpr double opacity = 0.03;

@@ -16,7 +16,7 @@ namespace limber::detail {
 namespace {
 
 // Of pictures: raised when the same film comes out otherwise, so that it is painted anew.
-constexpr int generation = 7;
+constexpr int generation = 8;
 
 }  // namespace
 
