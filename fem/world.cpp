@@ -116,11 +116,13 @@ World build_world(const WorldSpec& spec) {
   world.robot = spec.robot;
   world.bounds_m = spec.bounds_m;
   world.walls = spec.walls;
-  world.gravity_m_s2 = spec.gravity_m_s2;
   world.rest_speed_m_s = spec.rest_speed_m_s;
   world.part_overlaps = spec.part_overlaps;
   world.max_overlap_m = spec.max_overlap_m;
-  for (const BodySpec& body : spec.bodies) world.bodies.push_back(detail::make_body(body));
+  for (const BodySpec& body : spec.bodies) {
+    world.bodies.push_back(detail::make_body(body));
+    world.bodies.back().gravity_m_s2 = body.gravity_m_s2.value_or(spec.gravity_m_s2);
+  }
   if (!world.bodies[spec.robot].pushed())
     throw InputError(
         fmt::format("body {}: the robot has no node that can move", world.bodies[spec.robot].name));

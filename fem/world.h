@@ -4,6 +4,7 @@
 
 #include <limits>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -29,6 +30,7 @@ struct Material {
       0.45;  // springs: 0.25 ≤ ν ≤ 0.495, since springs alone have 0.25; else 0 ≤ ν ≤ 0.495
   double density_kg_m3 = 100;     // > 0
   double damping_ratio = 0.05;    // 0 … 1, share of critical damping of the body's lowest longitudinal mode
+  double mass_damping_per_s = 0;  // ≥ 0; Rayleigh's α: what moves is slowed by α v, as in a medium at rest
   double friction = 0.2;          // 0 … 2, Coulomb; a pair has the geometric mean, a wall the body's own
   bool mesh_independent = false;  // softens the elements by what coarse tets are too stiff (docs/dynamics.md)
 };
@@ -60,7 +62,8 @@ struct BodySpec {
   bool phong = false;  // the cage moves that surface by Phong Deformation (docs/binding.md); else linearly
   // At the start, of a body that is pushed; it turns about its centre of mass. Held nodes do not move.
   Vec3 velocity_m_s = Vec3::Zero(), angular_velocity_rad_s = Vec3::Zero();
-  Track track = {};  // kinematic
+  std::optional<Vec3> gravity_m_s2 = {};  // nothing: the world's
+  Track track = {};                       // kinematic
   // Body::stiffness_share of a body of this spec, which spares build_world to find it; 0: not known.
   double stiffness_share = 0;
 };
@@ -70,7 +73,7 @@ struct WorldSpec {
   int robot = 0;                     // index of the body that controls push
   Box bounds_m;                      // every body starts inside
   bool walls = true;                 // the bounds are rigid walls
-  Vec3 gravity_m_s2 = Vec3::Zero();  // on every node that is not fixed
+  Vec3 gravity_m_s2 = Vec3::Zero();  // on every node that is not fixed, where its body has no other
   double max_dt_s = 0;               // 0: automatic; a scene may only lower the step
   Points goal_shape_m;  // (N × 3) to which interpolation draws the robot, wherever; empty: its rest shape
   // A soft body all of whose nodes are slower, and would gain less than this in a second, comes to a stand;
@@ -110,6 +113,7 @@ struct Body {
   bool phong;                             // as asked for; false unless deformable, moving and with a shape
   double max_volume_change, max_stretch;  // as asked for
   Vec3 velocity_m_s, angular_velocity_rad_s;        // as asked for
+  Vec3 gravity_m_s2;                                // on every node that is not fixed
   Track track;                                      // likewise
   std::vector<Eigen::Matrix3d> inverse_rest_edges;  // (T) of the edges from a tet's node 0, as columns
   double stiffness_share;     // by which the elements' stiffness is multiplied; 1 unless mesh_independent
@@ -138,7 +142,6 @@ struct World {
   int robot;
   Box bounds_m;
   bool walls;
-  Vec3 gravity_m_s2;
   double rest_speed_m_s;
   double dt_s;  // time step, exactly a float32
   double

@@ -71,6 +71,7 @@ struct CageSpec {
 struct MaterialSpec {
   std::string model;  // "springs" or "neo_hookean"
   double youngs_modulus_pa = 0, poisson_ratio = 0, density_kg_m3 = 0, damping_ratio = 0, friction = 0;
+  double mass_damping_per_s = 0;
   bool mesh_independent = true;  // what the cage's tets are too stiff is taken off
 };
 
@@ -129,6 +130,7 @@ struct BodySpec {
   Pose pose;
   FixedSpec fixed;
   Vec3 velocity_m_s = Vec3::Zero(), angular_velocity_rad_s = Vec3::Zero();  // at the start
+  std::optional<Vec3> gravity_m_s2;                                         // nothing: the world's
   Vec3 color_srgb = Vec3::Zero();                                           // 0 … 1
   bool texture = true;  // the model's own colors are shown, where it has some
   BodyLook look = BodyLook::plain;

@@ -43,7 +43,7 @@ bench::Operations count_element() {
 
 bench::Operations count_node() {
   Counted record[8], f[4], inverse_mass(1), box[6], speed2;
-  Motion<Counted> motion{0, 1, &inverse_mass, Counted(1), {}, nullptr, box, box + 3, &speed2};
+  Motion<Counted> motion{0, 1, &inverse_mass, Counted(1), {}, Counted(1), nullptr, box, box + 3, &speed2};
   counted = {};
   integrate_body<Counted, 1, false>(motion, record, record + 4, f);
   return counted;

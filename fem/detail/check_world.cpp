@@ -61,7 +61,10 @@ void check(const BodySpec& spec) {
     require_range(spec, "poisson_ratio", m.poisson_ratio, 0, 0.495, "from 0 to 0.495");
   require_density("density_kg_m3", m.density_kg_m3);
   require_range(spec, "damping_ratio", m.damping_ratio, 0, 1, "from 0 to 1");
+  require_range(spec, "mass_damping_per_s", m.mass_damping_per_s, 0, 1000, "from 0 to 1000");
   require_range(spec, "friction", m.friction, 0, 2, "from 0 to 2");
+  if (spec.gravity_m_s2 && !spec.gravity_m_s2->allFinite())
+    throw InputError(fmt::format("body {}: its gravity_m_s2 is not finite", spec.name));
   const int nodes = int(spec.cage.positions.rows());
   for (int n : spec.fixed_nodes)
     if (n < 0 || n >= nodes)

@@ -158,7 +158,8 @@ void Friction<Real>::limit_wall_nodes() {
   for (const WallNode& node : wall_nodes_) load_of(node) = WallLoad{};
 }
 
-// The velocities with which the step would end, v + h (f/m + g + push), of the nodes that take part; and of
+// The velocities with which the step would end but for damping by mass, v + h (f/m + g + push), of the nodes
+// that take part; what is 0 stays 0 with it. And of
 // rigid bodies the same as a velocity of the centre of mass and a spin, from the momentum and the angular
 // momentum of their nodes. Held nodes keep the velocity that they have.
 template <class Real>
@@ -167,9 +168,10 @@ void Friction<Real>::predict(const LaneView<Real>& view, const std::vector<const
     Real v = view.v[view.state.at(node, c)];
     const Real inverse_mass = tables_.inverse_mass[node];
     if (!(inverse_mass > 0)) return v;
-    Real gain = view.f[view.force.at(node, c)] * inverse_mass + Real(world_.gravity_m_s2[c]);
+    const Body& of = world_.bodies[std::size_t(body)];
+    Real gain = view.f[view.force.at(node, c)] * inverse_mass + Real(of.gravity_m_s2[c]);
     if (const Real* push = pushes[std::size_t(body)])
-      gain += push[(3 * (node - world_.bodies[std::size_t(body)].first_node) + c) * view.stride];
+      gain += push[(3 * (node - of.first_node) + c) * view.stride];
     return v + dt_ * gain;
   };
   velocities_.resize(slots_.size());

@@ -93,6 +93,7 @@ struct Motion {
   const Real* inverse_mass;   // a world node; 0 where it never moves
   Real dt;
   Real gravity[3];
+  Real kept;            // share of the velocity that damping by mass leaves in a step; 1: all
   const Real* push;     // accelerations [3 (n − first_node) + xyz][lane], or null
   Real *lower, *upper;  // out: box of the new positions, [xyz][lane]
   Real* speed2;         // out: largest |v|² of the new velocities, [lane]
@@ -170,7 +171,7 @@ struct Kernels {
   int lanes;
   // Adds the elastic and damping forces to f.
   void (*elastic)(const Elements<Real>&, const Real* x, const Real* v, Real* f);
-  // v += dt (f/m + g + push), x += dt v, f = 0.
+  // v = kept (v + dt (f/m + g + push)), x += dt v, f = 0.
   void (*integrate)(const Motion<Real>&, Real* x, Real* v, Real* f);
   // The same where a body may stand still: it does in lanes where it is asleep, and where it was slow, stays
   // slow and gains little.

@@ -100,8 +100,11 @@ class Parter {
  public:
   Parter(const World& world, double offset_m, const Gaps& before)
       : world_(world), offset_m_(offset_m), bodies_(world.bodies.size()), before_(before), now_(before) {
-    world_.gravity_m_s2.setZero(), world_.forces.clear();
-    for (Body& body : world_.bodies) body.track = {};  // time stands still
+    world_.forces.clear();
+    for (Body& body : world_.bodies) {
+      body.gravity_m_s2.setZero(), body.material.mass_damping_per_s = 0;
+      body.track = {};  // time stands still
+    }
     world_.rest_speed_m_s = 0, world_.dt_s = world_.contact_dt_s;
     stage_steps_ = steps_of_stage(world_);
     std::fill(world_.tables.pair_friction.begin(), world_.tables.pair_friction.end(), 0.f);

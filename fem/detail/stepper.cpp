@@ -1,6 +1,6 @@
-// One step of a world, over lanes: kick-drift, v += h (f/m + g + push), x += h v, with one evaluation of
-// forces. The velocity belongs to the middle of a step (docs/dynamics.md, "Integration"). In a step come,
-// in this order,
+// One step of a world, over lanes: kick-drift, v = e^(−αh) (v + h (f/m + g + push)), x += h v, with one
+// evaluation of forces. The velocity belongs to the middle of a step (docs/dynamics.md, "Integration"). In a
+// step come, in this order,
 //
 //     who sleeps, contact, controls, limits of stretch, elastic forces, friction, integration.
 //
@@ -530,9 +530,10 @@ void Stepper<Real>::integrate() {
       continue;
     }
     Motion<Real> motion{
-        body.first_node, body.last_node,     tables_.inverse_mass.data(), Real(world_.dt_s), {},
-        pushes_on(b),    &lower_[3 * first], &upper_[3 * first],          &speed2_[first]};
-    for (int c = 0; c < 3; ++c) motion.gravity[c] = Real(world_.gravity_m_s2[c]);
+        body.first_node, body.last_node, tables_.inverse_mass.data(), Real(world_.dt_s),  {},
+        Real(1),         pushes_on(b),   &lower_[3 * first],          &upper_[3 * first], &speed2_[first]};
+    for (int c = 0; c < 3; ++c) motion.gravity[c] = Real(world_.bodies[b].gravity_m_s2[c]);
+    motion.kept = Real(std::exp(-world_.bodies[b].material.mass_damping_per_s * world_.dt_s));
     Real *const x = state_.data(), *const v = &state_[first_velocity_];
     std::fill_n(&stands_[first], lanes_, Real(0));
     std::copy_n(&speed2_[first], lanes_, speed2_before_.data());

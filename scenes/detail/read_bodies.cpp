@@ -80,11 +80,16 @@ MaterialSpec read_material(const Node& body_table, Kind kind, Role role, const s
   if (!table) {  // it never deforms: any sound material does
     const Key& friction = *find_key("bodies[].material.friction");
     return {"springs", any_modulus_pa, 0.45,
-            1000,      0.05,           as_number(parse_set_value(std::string(friction.fallback), ""))};
+            1000,      0.05,           as_number(parse_set_value(std::string(friction.fallback), "")),
+            0};
   }
-  return {text(*table, "model"),           maybe_number(*table, "youngs_modulus_pa").value_or(any_modulus_pa),
-          number(*table, "poisson_ratio"), number(*table, "density_kg_m3"),
-          number(*table, "damping_ratio"), number(*table, "friction"),
+  return {text(*table, "model"),
+          maybe_number(*table, "youngs_modulus_pa").value_or(any_modulus_pa),
+          number(*table, "poisson_ratio"),
+          number(*table, "density_kg_m3"),
+          number(*table, "damping_ratio"),
+          number(*table, "friction"),
+          number(*table, "mass_damping_per_s"),
           flag(*table, "mesh_independent")};
 }
 
@@ -218,8 +223,9 @@ BodySpec read_body(const Node& table, const Box& bounds) {
   body.velocity_m_s = vector(table, "velocity_m_s");
   body.angular_velocity_rad_s = vector(table, "angular_velocity_rad_s");
   const bool stands = body.role == Role::scenery || (body.role == Role::obstacle && body.kind == Kind::rigid);
-  for (const char* key : {"velocity_m_s", "angular_velocity_rad_s"})
-    if (stands && !vector(table, key).isZero(0))
+  if (table.find("gravity_m_s2")) body.gravity_m_s2 = vector(table, "gravity_m_s2");
+  for (const char* key : {"velocity_m_s", "angular_velocity_rad_s", "gravity_m_s2"})
+    if (stands && table.find(key) && !vector(table, key).isZero(0))
       complain(child(table, key),
                fmt::format(
                    "{} cannot be pushed, and has no {}; {}", what, key,

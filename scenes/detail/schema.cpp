@@ -323,6 +323,8 @@ constexpr Key all_keys[] = {
      "kg/m³; of the model, not of its cage", "", ""},
     {"bodies[].material.damping_ratio", Type::number, share, 0, "0.05",
      "share of the critical damping of the body's slowest stretching", "", ""},
+    {"bodies[].material.mass_damping_per_s", Type::number, from_to(0, 1000), 0, "0.0",
+     "1/s; what moves is slowed by so much of its velocity, as in a medium at rest: swings die away", "", ""},
     {"bodies[].material.friction", Type::number, from_to(0, 2), 0, "0.2",
      "Coulomb's; a pair of bodies has the geometric mean", "", ""},
     {"bodies[].material.mesh_independent",
@@ -373,6 +375,8 @@ constexpr Key all_keys[] = {
      "m/s; at the start, of a body that forces can push; held nodes stand", "", ""},
     {"bodies[].angular_velocity_rad_s", Type::vector, any, 3, "[0, 0, 0]",
      "rad/s; at the start, about its centre of mass", "", ""},
+    {"bodies[].gravity_m_s2", Type::vector, from_to(-1000, 1000), 3, may_lack,
+     "m/s²; of a body that forces can push; left out: the world's", "", ""},
 
     {"bodies[].fixed",
      Type::fixed,

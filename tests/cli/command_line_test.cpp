@@ -46,6 +46,18 @@ TEST_F(Program, RunFilmsASceneVerifyAgreesAndASecondRunChangesNothing) {
   }
 }
 
+// The paper's falling objects collide, all three, also where made models take the places of the fetched ones.
+TEST_F(Program_slow, AllThreeFallingObjectsCollide) {
+  const Result planned = limber_program({"plan", "falling_objects", "-o", out()});
+  ASSERT_EQ(planned.code, exit_done) << planned.err;
+  const std::string csv = out("observables.csv");
+  const Result verified = limber_program({"verify", out(), "--observables", csv});
+  ASSERT_EQ(verified.code, exit_done) << verified.err;
+  const std::string text = read_file(csv), head = text.substr(0, text.find('\n'));
+  for (const char* pair : {"bunny|dragon", "bunny|plate", "dragon|plate"})
+    EXPECT_NE(head.find(fmt::format(",{}.contact_force_n", pair)), std::string::npos) << pair;
+}
+
 // One row a frame, as many numbers as the head has names, and their extremes are those that verify and plan
 // tell.
 TEST_F(Program_slow, ObservablesOfAPathAgreeWithItsSummary) {
@@ -90,6 +102,18 @@ TEST_F(Program_slow, ObservablesOfAPathAgreeWithItsSummary) {
   EXPECT_EQ(largest("gap_m"), motion.at("gap").at("worst_m"));
   EXPECT_EQ(largest("gap_at_contact_m"), motion.at("gap_at_contact").at("worst_m"));
   EXPECT_EQ(largest("gap_to_wall_m"), motion.at("gap_to_wall").at("worst_m"));
+  // The strongest pair of each frame is the largest of the columns of pairs, which come last.
+  const std::vector<double> strongest = column("contact_force_n");
+  const auto is_pair = [](const std::string& name) { return name.find('|') != std::string::npos; };
+  const auto first_pair = std::find_if(rows[0].begin(), rows[0].end(), is_pair);
+  EXPECT_TRUE(std::all_of(first_pair, rows[0].end(), is_pair));
+  EXPECT_NE(std::find(first_pair, rows[0].end(), "robot|block.contact_force_n"), rows[0].end());
+  for (std::size_t r = 1; r < rows.size(); ++r) {
+    double most = 0;
+    for (std::size_t c = std::size_t(first_pair - rows[0].begin()); c < rows[r].size(); ++c)
+      most = std::max(most, std::stod(rows[r][c]));
+    EXPECT_EQ(most, strongest[r - 1]) << r;
+  }
   const std::vector<double> pressing = column("pressing");
   EXPECT_GT(largest("pressing"), 0);
   EXPECT_EQ(std::accumulate(pressing.begin(), pressing.end(), 0.0),

@@ -98,6 +98,50 @@ TEST(Elastic, FreeFallFollowsTheScheme) {
                 std::abs(center_of_mass_m(world, end, 0).z() / -fallen - 1), 1e-5);
 }
 
+// Damping by mass, k = e^(−αh) a step: after n steps a body that drifts has gone h v (k + … + kⁿ) and keeps
+// kⁿ of its momentum and of its spin; one that falls reaches k h g / (1 − k), by a gravity of its own that
+// the world does not have. Soft and rigid.
+TEST(Elastic, DampingByMassIsExponential) {
+  for (const BodyKind kind : {BodyKind::deformable, BodyKind::rigid}) {
+    BodySpec body = soft(cube({0, 0, 0}, 1, 2));
+    body.kind = kind;
+    body.material.mass_damping_per_s = 1.5;
+    body.velocity_m_s = {0.3, -0.1, 0.2}, body.angular_velocity_rad_s = {0, 0, 0.02};
+    BodySpec falling = body;
+    falling.name = "falling", falling.cage.positions.rowwise() += Vec3(5, 0, 0).transpose();
+    falling.velocity_m_s.setZero(), falling.angular_velocity_rad_s.setZero();
+    falling.gravity_m_s2 = Vec3(0, 0, -2);
+    WorldSpec spec = alone(body);
+    spec.bodies.push_back(falling);
+    const World world = build_world(spec);
+    const std::string where = kind == BodyKind::rigid ? "rigid cube" : "soft cube";
+    Control coast;
+    coast.steps = int(2 / world.dt_s);
+    const double k = std::exp(-1.5 * world.dt_s), left = std::pow(k, coast.steps);
+    const State end = propagate(world, start_state(world), coast).end;
+    const Vec3 gone = world.dt_s * body.velocity_m_s * k * (1 - left) / (1 - k);
+    prove_at_most(4, "drift with damping by mass, from h v Σ kⁿ, m", where,
+                  (center_of_mass_m(world, end, 0) - gone).norm(), 1e-5);
+    prove_at_most(4, "velocity left over e^(−αt), − 1", where,
+                  (center_velocity_m_s(world, end, 0) / left - body.velocity_m_s).norm() / 0.37, 1e-4);
+    const auto spin = [&](const State& state) {
+      const Points from_center =
+          body_positions(world, state, 0).rowwise() - center_of_mass_m(world, state, 0).transpose();
+      double sum = 0;
+      for (int n = 0; n < world.bodies[0].node_count(); ++n) {
+        const Vec3 v = Eigen::Map<const Vec3f>(&state.velocities[3 * n]).cast<double>();
+        sum += world.bodies[0].node_mass_kg[n] * Vec3(from_center.row(n)).cross(v).z();
+      }
+      return sum;
+    };
+    prove_at_most(4, "spin left over e^(−αt), − 1", where,
+                  std::abs(spin(end) / (left * spin(start_state(world))) - 1), 1e-3);
+    const double fastest = k * world.dt_s * 2 / (1 - k);
+    prove_at_most(4, "speed of a fall over k h g (1 − kⁿ)/(1 − k), − 1", where,
+                  std::abs(-center_velocity_m_s(world, end, 1).z() / (fastest * (1 - left)) - 1), 1e-4);
+  }
+}
+
 // Half the step, a quarter of the error; and damping ends all motion.
 TEST(Elastic, EnergyErrorsFallWithTheSquareOfTheStep) {
   for (const MaterialModel model : both_models) {

@@ -191,7 +191,7 @@ TEST(Observe, ContactForcesAreWhatMovesTheBodies) {
           const std::size_t k = std::size_t(3 * (body.first_node + n) + c);
           gained[c] += body.node_mass_kg[n] * (double(next.velocities[k]) - double(state.velocities[k]));
         }
-      const Vec3 expected = world.dt_s * (sum[b] + body.mass_kg * world.gravity_m_s2);
+      const Vec3 expected = world.dt_s * (sum[b] + body.mass_kg * body.gravity_m_s2);
       EXPECT_LT((gained - expected).norm(), 1e-5 * body.mass_kg) << body.name;  // m/s, of about 1
     }
     for (const ContactForce& f : forces) {
@@ -239,7 +239,7 @@ TEST(Observe, ControlForcesAreWhatMovesTheRobot) {
       if (pair.body == world.robot) sum += pair.force_n;
       if (pair.other == world.robot) sum -= pair.force_n;
     }
-    const Vec3 expected = world.dt_s * (sum + robot.mass_kg * world.gravity_m_s2);
+    const Vec3 expected = world.dt_s * (sum + robot.mass_kg * robot.gravity_m_s2);
     EXPECT_LT((gained - expected).norm(), 1e-5 * robot.mass_kg);
   }
 }

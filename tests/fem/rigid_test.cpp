@@ -348,6 +348,7 @@ TEST(Rigid, ALightNodeBearsTheWholeBody) {
 TEST(Rigid, ResultsDoNotDependOnLanesInstructionSetOrPauses) {
   WorldSpec spec = testing::barriers();
   spec.bodies[0].kind = BodyKind::rigid;
+  spec.bodies[0].material.mass_damping_per_s = 0.2;
   const World world = build_world(spec);
   Control press;
   press.manipulation = Manipulation::body;

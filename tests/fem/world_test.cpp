@@ -60,6 +60,10 @@ TEST(World, EveryComplaintNamesBodyAndElement) {
               HasSubstr("0.25 to 0.495"));
   EXPECT_THAT(spoiled([&](WorldSpec& s) { s.bodies[0].material.density_kg_m3 = nan; }),
               HasSubstr("density_kg_m3"));
+  EXPECT_THAT(spoiled([](WorldSpec& s) { s.bodies[0].material.mass_damping_per_s = -1; }),
+              HasSubstr("mass_damping_per_s"));
+  EXPECT_THAT(spoiled([&](WorldSpec& s) { s.bodies[0].gravity_m_s2 = Vec3(0, nan, 0); }),
+              HasSubstr("gravity_m_s2"));
   EXPECT_THAT(spoiled([](WorldSpec& s) { s.bodies[0].material.damping_ratio = 2; }),
               HasSubstr("damping_ratio"));
   EXPECT_THAT(spoiled([](WorldSpec& s) { s.bodies[0].material.friction = -1; }), HasSubstr("friction"));

@@ -511,6 +511,9 @@ TEST(Script, ComplainsWithLineAndColumn) {
       {"pose = { position_m = [8, 1.5, 1.5] }\n",
        "pose = { position_m = [8, 1.5, 1.5] }\nvelocity_m_s = [1, 0, 0]\n", "[1, 0, 0]",
        "bodies.shutter cannot be pushed, and has no velocity_m_s"},
+      {"pose = { position_m = [8, 1.5, 1.5] }\n",
+       "pose = { position_m = [8, 1.5, 1.5] }\ngravity_m_s2 = [0, 0, -1]\n", "[0, 0, -1]",
+       "bodies.shutter cannot be pushed, and has no gravity_m_s2"},
   };
   for (const Slip& slip : slips) {
     SCOPED_TRACE(fmt::format("{} → {}", slip.from, slip.to));
@@ -826,6 +829,7 @@ std::string all_of(const Scene& s) {
     t += fmt::format(" {}", int(body.deformation));
     t += fmt::format(" {} {}", body.fixed.walls, body.max_stretch.value_or(-1));
     t += v(body.velocity_m_s) + v(body.angular_velocity_rad_s);
+    t += fmt::format(" {} {}", m.mass_damping_per_s, v(body.gravity_m_s2.value_or(Vec3::Zero())));
     for (const Box& box : body.fixed.boxes_m) t += b(box);
     for (const PartSpec& part : body.parts)
       t += fmt::format(" {} {} {} {}", part.shell.value_or(-1), b(part.box_m),

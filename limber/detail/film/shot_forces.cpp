@@ -81,7 +81,8 @@ void Shot::measure_forces() {
     strongest = std::max(strongest, double(largest_force(control)));
   for (const fem::Force& force : world_.forces) strongest = std::max(strongest, force.force_n.norm());
   if (strongest == 0)  // of a simulation: what the robot weighs
-    strongest = world_.bodies[std::size_t(world_.robot)].mass_kg * world_.gravity_m_s2.norm();
+    strongest = world_.bodies[std::size_t(world_.robot)].mass_kg *
+                world_.bodies[std::size_t(world_.robot)].gravity_m_s2.norm();
   const double robot = bounding_box(bodies_[std::size_t(world_.robot)].surface.positions).diagonal();
   strongest_push_n_ = strongest;
   arrow_m_per_n_ = strongest > 0 ? robot / strongest : 0;

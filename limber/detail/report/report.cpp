@@ -107,6 +107,27 @@ void stage(Page& page) {
       "plays, arrow keys step. Click in a plot to go there.</p>\n");
 }
 
+// At most eight pairs, those that press most, each in a color of its own: bodies' colors may be alike.
+std::vector<render::Curve> curves_of_pairs(const Findings& f) {
+  const Vec3 colors[] = {{0.80, 0.20, 0.15}, {0.16, 0.50, 0.73}, {0.90, 0.49, 0.13}, {0.25, 0.60, 0.30},
+                         {0.55, 0.35, 0.70}, {0.45, 0.35, 0.25}, {0.85, 0.45, 0.65}, {0.40, 0.40, 0.45}};
+  std::vector<std::pair<double, render::Curve>> all;
+  for (const auto& [body, other, name] : touching_pairs(f.world, f.figures)) {
+    render::Curve curve{name, {}, {}, {}};
+    for (const FrameFigures& frame : f.figures.frames)
+      curve.x.push_back(frame.time_s), curve.y.push_back(pair_force_n(frame, body, other));
+    all.emplace_back(*std::max_element(curve.y.begin(), curve.y.end()), std::move(curve));
+  }
+  std::stable_sort(all.begin(), all.end(), [](const auto& a, const auto& b) { return a.first > b.first; });
+  std::vector<render::Curve> curves;
+  for (const Vec3& color : colors) {
+    if (curves.size() == all.size()) break;
+    curves.push_back(std::move(all[curves.size()].second));
+    curves.back().color_srgb = color;
+  }
+  return curves;
+}
+
 void plots(const Findings& f, Page& page) {
   const auto curves_of = [&](const auto& value, bool moving_only) {
     std::vector<render::Curve> curves;
@@ -143,6 +164,8 @@ void plots(const Findings& f, Page& page) {
   plot("Energy of all bodies", "energy (J)", {elastic, kinetic});
   plot("Contact", "sum of forces on a body (N)",
        curves_of([](const BodyFigures& b) { return b.contact_force_n; }, false));
+  if (const auto pairs = curves_of_pairs(f); !pairs.empty())
+    plot("Contact, pair by pair", "sum of forces of a pair (N)", pairs);
   plot("Largest strain of a tet", "Green's strain",
        curves_of([](const BodyFigures& b) { return b.largest_strain; }, true));
   const double percent = 100 / f.figures.robot_surface_size_m;

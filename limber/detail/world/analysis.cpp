@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 
 #include "core/progress.h"
 #include "core/threads.h"
@@ -28,6 +29,7 @@ FrameFigures measure_frame(const fem::World& world, const State& state) {
   for (const fem::PairForce& pair : fem::pair_forces(fem::contact_forces(world, state))) {
     contact[std::size_t(pair.body)] += pair.force_n;
     if (pair.other >= 0) contact[std::size_t(pair.other)] -= pair.force_n;
+    frame.pair_force_n[{pair.body, pair.other}] = pair.force_n.norm();
     if (pair.force_n.norm() <= frame.contact_force_n) continue;
     frame.contact_force_n = pair.force_n.norm();
     frame.contact_between = between(world, pair.body, pair.other);
@@ -184,6 +186,24 @@ Json json_of(const MotionFigures& figures) {
           {"largest_force_n", figures.largest_force_n}};
 }
 
+double pair_force_n(const FrameFigures& frame, int body, int other) {
+  const auto found = frame.pair_force_n.find({body, other});
+  return found == frame.pair_force_n.end() ? 0 : found->second;
+}
+
+std::vector<TouchingPair> touching_pairs(const fem::World& world, const MotionFigures& figures) {
+  std::set<std::pair<int, int>> found;
+  for (const FrameFigures& frame : figures.frames)
+    for (const auto& [pair, force_n] : frame.pair_force_n)
+      if (force_n > 0) found.insert(pair);
+  std::vector<TouchingPair> pairs;
+  for (const auto& [body, other] : found)
+    pairs.push_back({body, other,
+                     fmt::format("{}|{}", world.bodies[std::size_t(body)].name,
+                                 other < 0 ? std::string("walls") : world.bodies[std::size_t(other)].name)});
+  return pairs;
+}
+
 void write_observables(const fs::path& csv, const fem::World& world, const MotionFigures& figures) {
   std::string text = "time_s";
   for (const fem::Body& body : world.bodies)
@@ -194,7 +214,10 @@ void write_observables(const fs::path& csv, const fem::World& world, const Motio
       ",contact_force_n,contact_between,penetration_m,penetration_between,inverted_tets,overlap_m,overlap_"
       "between,"
       "self_overlap_m,self_overlap_of,pressing,gap_m,gap_at_contact_m,gap_between,pressing_walls,gap_to_wall_"
-      "m\n";
+      "m";
+  const std::vector<TouchingPair> pairs = touching_pairs(world, figures);
+  for (const TouchingPair& pair : pairs) text += fmt::format(",{}.contact_force_n", pair.name);
+  text += "\n";
   for (const FrameFigures& frame : figures.frames) {
     text += fmt::format("{}", frame.time_s);
     for (const BodyFigures& b : frame.bodies)
@@ -215,10 +238,13 @@ void write_observables(const fs::path& csv, const fem::World& world, const Motio
     const SeenFrame::Gap* const pair = widest(seen, false, &SeenFrame::Gap::at_contact_m);
     const SeenFrame::Gap* const least = widest(seen, false, &SeenFrame::Gap::min_m);
     const SeenFrame::Gap* const wall = widest(seen, true, &SeenFrame::Gap::at_contact_m);
-    text += fmt::format(",{},{},{},{},{},{}\n", pressing(false), least ? least->min_m : 0.0,
+    text += fmt::format(",{},{},{},{},{},{}", pressing(false), least ? least->min_m : 0.0,
                         pair ? pair->at_contact_m : 0.0,
                         pair ? between(world, pair->body, pair->other) : "nothing presses", pressing(true),
                         wall ? wall->at_contact_m : 0.0);
+    for (const auto& [body, other, name] : pairs)
+      text += fmt::format(",{}", pair_force_n(frame, body, other));
+    text += "\n";
   }
   write_file(csv, text);
 }

@@ -1,7 +1,9 @@
 // What a motion did to the bodies, measured at every stored frame.
 #pragma once
 
+#include <map>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "core/file.h"
@@ -24,6 +26,7 @@ struct BodyFigures {          // of one frame; all 0 for a body that does not mo
 struct FrameFigures {
   double time_s = 0;
   std::vector<BodyFigures> bodies;
+  std::map<std::pair<int, int>, double> pair_force_n;  // of two bodies that touch, the lower first; walls: −1
   double contact_force_n = 0;   // the largest sum over one pair of bodies, or a body and the walls
   std::string contact_between;  // "robot and floor", "robot and a wall"; "nothing touches"
   fem::Penetration penetration;
@@ -63,9 +66,16 @@ MotionFigures measure_motion(const fem::World&, const plan::Trajectory&);
 // With those that a search has looked at, nullptr for none.
 MotionFigures measure_motion(const fem::World&, const std::vector<PreparedBody>&, const plan::Trajectory&,
                              const Surfaces* = nullptr);
+// Those that touch in some frame, ascending, and as they are called: "robot|floor", "robot|walls".
+struct TouchingPair {
+  int body, other;
+  std::string name;
+};
+double pair_force_n(const FrameFigures&, int body, int other);  // 0 where they do not touch
+std::vector<TouchingPair> touching_pairs(const fem::World&, const MotionFigures&);
 Json json_of(const MotionFigures&);  // as plan, verify and bench print them
 
-// A row a frame, for each body its figures and then what is of all: docs/files.md.
+// A row a frame, for each body its figures, then what is of all, then the forces of pairs: docs/files.md.
 void write_observables(const fs::path& csv, const fem::World&, const MotionFigures&);
 
 // The bytes of volume.svg and volume.png.

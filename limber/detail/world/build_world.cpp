@@ -232,11 +232,13 @@ fem::World build_world(const scenes::Scene& scene, const std::vector<PreparedBod
                          .poisson_ratio = body.material.poisson_ratio,
                          .density_kg_m3 = share * body.material.density_kg_m3,
                          .damping_ratio = body.material.damping_ratio,
+                         .mass_damping_per_s = body.material.mass_damping_per_s,
                          .friction = body.material.friction,
                          .mesh_independent = body.material.mesh_independent};
     fem_body.fixed_nodes = scenes::fixed_nodes(body, scene.bounds_m, prepared[b].cage.positions);
     fem_body.kind = kind_of(body);
     fem_body.velocity_m_s = body.velocity_m_s, fem_body.angular_velocity_rad_s = body.angular_velocity_rad_s;
+    fem_body.gravity_m_s2 = body.gravity_m_s2;
     fem_body.max_volume_change = body.max_volume_change;
     if (body.max_stretch && *body.max_stretch < scenes::any_stretch) fem_body.max_stretch = *body.max_stretch;
     set_parts(body, prepared[b], share, fem_body);

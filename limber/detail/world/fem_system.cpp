@@ -43,7 +43,8 @@ std::uint64_t hash_of_world(const fem::World& world) {
   hasher.text("edition").value(edition);
   hasher.value(world.robot).matrix(world.bounds_m.lower).matrix(world.bounds_m.upper).value(int(world.walls));
   hasher.matrix(world.goal_shape_m);
-  hasher.matrix(world.gravity_m_s2).value(world.dt_s).value(world.contact_dt_s).value(world.rest_speed_m_s);
+  const Vec3 gravity_m_s2 = world.bodies[std::size_t(world.robot)].gravity_m_s2;
+  hasher.matrix(gravity_m_s2).value(world.dt_s).value(world.contact_dt_s).value(world.rest_speed_m_s);
   for (const double offset : world.surfaces64.offset) hasher.value(offset);
   if (!world.part_overlaps) hasher.text("overlaps are refused");
   if (std::isfinite(world.max_overlap_m)) hasher.value(world.max_overlap_m);
@@ -62,6 +63,8 @@ std::uint64_t hash_of_world(const fem::World& world) {
       hasher.value(v);
     for (const auto* of_tets : {&body.youngs_modulus_from_tet_pa, &body.density_from_tet_kg_m3})
       for (const double v : *of_tets) hasher.value(v);
+    if (m.mass_damping_per_s != 0) hasher.text("mass damping").value(m.mass_damping_per_s);
+    if (body.gravity_m_s2 != gravity_m_s2) hasher.text("gravity").matrix(body.gravity_m_s2);
     for (const bool fixed : body.fixed) hasher.value(int(fixed));
     if (body.shape) hasher.value(limber::hash_of(*body.shape));
   }
