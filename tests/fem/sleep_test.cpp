@@ -124,7 +124,7 @@ TEST(Sleep, AForceThatIsNotBalancedKeepsABodyAwake) {
 }
 
 // A plate of the scenes' stuff, 2.2 m high and held at its foot alone, is struck and left: by damping of its
-// strain alone it swings on for minutes, by damping by mass it stands after 20 s. What stands may be bent by
+// strain alone it still swings after 20 s, by damping by mass it stands. What stands may be bent by
 // a hair, for it comes to a stand where forces are small.
 TEST(Sleep, ASoftPlateComesToAStandByDampingByMass) {
   for (const double mass_damping_per_s : {0.0, 1.0}) {
