@@ -194,7 +194,7 @@ plan::Sample draw_towards(const Problem& problem, ompl::RNG& rng, const Vec3& po
                    : pick < s.weights.body + s.weights.control_point ? Manipulation::control_point
                                                                      : Manipulation::interpolation;
   d.force_n = s.max_force_n * rng.uniformReal(s.min_force_share, s.max_force_share);
-  d.robot_node = rng.uniformInt(0, problem.system.robot_nodes() - 1);
+  d.robot_node = problem.system.control_node(rng.uniformInt(0, problem.system.robot_nodes() - 1));
   d.steps = problem.steps;
   return d;
 }

@@ -256,8 +256,16 @@ int piercing_edges(const World& world, const State& state) {
   return count;
 }
 
-std::vector<ContactForce> contact_forces(const World& world, const State& state, const Control& control) {
-  detail::Stepper<float> stepper(world, 1, detail::best_isa());
+struct ContactProbe::Impl {
+  detail::Stepper<float> stepper;
+};
+
+ContactProbe::ContactProbe(const World& world)
+    : impl_(new Impl{detail::Stepper<float>(world, 1, detail::best_isa())}) {}
+ContactProbe::~ContactProbe() = default;
+
+std::vector<ContactForce> ContactProbe::forces(const State& state, const Control& control) {
+  detail::Stepper<float>& stepper = impl_->stepper;
   stepper.load(0, state.step, state.positions.data(), state.velocities.data(), control, true);
   std::vector<ContactForce> forces;
   for (const auto& e : stepper.contact_records(0)) {
@@ -266,6 +274,27 @@ std::vector<ContactForce> contact_forces(const World& world, const State& state,
     forces.push_back(force);
   }
   return forces;
+}
+
+std::vector<ContactForce> contact_forces(const World& world, const State& state, const Control& control) {
+  return ContactProbe(world).forces(state, control);
+}
+
+std::vector<double> contact_loads_n(const World& world, const std::vector<ContactForce>& forces) {
+  std::vector<double> loads(world.bodies.size(), 0);
+  for (const ContactForce& f : forces) {
+    if (f.body == f.other) continue;
+    loads[std::size_t(f.body)] += f.force_n.norm();
+    if (f.other >= 0) loads[std::size_t(f.other)] += f.force_n.norm();
+  }
+  return loads;
+}
+
+bool within_contact_loads(const World& world, const std::vector<ContactForce>& forces) {
+  const std::vector<double> loads = contact_loads_n(world, forces);
+  for (std::size_t b = 0; b < world.bodies.size(); ++b)
+    if (!(loads[b] <= world.bodies[b].max_contact_load_n)) return false;
+  return true;
 }
 
 std::vector<PairForce> pair_forces(const std::vector<ContactForce>& forces) {

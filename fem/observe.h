@@ -1,6 +1,9 @@
 // What a State shows: pure functions of World and State, in double.
 #pragma once
 
+#include <memory>
+#include <vector>
+
 #include "fem/world.h"
 
 namespace limber::fem {
@@ -70,6 +73,25 @@ struct ContactForce {
   double depth_m;
 };
 std::vector<ContactForce> contact_forces(const World&, const State&, const Control& = {});
+
+// The same with scratch memory that is kept, for whoever asks of many states. Of one thread; the world must
+// outlive it.
+class ContactProbe {
+ public:
+  explicit ContactProbe(const World&);
+  ~ContactProbe();
+  std::vector<ContactForce> forces(const State&, const Control& = {});
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+// What presses each body (its number), newtons: the magnitudes of all forces on it, of other bodies and of
+// walls, summed, so that forces from opposite sides add up. What it does to itself does not count.
+std::vector<double> contact_loads_n(const World&, const std::vector<ContactForce>&);
+// No body bears more than its max_contact_load_n.
+bool within_contact_loads(const World&, const std::vector<ContactForce>&);
 
 struct PairForce {
   int body, other;  // body < other, or equal: it touches itself; other −1: the walls

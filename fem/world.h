@@ -56,6 +56,8 @@ struct BodySpec {
   double max_volume_change = std::numeric_limits<double>::infinity();  // |V − V0|/V0 of a sound state, > 0
   // s > 1: in a sound state the singular values of all tets' deformation gradients lie within 1/s and s.
   double max_stretch = std::numeric_limits<double>::infinity();
+  // > 0; what may press the body at a frame (contact_loads_n).
+  double max_contact_load_n = std::numeric_limits<double>::infinity();
   // Of the fine surface that the cage moves: contact is where that is. All bodies of a world have one, or
   // none has: then contact is between the cages. Shared, for it is large and never changes.
   std::shared_ptr<const ContactShape> shape = nullptr;
@@ -110,11 +112,11 @@ struct Body {
       density_from_tet_kg_m3;  // (T) the material's, or a part's own
   double mass_kg, rest_volume_m3;
   std::shared_ptr<const ContactShape> shape;  // as given
-  bool phong;                             // as asked for; false unless deformable, moving and with a shape
-  double max_volume_change, max_stretch;  // as asked for
-  Vec3 velocity_m_s, angular_velocity_rad_s;        // as asked for
-  Vec3 gravity_m_s2;                                // on every node that is not fixed
-  Track track;                                      // likewise
+  bool phong;  // as asked for; false unless deformable, moving and with a shape
+  double max_volume_change, max_stretch, max_contact_load_n;  // as asked for
+  Vec3 velocity_m_s, angular_velocity_rad_s;                  // as asked for
+  Vec3 gravity_m_s2;                                          // on every node that is not fixed
+  Track track;                                                // likewise
   std::vector<Eigen::Matrix3d> inverse_rest_edges;  // (T) of the edges from a tet's node 0, as columns
   double stiffness_share;     // by which the elements' stiffness is multiplied; 1 unless mesh_independent
   double elastic_dt_limit_s;  // largest stable step of the damped elastic body; infinite unless deformable

@@ -29,6 +29,7 @@ class Bounded final : public System {
   double robot_mass_kg() const override { return system_.robot_mass_kg(); }
   double mean_speed(const State& s) const override { return system_.mean_speed(s); }
   int robot_nodes() const override { return system_.robot_nodes(); }
+  int control_node(int drawn) const override { return system_.control_node(drawn); }
   Box sample_bounds() const override { return system_.sample_bounds(); }
   double dt_s() const override { return system_.dt_s(); }
   std::uint64_t hash() const override { return system_.hash(); }

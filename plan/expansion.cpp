@@ -34,7 +34,7 @@ Sample draw_sample(const Settings& s, const System& system, std::int64_t iterati
   if (d.towards_goal) d.point = s.goal.center_of_mass_m;
   d.manipulation = choose(s.weights, d.towards_goal, rng.uniform());
   d.force_n = s.max_force_n * rng.uniform(s.min_force_share, s.max_force_share);
-  d.robot_node = rng.below(system.robot_nodes());
+  d.robot_node = system.control_node(rng.below(system.robot_nodes()));
   d.steps = steps_of(rng.uniform(s.min_duration_s, s.max_duration_s), system.dt_s());
   d.guided = rng.uniform() < s.search_options.guidance && !d.towards_goal;
   d.rank = rng.uniform(), d.ahead = rng.uniform(), d.stretch = rng.uniform();

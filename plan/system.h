@@ -25,11 +25,10 @@ struct Rollout {
 
 // What a rollout shows on its way.
 struct Observation {
-  int steps = 0;  // since it began
-  Vec3 center = Vec3::Zero(),
-       velocity = Vec3::Zero();    // of the robot: centre of mass, metres, metres a second
-  Vec3 goal_shift = Vec3::Zero();  // as System::goal_shift
-  bool lost = false;               // the goal cannot be reached any more, and the state is not acceptable
+  int steps = 0;                                        // since it began
+  Vec3 center = Vec3::Zero(), velocity = Vec3::Zero();  // as System::robot_center, robot_velocity
+  Vec3 goal_shift = Vec3::Zero();                       // as System::goal_shift
+  bool lost = false;  // the goal cannot be reached any more, and the state is not acceptable
 };
 
 // Hands rollouts to whoever has a lane free.
@@ -84,14 +83,18 @@ class System {
  public:
   virtual ~System() = default;
   virtual State start() const = 0;
-  virtual Vec3 robot_center(const State&) const = 0;    // centre of mass, metres
-  virtual Vec3 robot_velocity(const State&) const = 0;  // of the centre of mass, metres a second
+  // Where the robot is taken to be, metres: its centre of mass, or that of a part which leads it; and how
+  // fast that moves, metres a second.
+  virtual Vec3 robot_center(const State&) const = 0;
+  virtual Vec3 robot_velocity(const State&) const = 0;
   virtual double robot_mass_kg() const = 0;
   virtual double mean_speed(const State&) const = 0;  // of the robot's nodes, metres a second
   virtual int robot_nodes() const = 0;                // Control::node is below it
-  virtual Box sample_bounds() const = 0;              // where random points are drawn, metres
-  virtual double dt_s() const = 0;                    // length of a step
-  virtual std::uint64_t hash() const = 0;             // of all that a rollout's result depends on
+  // The node that a control point is at, of one drawn below robot_nodes().
+  virtual int control_node(int drawn) const { return drawn; }
+  virtual Box sample_bounds() const = 0;   // where random points are drawn, metres
+  virtual double dt_s() const = 0;         // length of a step
+  virtual std::uint64_t hash() const = 0;  // of all that a rollout's result depends on
   // False: no rollout passes through this state at a frame time, and no node is made of it; as where
   // Rollout::clear is false.
   virtual bool acceptable(const State&) const { return true; }

@@ -7,6 +7,7 @@
 #include <set>
 
 #include "core/error.h"
+#include "scenes/detail/five_tets.h"
 #include "scenes/detail/surface_builder.h"
 #include "scenes/shapes.h"
 
@@ -204,16 +205,12 @@ TetMesh cut_in_tets(const Grid& grid) {
   const auto node = [&](int i, int j, int k) {
     return (k * (grid.cells(1) + 1) + j) * (grid.cells(0) + 1) + i;
   };
-  // Corner c of a cell lies at (c & 1, c >> 1 & 1, c >> 2). One tet in the middle, one at each of four
-  // corners.
-  constexpr int even[5][4] = {{0, 3, 5, 6}, {1, 0, 5, 3}, {2, 0, 3, 6}, {4, 0, 6, 5}, {7, 3, 5, 6}};
-  constexpr int odd[5][4] = {{1, 2, 4, 7}, {0, 1, 2, 4}, {3, 1, 7, 2}, {5, 1, 4, 7}, {6, 2, 7, 4}};
   std::vector<Eigen::Vector4i> tets;
   std::vector<int> row(std::size_t(node(0, 0, grid.cells(2) + 1)), -1);
   grid.for_each_cell([&](const Cell& cell) {
     if (!grid.solid(cell)) return;
     const auto [i, j, k] = cell;
-    for (const auto& corners : (i + j + k) % 2 ? odd : even) {
+    for (const auto& corners : five_tets[(i + j + k) % 2]) {
       Eigen::Vector4i tet;
       std::array<Vec3, 4> p;
       for (int c = 0; c < 4; ++c) {

@@ -113,9 +113,10 @@ std::optional<SurfaceMesh> made_surface(const BodySpec& body) {
                             [](const BoxModel& m) { return std::optional(make_box(m)); },
                             [](const PlateModel& m) { return std::optional(make_plate(m)); },
                             [](const SphereModel& m) { return std::optional(make_sphere(m)); },
-                            [](const BlocksModel& m) { return std::optional(make_blocks(m)); }},
+                            [](const BlocksModel& m) { return std::optional(make_blocks(m)); },
+                            [](const TubeModel& m) { return std::optional(make_tube(m)); }},
                  body.model);
-  if (body.cage.tets == 0 && body.cage.cell_m == 0) surface->positions *= 1 - 1e-6;
+  if (box_size(body.model) && body.cage.tets == 0) surface->positions *= 1 - 1e-6;
   return surface;
 }
 
@@ -127,6 +128,11 @@ std::optional<TetMesh> made_cage(const BodySpec& body) {
   if (body.cage.tets > 0) return std::nullopt;
   if (const auto* blocks = std::get_if<BlocksModel>(&body.model))
     return make_blocks_cage(*blocks, body.cage.cell_m);
+  if (const auto* tube = std::get_if<TubeModel>(&body.model)) try {
+      return make_tube_cage(*tube, body.cage.cells);
+    } catch (const InputError& error) {
+      throw InputError(fmt::format("{}: bodies.{}.cage: {}", body.where, body.name, error.what()));
+    }
   const Vec3* size_m = box_size(body.model);
   LIMBER_CHECK(size_m, body.name);
   return make_box_cage(*size_m, body.cage.cells);

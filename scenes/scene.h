@@ -57,7 +57,13 @@ struct BlocksModel {  // all that is in a solid and in no hole; its origin is th
   double bevel_m = 0;
   double triangle_m = 0;
 };
-using Model = std::variant<FileModel, MadeModel, BoxModel, PlateModel, SphereModel, BlocksModel>;
+struct TubeModel {  // along a smooth curve through points; its origin is that of their coordinates
+  std::vector<Vec3> path_m;
+  double diameter_m = 0;  // outer
+  double wall_m = 0;      // 0: a rod, with half a ball at each end
+  double triangle_m = 0;
+};
+using Model = std::variant<FileModel, MadeModel, BoxModel, PlateModel, SphereModel, BlocksModel, TubeModel>;
 
 struct CageSpec {
   int tets = 0;      // budget of the enclosing cage; 0 when cells or cell_m are given
@@ -122,6 +128,8 @@ struct BodySpec {
   // > 1: the body stiffens towards tets whose singular values are outside of 1/s and s, and in all states of
   // a plan they are within. Nothing, or any_stretch: no limit.
   std::optional<double> max_stretch;
+  std::optional<double>
+      max_contact_load_n;  // > 0; what presses it in all frames of a plan; nothing: no limit
   Model model;
   CageSpec cage;
   MaterialSpec
@@ -195,6 +203,11 @@ struct PlannerSpec {
   double min_force_share = 0, max_force_share = 0;  // of max_force_n, drawn evenly between
   double min_duration_s = 0, max_duration_s = 0;    // one manipulation is held so long, drawn evenly between
   double control_point_radius_m = 0;
+  // Where control points are, in world coordinates at the start; empty: at any node. With `lead` the first is
+  // where the robot is taken to be.
+  std::vector<Box> patches_m;
+  bool lead = false;
+  std::string patches_where;      // their place in the text, for complaints
   double settle_time_s = 0;       // the robot gets at most so long to come to rest at the goal,
   double settle_speed_m_s = 0;    // which it does when its mean speed is below this
   double settle_force_share = 0;  // of max_force_n: the largest force of the settle

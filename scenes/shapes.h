@@ -46,6 +46,17 @@ SurfaceMesh make_liver();
 SurfaceMesh make_spine();
 SurfaceMesh make_ribcage();  // twenty ribs and the breastbone, each a tube of its own
 
+// A tube with round rims, or a rod with round ends, swept along a smooth curve through the points.
+SurfaceMesh make_tube(const TubeModel&);
+
+// That surface's cage: of a tube `cells` round it (even, at least 6), through its wall and along it; of a rod
+// across it (twice the same number) and along it. Five tets each. Throws InputError where cells fold or
+// would fill the lumen.
+TetMesh make_tube_cage(const TubeModel&, const Eigen::Vector3i& cells);
+
+double least_bend_radius_m(const TubeModel&);  // of its middle line
+double length_m(const TubeModel&);             // likewise
+
 // nx × ny × nz cells of five tets each, cut in alternate ways so that neighbours share their faces: 3 × 3 × 3
 // cells are 64 nodes and 135 tets. Nodes in x-fastest order.
 TetMesh make_box_cage(const Vec3& size_m, const Eigen::Vector3i& cells);

@@ -42,6 +42,7 @@ Body make_body(const BodySpec& spec) {
   body.max_volume_change = spec.max_volume_change;
   body.shape = spec.shape;
   body.max_stretch = spec.max_stretch;
+  body.max_contact_load_n = spec.max_contact_load_n;
   body.self_contact = spec.self_contact && spec.kind == BodyKind::deformable;
   for (int n : spec.fixed_nodes) body.fixed[n] = true;
   body.moving = kinematic || std::find(body.fixed.begin(), body.fixed.end(), false) != body.fixed.end();

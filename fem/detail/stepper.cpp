@@ -448,7 +448,7 @@ void Stepper<Real>::add_friction(std::vector<ContactRecord<Real>>* records) {
 }
 
 // Runs the forces of a step without its integration, and tells those of contact, walls and friction. One
-// lane; it has forces in it afterwards and is to be loaded anew.
+// lane, which is to be loaded anew afterwards.
 template <class Real>
 std::vector<ContactRecord<Real>> Stepper<Real>::contact_records(int lane) {
   LIMBER_CHECK(lanes_ == 1 && lane == 0, lanes_, lane);
@@ -459,6 +459,7 @@ std::vector<ContactRecord<Real>> Stepper<Real>::contact_records(int lane) {
   follow_forces(lane), find_sleepers();
   record_to(&records), add_contact_forces(), record_to(nullptr);
   find_pushes(), add_stretch_limits(), add_elastic_forces(), add_friction(&records);
+  std::fill(f_.begin(), f_.end(), Real(0));  // as integration leaves it
   return records;
 }
 

@@ -49,11 +49,20 @@ CageSpec read_cage(const Node& table, const Model& model, const std::string& bod
     return cage;
   }
   const auto* plate = std::get_if<PlateModel>(&model);
-  if (!std::holds_alternative<BoxModel>(model) && !(plate && !plate->hole))
+  const auto* tube = std::get_if<TubeModel>(&model);
+  if (!tube && !std::holds_alternative<BoxModel>(model) && !(plate && !plate->hole))
     complain(
         *cells,
-        fmt::format("{}.cage.cells needs a box, or a plate without a hole; write tets = N instead", body));
+        fmt::format("{}.cage.cells needs a box, a tube, or a plate without a hole; write tets = N instead",
+                    body));
   cage.cells = as_vector(*cells).cast<int>();
+  if (tube && tube->wall_m > 0 && (cage.cells[0] % 2 == 1 || cage.cells[0] < 6))
+    complain(*cells,
+             fmt::format("{}.cage.cells has {} cells round the tube; write an even number, 6 at least", body,
+                         cage.cells[0]));
+  if (tube && tube->wall_m == 0 && cage.cells[0] != cage.cells[1])
+    complain(*cells, fmt::format("{}.cage.cells has {} and {} cells across the rod; write one number twice",
+                                 body, cage.cells[0], cage.cells[1]));
   if (const int made = 5 * cage.cells.prod(), most = 200'000; made > most)
     complain(*cells,
              fmt::format("{}.cage.cells make {} tets; write fewer cells, at most {} tets", body, made, most));
@@ -200,6 +209,7 @@ BodySpec read_body(const Node& table, const Box& bounds) {
   body.deformation = bends ? Deformation::phong : Deformation::linear;
   body.max_volume_change = number(table, "max_volume_change");
   body.max_stretch = maybe_number(table, "max_stretch");
+  body.max_contact_load_n = maybe_number(table, "max_contact_load_n");
   body.model = read_model(child(table, "model"), what);
   body.color_srgb = read_body_color(table, body.role);
   body.texture = table.find("texture") ? flag(table, "texture") : !table.find("color");

@@ -120,6 +120,28 @@ void read_goals(const Node& root, Scene& scene, const Complaints& complaints) {
 
 // Keys that only have a meaning together are checked together: guidance needs a lag, and what ends a push on
 // its way needs looks at it.
+namespace {
+
+// What leads is a part; interpolation, holding and coming to rest are of the whole robot's centre of mass.
+void require_of_lead(const PlannerSpec& planner, const Node& table) {
+  const Node& lead = child(table, "lead");
+  if (planner.patches_m.empty())
+    complain(
+        lead,
+        "planner.lead needs a patch that leads; write for example planner.patches_m = [[[0, 0, 0], [1, 1, "
+        "1]]]");
+  if (planner.weight_interpolation > 0)
+    complain(lead,
+             "interpolation draws the centre of mass to the goal, and a patch leads; write "
+             "planner.weights.interpolation = 0");
+  if (planner.settle_time_s > 0)
+    complain(lead,
+             "the robot is brought to rest by its centre of mass, and a patch leads; write "
+             "planner.settle_time_s = 0");
+}
+
+}  // namespace
+
 PlannerSpec read_planner(const Node& table) {
   PlannerSpec planner;
   planner.preset = text(table, "preset");
@@ -140,6 +162,9 @@ PlannerSpec read_planner(const Node& table) {
   planner.min_force_share = share[0], planner.max_force_share = share[1];
   planner.min_duration_s = duration[0], planner.max_duration_s = duration[1];
   planner.control_point_radius_m = number(table, "control_point_radius_m");
+  planner.patches_m = read_boxes(table, "patches_m");
+  planner.lead = flag(table, "lead");
+  if (const Node* patches = table.find("patches_m")) planner.patches_where = patches->where.text();
   planner.settle_time_s = number(table, "settle_time_s");
   planner.settle_speed_m_s = number(table, "settle_speed_m_s");
   planner.settle_force_share = number(table, "settle_force_share");
@@ -162,6 +187,7 @@ PlannerSpec read_planner(const Node& table) {
     complain(child(table, planner.stop_in_goal ? "stop_in_goal" : "end_hopeless"),
              "stop_in_goal and end_hopeless need pushes that are looked at; write planner.look_s = 0.1");
   planner.shortcut_rounds = integer(table, "shortcut_rounds");
+  if (planner.lead) require_of_lead(planner, table);
   return planner;
 }
 

@@ -59,12 +59,6 @@ PlateModel read_plate(const Node& table, const std::string& what) {
   return model;
 }
 
-std::vector<Box> read_boxes(const Node& table, std::string_view key) {
-  std::vector<Box> boxes;
-  for (const Node& node : list(table, key)) boxes.push_back(as_box(node));
-  return boxes;
-}
-
 // Blocks are cut out of a grid of cells of triangle_m, so they cost by their volume, too.
 BlocksModel read_blocks(const Node& table, const std::string& what) {
   constexpr std::size_t max_boxes = 32;
@@ -88,6 +82,35 @@ BlocksModel read_blocks(const Node& table, const std::string& what) {
   return model;
 }
 
+TubeModel read_tube(const Node& table, const std::string& what) {
+  constexpr std::size_t max_points = 100;
+  TubeModel model;
+  for (const Node& point : list(table, "path_m")) model.path_m.push_back(as_vector(point));
+  model.diameter_m = number(table, "diameter_m"), model.wall_m = number(table, "wall_m");
+  model.triangle_m = maybe_number(table, "triangle_m").value_or(model.diameter_m / 8);
+  const Node& path = child(table, "path_m");
+  if (model.path_m.size() > max_points)
+    complain(path,
+             fmt::format("{}.path_m has {} points; write at most {}", what, model.path_m.size(), max_points));
+  for (std::size_t i = 1; i < model.path_m.size(); ++i)
+    if (!((model.path_m[i] - model.path_m[i - 1]).norm() > 1e-3 * model.diameter_m))
+      complain(path, fmt::format("{}.path_m has points {} and {} in one place; move one", what, i - 1, i));
+  if (!(model.wall_m < model.diameter_m / 2))
+    complain(child(table, "wall_m"), fmt::format("{}.wall_m is {}, which leaves no lumen; it must be < {}",
+                                                 what, model.wall_m, model.diameter_m / 2));
+  const double length = length_m(model), bend = least_bend_radius_m(model);
+  if (!(length > model.diameter_m))
+    complain(path, fmt::format("{} is {:.3g} m long, no longer than it is thick; move its points apart", what,
+                               length));
+  if (!(bend > 0.6 * model.diameter_m))
+    complain(path,
+             fmt::format("{} bends round a radius of {:.3g} m, too sharply for a diameter of {:g} m; make it "
+                         "thinner, or move its points apart",
+                         what, bend, model.diameter_m));
+  check_fineness(table, Vec3(length, model.diameter_m, model.diameter_m), model.triangle_m);
+  return model;
+}
+
 FileModel read_file_model(const Node& table, const std::string& what) {
   FileModel model;
   model.file = text(table, "file");
@@ -108,15 +131,22 @@ FileModel read_file_model(const Node& table, const std::string& what) {
 
 }  // namespace
 
+std::vector<Box> read_boxes(const Node& table, std::string_view key) {
+  std::vector<Box> boxes;
+  for (const Node& node : list(table, key)) boxes.push_back(as_box(node));
+  return boxes;
+}
+
 Model read_model(const Node& table, const std::string& body) {
   const std::string what = body + ".model";
   const auto given = [&](std::string_view key) { return table.find(key) != nullptr; };
   const int kinds = given("file") + given("box") + given("plate") + given("blocks") + given("sphere") +
-                    (given("made") && !given("file"));
+                    given("tube") + (given("made") && !given("file"));
   if (kinds != 1)
-    complain(table, fmt::format("{} has {} of file, made, box, plate, blocks, sphere; give exactly one (made "
-                                "may stand beside file)",
-                                what, kinds == 0 ? "none" : "more than one"));
+    complain(table,
+             fmt::format("{} has {} of file, made, box, plate, blocks, sphere, tube; give exactly one (made "
+                         "may stand beside file)",
+                         what, kinds == 0 ? "none" : "more than one"));
   for (const char* key : {"scale", "up", "front"})
     if (given(key) && !given("file"))
       complain(*table.find(key), fmt::format("{}.{} goes with file only; remove it", what, key));
@@ -127,6 +157,7 @@ Model read_model(const Node& table, const std::string& body) {
   if (given("box")) return read_box(child(table, "box"), what + ".box");
   if (given("plate")) return read_plate(child(table, "plate"), what + ".plate");
   if (given("blocks")) return read_blocks(child(table, "blocks"), what + ".blocks");
+  if (given("tube")) return read_tube(child(table, "tube"), what + ".tube");
   const Node& sphere = child(table, "sphere");
   const double d = number(sphere, "diameter_m");
   const SphereModel model{d, triangle_edge(sphere, Vec3::Constant(d))};

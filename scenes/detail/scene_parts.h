@@ -15,6 +15,7 @@ namespace limber::scenes {
 
 // `body` names it in complaints. scenes/detail/read_model.cpp
 Model read_model(const Node& table, const std::string& body);
+std::vector<Box> read_boxes(const Node& table, std::string_view key);  // there, too
 
 // Bodies, scenery, and which of them is the robot. scenes/detail/read_bodies.cpp
 void read_bodies(const Node& root, Scene&, const Complaints&);

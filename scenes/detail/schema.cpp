@@ -146,6 +146,15 @@ constexpr Key all_keys[] = {
      "body that is touched at its surface, and none for others; 1000: none",
      "",
      ""},
+    {"bodies[].max_contact_load_n",
+     Type::number,
+     {0, 1e9, true, false},
+     0,
+     may_lack,
+     "N: no plan passes through a frame in which other bodies and walls press this one with more: the "
+     "magnitudes of all forces of contact on it, summed, so that pushes from two sides add up; else no limit",
+     "",
+     ""},
     {"bodies[].color",
      Type::color,
      {},
@@ -195,7 +204,7 @@ constexpr Key all_keys[] = {
      {},
      0,
      required,
-     "what is seen: exactly one of file, made, box, plate, blocks, sphere",
+     "what is seen: exactly one of file, made, box, plate, blocks, sphere, tube",
      "",
      ""},
     {"bodies[].model.file",
@@ -273,6 +282,21 @@ constexpr Key all_keys[] = {
     {"bodies[].model.blocks.bevel_m", Type::number, at_least_zero, 0, "0.0",
      "m; radius of the rounded edges, at most half of the least way between two faces", "", ""},
     {"bodies[].model.blocks.triangle_m", Type::number, positive, 0, may_lack, "m; as of a box", "", ""},
+    {"bodies[].model.tube",
+     Type::table,
+     {},
+     0,
+     may_lack,
+     "a tube, or a rod, along a smooth curve, in coordinates of its own",
+     "",
+     ""},
+    {"bodies[].model.tube.path_m", Type::points, any, 0, required, "m; its middle line goes through them", "",
+     ""},
+    {"bodies[].model.tube.diameter_m", Type::number, positive, 0, required, "m; outer", "", ""},
+    {"bodies[].model.tube.wall_m", Type::number, at_least_zero, 0, "0.0",
+     "m; 0: a rod, with half a ball at each end", "", ""},
+    {"bodies[].model.tube.triangle_m", Type::number, positive, 0, may_lack,
+     "m; longest edge of a triangle, about; an eighth of the diameter when not given", "", ""},
     {"bodies[].model.sphere", Type::table, {}, 0, may_lack, "a sphere", "", ""},
     {"bodies[].model.sphere.diameter_m", Type::number, positive, 0, required, "m", "", ""},
     {"bodies[].model.sphere.triangle_m", Type::number, positive, 0, may_lack,
@@ -289,7 +313,10 @@ constexpr Key all_keys[] = {
     {"bodies[].cage.tets", Type::integer, from_to(24, 200'000), 0, may_lack,
      "budget of a cage made round the model", "", ""},
     {"bodies[].cage.cells", Type::integers, from_to(1, 200), 3, may_lack,
-     "boxes, and plates without a hole: cells along x, y, z, five tets each", "", ""},
+     "five tets each; boxes, and plates without a hole: along x, y, z; tubes: round (even, 6 at least), "
+     "through "
+     "the wall, along; rods: across, across (the same), along",
+     "", ""},
     {"bodies[].cage.cell_m", Type::number, positive, 0, may_lack,
      "m; blocks: cells between their faces, five tets each, no longer than this, two at least through a "
      "solid",
@@ -587,6 +614,21 @@ constexpr Key all_keys[] = {
      "[0.2, 3.0]"},
     {"planner.control_point_radius_m", Type::number, positive, 0, "0.25",
      "m; round the node, in the rest shape; wider where that is less than a tenth of the robot's mass", "",
+     ""},
+    {"planner.patches_m", Type::boxes, any, 0, "[]",
+     "m; in world coordinates at the start: the robot is pushed there alone, where it is pushed at control "
+     "points; one box as often as another, each at the node of the robot's cage in it that is nearest to its "
+     "middle",
+     "", ""},
+    {"planner.lead",
+     Type::boolean,
+     {},
+     0,
+     "false",
+     "the first of these patches leads: the mean of its nodes, by mass, is what is near, guided and in a "
+     "goal, "
+     "wherever the centre of mass is; goes with weights.interpolation = 0 and settle_time_s = 0",
+     "",
      ""},
     {"planner.settle_time_s", Type::number, from_to(0, 100), 0, "3.0",
      "s; at the goal the robot is given at most so long to come to rest", "", ""},
@@ -1056,6 +1098,15 @@ void check_boxes(const Key& key, const std::string& shown, const Node& node) {
     check_box(key, fmt::format("{}[{}]", shown, i), (*elements)[i]);
 }
 
+void check_points(const Key& key, const std::string& shown, const Node& node) {
+  const Array* elements = node.array();
+  if (!elements) complain_of_type(key, shown, node);
+  if (elements->size() < 2)
+    complain(node.where, fmt::format("{} has {} points; write two at least", shown, elements->size()));
+  for (std::size_t i = 0; i < elements->size(); ++i)
+    checked_numbers(key, fmt::format("{}[{}]", shown, i), (*elements)[i], 3);
+}
+
 void check_fixed(const Key& key, const std::string& shown, Node& node, const Complaints& complaints) {
   const auto is_walls = [](const Node& n) {
     const auto* text = std::get_if<std::string>(&n.value);
@@ -1112,6 +1163,8 @@ void check_value(const Key& key, const std::string& shown, Node& node, const Com
       return check_box(key, shown, node);
     case Type::boxes:
       return check_boxes(key, shown, node);
+    case Type::points:
+      return check_points(key, shown, node);
     case Type::color:
       return check_color(key, shown, node);
     case Type::fixed:
@@ -1230,6 +1283,8 @@ std::string Key::expected() const {
       return "two corners [[x, y, z], [x, y, z]], the lower one first";
     case Type::boxes:
       return "a list of boxes [[x, y, z], [x, y, z]], the lower corner first";
+    case Type::points:
+      return "a list of points [x, y, z], two at least";
     case Type::color:
       return "a colour \"#rrggbb\"";
     case Type::fixed:
@@ -1274,6 +1329,8 @@ std::string Key::example() const {
         return "[[0, 0, 0], [10, 3, 3]]";
       case Type::boxes:
         return "[[[0, 0, 0], [1, 1, 1]]]";
+      case Type::points:
+        return "[[0, 0, 0], [1, 0, 0]]";
       case Type::color:
         return "\"#c0392b\"";
       case Type::fixed:

@@ -27,6 +27,7 @@ enum class Type {
   box,
   region,  // a box that may be flat
   boxes,
+  points,  // two at least
   color,
   fixed,
   table,

@@ -63,6 +63,12 @@ role = "obstacle"
 kind = "rigid"
 model = { sphere = { diameter_m = 1, triangle_m = 0.3 } }
 cage = { tets = 60 }
+[[bodies]]
+name = "tube"
+role = "obstacle"
+kind = "rigid"
+model = { tube = { path_m = [[0, 0, 0], [1, 0, 0]], diameter_m = 0.4, triangle_m = 0.2 } }
+cage = { cells = [2, 2, 4] }
 [goal]
 center_of_mass_m = [1, 1, 1]
 radius_m = 0.3
@@ -96,6 +102,11 @@ const std::vector<MeshRow> mesh_rows{
     {"blocks", "bodies[].model.blocks.triangle_m", "bodies.blocks.model.blocks.triangle_m=0.2"},
     {"ball", "bodies[].model.sphere.diameter_m", "bodies.ball.model.sphere.diameter_m=1.1"},
     {"ball", "bodies[].model.sphere.triangle_m", "bodies.ball.model.sphere.triangle_m=0.2"},
+    {"tube", "bodies[].model.tube.path_m", "bodies.tube.model.tube.path_m=[[0, 0, 0], [1, 0.1, 0]]"},
+    {"tube", "bodies[].model.tube.diameter_m", "bodies.tube.model.tube.diameter_m=0.3"},
+    {"tube", "bodies[].model.tube.wall_m", "bodies.tube.model.tube.wall_m=0.1",
+     "bodies.tube.cage.cells=[8, 8, 4]"},
+    {"tube", "bodies[].model.tube.triangle_m", "bodies.tube.model.tube.triangle_m=0.1"},
     {"file", "bodies[].cage.tets", "bodies.file.cage.tets=80"},
     {"file", "bodies[].cage.mode", "bodies.file.cage.mode=fast"},
     {"file", "bodies[].cage.shells", "bodies.file.cage.shells=3"},
@@ -185,6 +196,7 @@ const std::vector<Row> rows{
     {"bodies[].self_contact", "bodies.cart.self_contact=true", world},
     {"bodies[].max_volume_change", "bodies.cart.max_volume_change=0.2", world},
     {"bodies[].max_stretch", "bodies.cart.max_stretch=3", world},
+    {"bodies[].max_contact_load_n", "bodies.cart.max_contact_load_n=300", world},
     {"bodies[].color", "bodies.cart.color=\"#123456\"", film},
     {"bodies[].texture", "bodies.cart.texture=false", film, "film.color_by=body"},
     {"bodies[].opacity", "bodies.veil.opacity=0.5", film},
@@ -270,6 +282,9 @@ const std::vector<Row> rows{
     {"planner.force_share", "planner.force_share=[0.5, 1]", search},
     {"planner.duration_s", "planner.duration_s=[0.2, 2]", search},
     {"planner.control_point_radius_m", "planner.control_point_radius_m=0.2", search},
+    {"planner.patches_m", "planner.patches_m=[[[0, 0, 0], [4, 2, 2]]]", world},
+    {"planner.lead", "planner.lead=true", world,
+     "planner.patches_m=[[[0, 0, 0], [4, 2, 2]]]|planner.settle_time_s=0|planner.weights.interpolation=0"},
     {"planner.settle_time_s", "planner.settle_time_s=2", search},
     {"planner.settle_speed_m_s", "planner.settle_speed_m_s=0.03", search},
     {"planner.settle_force_share", "planner.settle_force_share=0.5", search},

@@ -386,6 +386,7 @@ List of_the_scene() {
   add("planner.lag=3", tree);
   add("bodies.ball.max_volume_change=0.0001", "ball: volume changes by at most 0.01 %");
   add("bodies.ball.max_stretch=1.001", "ball: tets are stretched within");
+  add("bodies.block.max_contact_load_n=0.01", "block: is pressed by at most 0.01 N");
   add("bodies.ball.youngs_modulus_pa=8e3", steps);
   add("bodies.ball.density_kg_m3=90", steps);
   add("bodies.block.material.model=neo_hookean", replay);

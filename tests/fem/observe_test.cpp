@@ -206,6 +206,43 @@ TEST(Observe, ContactForcesAreWhatMovesTheBodies) {
   EXPECT_GT(between_moving, 10);
 }
 
+// A block that rests on a floor and bears another: it is pressed by the other's weight and by both from
+// below, though all forces on it sum to its own weight. The balance of forces is the closed form.
+TEST(Observe, WhatPressesABodyAddsUpFromBothSides) {
+  Material material;
+  material.mass_damping_per_s = 2;
+  WorldSpec spec;
+  spec.bodies = {{"lower", cube({0, 0, 0.5}, 1, 2), material, {}, BodyKind::rigid},
+                 {"upper", cube({0, 0, 1.4}, 0.8, 2), material, {}, BodyKind::rigid},
+                 {"apart", cube({3, 0, 1}, 0.5, 1), material, {}, BodyKind::immovable}};
+  spec.bounds_m = {Vec3(-3, -3, 0), Vec3(4, 3, 4)};
+  spec.gravity_m_s2 = {0, 0, -10};
+  spec.bodies[0].max_contact_load_n = 2200;
+  const World world = build_world(spec);
+  Control coast;
+  coast.steps = int(6 / world.dt_s);
+  const State rest = propagate(world, rest_state(world), coast).end;
+  const std::vector<ContactForce> forces = contact_forces(world, rest);
+  const std::vector<double> loads = contact_loads_n(world, forces);
+  const double lower_n = 1000, upper_n = 512;  // 100 kg/m³
+  EXPECT_NEAR(loads[0], lower_n + 2 * upper_n, 10);
+  EXPECT_NEAR(loads[1], upper_n, 5);
+  EXPECT_EQ(loads[2], 0);
+  EXPECT_TRUE(within_contact_loads(world, forces));
+  spec.bodies[0].max_contact_load_n = 1900;
+  EXPECT_FALSE(within_contact_loads(build_world(spec), forces));
+  // A probe keeps nothing from one state to the next.
+  ContactProbe probe(world);
+  for (const State& state : {rest, rest_state(world), rest}) {
+    const std::vector<ContactForce> again = probe.forces(state), alone = contact_forces(world, state);
+    ASSERT_EQ(again.size(), alone.size());
+    for (std::size_t i = 0; i < again.size(); ++i) {
+      EXPECT_EQ(again[i].force_n, alone[i].force_n);
+      EXPECT_EQ(again[i].place_m, alone[i].place_m);
+    }
+  }
+}
+
 // So does each kind of control: the robot's momentum gains h times the sum of what it does to the nodes, and
 // no node gets more than its share of the most that is allowed.
 TEST(Observe, ControlForcesAreWhatMovesTheRobot) {

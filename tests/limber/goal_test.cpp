@@ -81,6 +81,36 @@ TEST(Goal, PredicatesAreAboutAllOfABody) {
   EXPECT_NE(is_above.hash(), is_below.hash()) << "another goal is another search";
 }
 
+// A search whose robot would lean on a plate does not, where the plate may bear little: no node of its tree
+// and no frame of its path is a state in which more presses it.
+TEST(Goal, NoSearchPressesABodyByMoreThanItMayBear) {
+  const auto most_of_plan = [](double max_contact_load_n) {
+    fem::WorldSpec spec = fem::testing::barriers();
+    spec.bodies[1].max_contact_load_n = max_contact_load_n;
+    const fem::World world = fem::build_world(spec);
+    const FemSystem system(world);
+    plan::Settings s;
+    s.goal.center_of_mass_m = Vec3(9, 1.5, 1.5), s.goal.radius_m = 0.4;
+    s.seed = 4, s.max_force_n = 200, s.max_iterations = 100, s.goal_bias = 0.5;
+    const plan::Plan p = plan::plan(system, s);
+    double most = 0;
+    const auto look = [&](const State& state) {
+      most = std::max(most, fem::contact_loads_n(world, fem::contact_forces(world, state))[1]);
+    };
+    for (int n = 0; n < p.tree.size(); ++n) look(p.tree.states[std::size_t(n)]);
+    for (const State& state : p.trajectory.frames) look(state);
+    EXPECT_GT(p.tree.size(), 10);
+    return std::pair(most, system.hash());
+  };
+  const auto [freely, free_hash] = most_of_plan(std::numeric_limits<double>::infinity());
+  ASSERT_GT(freely, 40);
+  const double limit = 0.8 * freely;
+  const auto [gently, gentle_hash] = most_of_plan(limit);
+  EXPECT_GT(gently, 0) << "it still touches";
+  EXPECT_LE(gently, limit);
+  EXPECT_NE(free_hash, gentle_hash) << "another limit is another search";
+}
+
 // The whole way: the robot is asked to end turned by a right angle, in a box.
 TEST(Goal, TheRobotComesToRestTurnedInTheBox) {
   fem::WorldSpec spec = brick_over_slab();
@@ -145,6 +175,46 @@ TEST(Goal, TheSettleHoldsARobotInWhateverTurnItIs) {
     EXPECT_EQ(course.result, plan::ControlRollout::rests_in_goal) << hold;
     EXPECT_NEAR(fem::turn_from_goal_shape_deg(world, course.end), hold ? 60 : 0, 5) << hold;
   }
+}
+
+// A rod that is pushed at its ends alone and led by one of them: that end goes to the goal, wherever the
+// middle of the rod is, and no other node is pushed.
+TEST(Goal, APatchThatLeadsIsWhatGoesToTheGoal) {
+  const fem::World world = fem::build_world(
+      alone({"robot", grid({-1, -0.1, -0.1}, {2, 0.2, 0.2}, 10, 1, 1), {}, {}, fem::BodyKind::deformable}));
+  GoalRules rules;
+  rules.patches_m = {Box{Vec3(0.95, -1, -1), Vec3(1.05, 1, 1)}, Box{Vec3(-1.05, -1, -1), Vec3(-0.95, 1, 1)}};
+  rules.lead = true;
+  const FemSystem system(world, rules);
+  EXPECT_LT((system.robot_center(system.start()) - Vec3(1, 0, 0)).norm(), 1e-6);
+  plan::Settings s;
+  s.goal.center_of_mass_m = Vec3(1.5, 1.5, 0), s.goal.radius_m = 0.3;
+  s.seed = 2, s.max_force_n = 20, s.max_iterations = 400, s.settle.max_duration_s = 0;
+  s.weights = {.body = 0, .control_point = 1, .interpolation = 0};
+  const plan::Plan p = plan::plan(system, s);
+  ASSERT_TRUE(p.solved()) << plan::explain(p);
+  const State& end = p.trajectory.end;
+  const Points rest = world.bodies[0].cage.positions, now = fem::body_positions(world, end, 0);
+  Vec3 tip = Vec3::Zero();
+  int tips = 0;
+  double weight = 0;
+  for (int n = 0; n < rest.rows(); ++n)
+    if (rest(n, 0) > 0.99) {
+      const double mass = world.bodies[0].node_mass_kg[std::size_t(n)];
+      tip += mass * now.row(n).transpose(), weight += mass, ++tips;
+    }
+  EXPECT_EQ(tips, 4);
+  EXPECT_LE((tip / weight - s.goal.center_of_mass_m).norm(), 0.3);
+  EXPECT_GT((fem::center_of_mass_m(world, end, 0) - s.goal.center_of_mass_m).norm(), 0.5);
+  int pushes = 0;
+  for (const Control& control : p.tree.controls)
+    if (control.manipulation == Manipulation::control_point) {
+      ++pushes;
+      EXPECT_GT(std::abs(rest(control.node, 0)), 0.99) << control.node;
+    }
+  EXPECT_GT(pushes, 5);
+  rules.lead = false;
+  EXPECT_NE(FemSystem(world, rules).hash(), system.hash());
 }
 
 // Where no rest is asked for, what else the goal asks still counts.

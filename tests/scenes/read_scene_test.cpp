@@ -202,7 +202,7 @@ TEST(ReadScene, ComplainsWithLineAndColumn) {
       {"bevel_m = 0.1", "triangle_m = 1e-5", "1e-5", "triangles"},
       {"size_m = 1.0", "size_m = 3.5", "3.5", "does not fit"},
       {"{ box = { size_m = [1, 1, 1], bevel_m = 0.1 } }", "{}", "{}",
-       "none of file, made, box, plate, blocks, sphere"},
+       "none of file, made, box, plate, blocks, sphere, tube"},
       {", bevel_m = 0.1 } }", " }, sphere = { diameter_m = 1 } }", "{ box", "more than one of"},
       {", bevel_m = 0.1 } }", " }, scale = 2 }", "2 }\ncage", "goes with file only"},
       {"{ box = { size_m = [1, 1, 1], bevel_m = 0.1 } }", "{ file = \"a\", up = \"+x\" }", "\"+x\"",
@@ -228,6 +228,22 @@ TEST(ReadScene, ComplainsWithLineAndColumn) {
        "{ solids", "the holes leave nothing"},
       {blocks_robot, "model = { blocks = { solids = [[[0, 0, 0], [1, 1, 1]]], bevel_m = 0.6 } }", "{ solids",
        "bevel_m is 0.6, more than half of the 1 m between two faces"},
+      {blocks_robot, "model = { tube = { path_m = [[0, 0, 0]], diameter_m = 0.1 } }", "[[0, 0, 0]]",
+       "has 1 points; write two"},
+      {blocks_robot, "model = { tube = { path_m = [[0, 0, 0], [0, 0, 0]], diameter_m = 0.1 } }",
+       "[[0, 0, 0], [0", "points 0 and 1 in one place"},
+      {blocks_robot,
+       "model = { tube = { path_m = [[0, 0, 0], [1, 0, 0]], diameter_m = 0.1, wall_m = 0.05 } }", "0.05",
+       "which leaves no lumen; it must be < 0.05"},
+      {blocks_robot,
+       "model = { tube = { path_m = [[0, 0, 0], [0.3, 0, 0], [0, 0.1, 0]], diameter_m = 0.2 } }",
+       "[[0, 0, 0], [0.3", "too sharply for a diameter of 0.2 m"},
+      {blocks_robot, "model = { tube = { path_m = [[0, 0, 0], [1, 0, 0]], diameter_m = 2 } }",
+       "[[0, 0, 0], [1, 0", "no longer than it is thick"},
+      {blocks_robot,
+       "model = { tube = { path_m = [[0, 0, 0], [1, 0, 0]], diameter_m = 0.2, wall_m = 0.02 } }", "[3, 3, 3]",
+       "has 3 cells round the tube; write an even number"},
+      {"[planner]", "[planner]\nlead = true", "true", "needs a patch that leads"},
       {blocks_robot, "model = { blocks = { solids = [] } }", "[] }", "write one solid at least"},
       {blocks_robot, "model = { blocks = { solids = [[[0, 0, 0], [1, 0, 1]]] } }", "[1, 0", "upper y = 0"},
       {"cells = [3, 3, 3]", "cell_m = 0.5", "0.5 }\nmaterial", "goes with model.blocks only"},
@@ -598,6 +614,7 @@ std::string another_value(const Key& key) {
       {"bodies[].pose.axis", "[1, 0, 0]"},
       {"bodies[].triangles", "777"},
       {"bodies[].max_stretch", "1.5"},
+      {"bodies[].max_contact_load_n", "2.5"},
       {"bodies[].model.box.size_m", "[0.9, 0.8, 0.7]"},
       {"bodies[].model.box.bevel_m", "0.2"},
       {"bodies[].model.box.triangle_m", "0.2"},
@@ -610,6 +627,11 @@ std::string another_value(const Key& key) {
       {"bodies[].model.blocks.holes", "[[[0.25, 0, 0.25], [0.75, 1, 0.75]]]"},
       {"bodies[].model.blocks.bevel_m", "0.2"},
       {"bodies[].model.blocks.triangle_m", "0.2"},
+      {"bodies[].model.tube.path_m", "[[0, 0, 0], [1, 0.1, 0]]"},
+      {"bodies[].model.tube.diameter_m", "0.3"},
+      {"bodies[].model.tube.wall_m", "0.05"},
+      {"bodies[].model.tube.triangle_m", "0.2"},
+      {"planner.patches_m", "[[[0, 0, 0], [1, 2, 2]]]"},
       {"bodies[].model.sphere.diameter_m", "0.8"},
       {"bodies[].model.sphere.triangle_m", "0.2"},
       {"bodies[].fixed", "[]"},
@@ -692,6 +714,12 @@ TEST(Keys, EveryKeyChangesTheScene) {
     if (key.path.find(".blocks") != key.path.npos || key.path == "bodies[].cage.cell_m")
       sets = {"bodies.robot.model={ blocks = { solids = [[[0, 0, 0], [1, 1, 1]]] } }",
               "bodies.robot.cage={ cell_m = 0.5 }"};
+    if (key.path.find(".tube") != key.path.npos)
+      sets = {"bodies.robot.model={ tube = { path_m = [[0, 0, 0], [1, 0, 0]], diameter_m = 0.2 } }",
+              tets_robot};
+    if (key.path == "planner.lead")
+      sets = {"planner.patches_m=[[[0, 0, 0], [1, 2, 2]]]", "planner.settle_time_s=0",
+              "planner.weights.interpolation=0"};
     if (key.path.find(".sphere") != key.path.npos) sets = {sphere_robot, tets_robot};
     if (key.path == "bodies[].cage.tets" || key.path == "bodies[].cage.mode" ||
         key.path == "bodies[].cage.shells")
@@ -796,6 +824,11 @@ std::string all_of(const Model& model) {
   if (const auto* m = std::get_if<BoxModel>(&model)) return "box " + box_text(*m);
   if (const auto* m = std::get_if<SphereModel>(&model))
     return fmt::format("sphere {} {}", m->diameter_m, m->triangle_m);
+  if (const auto* m = std::get_if<TubeModel>(&model)) {
+    std::string text = fmt::format("tube {} {} {} ", m->diameter_m, m->wall_m, m->triangle_m);
+    for (const Vec3& p : m->path_m) text += v(p) + fmt::format("{} ", p[2]);
+    return text;
+  }
   if (const auto* m = std::get_if<BlocksModel>(&model)) {
     std::string text = fmt::format("blocks {} {} {} ", m->solids.size(), m->bevel_m, m->triangle_m);
     for (const auto* boxes : {&m->solids, &m->holes})
@@ -827,7 +860,8 @@ std::string all_of(const Scene& s) {
     t += fmt::format(" {} {} {} {} {}", body.texture, body.opacity, body.roughness, body.metallic,
                      body.max_volume_change);
     t += fmt::format(" {}", int(body.deformation));
-    t += fmt::format(" {} {}", body.fixed.walls, body.max_stretch.value_or(-1));
+    t += fmt::format(" {} {} {}", body.fixed.walls, body.max_stretch.value_or(-1),
+                     body.max_contact_load_n.value_or(-1));
     t += v(body.velocity_m_s) + v(body.angular_velocity_rad_s);
     t += fmt::format(" {} {}", m.mass_damping_per_s, v(body.gravity_m_s2.value_or(Vec3::Zero())));
     for (const Box& box : body.fixed.boxes_m) t += b(box);
@@ -862,7 +896,8 @@ std::string all_of(const Scene& s) {
                    p.control_point_radius_m, p.settle_time_s, p.settle_speed_m_s, p.settle_force_share);
   t += fmt::format("{} {} {} {} {} {} {} {} {} {} {}\n", p.lag, p.metric, p.time_weight, p.guidance,
                    p.soft_price, p.look_s, p.learn_prices, p.steer, p.stop_in_goal, p.end_hopeless, p.hold);
-  t += fmt::format("{} {}\n", p.shortcut_rounds, p.settle_hold);
+  t += fmt::format("{} {} {}\n", p.shortcut_rounds, p.settle_hold, p.lead);
+  for (const Box& patch : p.patches_m) t += b(patch);
   for (const CameraSpec& c : s.cameras) {
     t += fmt::format("{} {} {} {} {}", c.name, v(c.direction), c.fov_deg, c.turn_deg, c.follow);
     t += fmt::format(" {} {}", c.subject, c.fill);

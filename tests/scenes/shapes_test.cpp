@@ -41,6 +41,22 @@ BlocksModel crossing(double bevel) {
 }
 constexpr double crossing_volume = 2 * 2.2 * 0.2 - 0.04 - 0.2 * (0.24 + 0.12 + 0.2 + 0.12);
 
+// An S of 0.6 m in three dimensions.
+TubeModel bent(double diameter, double wall, double triangle) {
+  return {{{0, 0, 0}, {0.15, 0, 0.05}, {0.25, 0.12, 0.05}, {0.4, 0.12, -0.05}, {0.55, 0, 0}},
+          diameter,
+          wall,
+          triangle};
+}
+
+// By Pappus and Guldin: a section's area times the way of its middle, whatever the curve. Round ends are half
+// balls and half rings.
+double tube_volume(const TubeModel& tube) {
+  const double r = tube.diameter_m / 2, w = tube.wall_m / 2, length = length_m(tube);
+  if (w == 0) return pi * r * r * (length - 2 * r) + 4 * pi / 3 * r * r * r;
+  return pi * (r * r - (r - 2 * w) * (r - 2 * w)) * (length - 2 * w) + 2 * pi * (r - w) * pi * w * w;
+}
+
 std::vector<Shape> shapes() {
   const Vec3 size(1, 2, 0.5);
   std::vector<Shape> made{
@@ -67,6 +83,11 @@ std::vector<Shape> shapes() {
       {"crossing walls", make_blocks(crossing(0)), 2 - 2 * 3, crossing_volume, 1e-4},
       {"rounded crossing walls", make_blocks(crossing(0.04)), 2 - 2 * 3, crossing_volume, 3e-2},
   };
+  const TubeModel straight{{{0, 0, 0}, {0, 0, 1}}, 0.2, 0, 0.01}, rod = bent(0.03, 0, 0.002),
+                                                                  tube = bent(0.06, 0.01, 0.003);
+  made.push_back({"straight rod", make_tube(straight), 2, tube_volume(straight), 4e-3});
+  made.push_back({"bent rod", make_tube(rod), 2, tube_volume(rod), 6e-3});
+  made.push_back({"bent tube", make_tube(tube), 0, tube_volume(tube), 6e-3});
   for (const Vec3& s : {Vec3(0.3, 3, 2), Vec3(3, 0.3, 2), Vec3(3, 2, 0.3)}) {
     made.push_back({"plate, square hole", make_plate({{s, 0, 0.1}, Hole{false, 0.8, {0.2, -0.1}}}), 0,
                     1.8 - 0.64 * 0.3, 1e-9});
@@ -216,6 +237,52 @@ TEST(BlocksCage, FillsTheBlocksInTwoLayersAndNoMore) {
   for (auto at = std::next(along.begin()); at != along.end(); ++at)
     longest = std::max(longest, *at - *std::prev(at));
   EXPECT_LE(longest, 0.4 + 1e-12);
+}
+
+// The tet that holds a point, or −1; and how far a point of no tet is outside of the nearest, as a share.
+int tet_that_holds(const TetMesh& cage, const Vec3& p) {
+  for (Eigen::Index t = 0; t < cage.tets.rows(); ++t) {
+    const auto corner = [&](int c) -> Vec3 { return cage.positions.row(cage.tets(t, c)); };
+    Vec3 q[4] = {corner(0), corner(1), corner(2), corner(3)};
+    bool inside = true;
+    for (int c = 0; c < 4 && inside; ++c) {
+      const Vec3 kept = q[c];
+      q[c] = p;
+      inside = signed_volume(q[0], q[1], q[2], q[3]) >= 0;
+      q[c] = kept;
+    }
+    if (inside) return int(t);
+  }
+  return -1;
+}
+
+TEST(TubeCage, HoldsItsSurfaceLeavesTheLumenAndSharesItsFaces) {
+  const auto holds_all = [](const TubeModel& tube, const Eigen::Vector3i& cells) {
+    SCOPED_TRACE(cells.transpose());
+    const TetMesh cage = make_tube_cage(tube, cells);
+    ASSERT_NO_THROW(validate(cage, "cage"));
+    const SurfaceMesh boundary{cage.positions, boundary_triangles(cage.tets)};
+    EXPECT_NEAR(volume(boundary), volume(cage), 1e-9 * volume(cage)) << "neighbours share their faces";
+    const SurfaceMesh surface = make_tube(tube);
+    for (Eigen::Index v = 0; v < surface.positions.rows(); ++v)
+      ASSERT_GE(tet_that_holds(cage, surface.positions.row(v)), 0) << surface.positions.row(v);
+  };
+  const TubeModel rod = bent(0.03, 0, 0.006), tube = bent(0.06, 0.01, 0.01);
+  holds_all(rod, {1, 1, 24});
+  holds_all(rod, {2, 2, 40});
+  holds_all(rod, {3, 3, 31});
+  holds_all(tube, {8, 1, 30});
+  holds_all(tube, {12, 2, 25});
+  // With many sections it is the polygon round the circle, less that in the lumen, along the tube.
+  const auto polygon = [](int n, double apothem) { return n * apothem * apothem * std::tan(pi / n); };
+  EXPECT_NEAR(volume(make_tube_cage(rod, {2, 2, 800})), polygon(8, 0.015) * length_m(rod),
+              0.03 * tube_volume(rod));
+  const double inner = 0.02 * std::cos(pi / 12) * std::cos(pi / 19);  // the surface has 19 vertices round
+  EXPECT_NEAR(volume(make_tube_cage(tube, {12, 1, 800})),
+              (polygon(12, 0.03) - polygon(12, inner)) * length_m(tube), 0.03 * tube_volume(tube));
+  const TetMesh cage = make_tube_cage(tube, {8, 1, 30});
+  for (const Vec3& p : tube.path_m) EXPECT_EQ(tet_that_holds(cage, p), -1) << "the lumen";
+  EXPECT_THROW(make_tube_cage(tube, {8, 1, 4}), InputError) << "it would fill the lumen";
 }
 
 // Faces stay where they are but for a millionth; in a corner that points inwards both do.

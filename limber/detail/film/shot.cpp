@@ -17,6 +17,7 @@
 #include "core/error.h"
 #include "fem/observe.h"
 #include "limber/detail/film/look.h"
+#include "limber/detail/world/goal_terms.h"
 #include "render/film.h"
 #include "render/image_file.h"
 
@@ -91,8 +92,7 @@ Shot::Shot(const scenes::Scene& scene, const std::string& camera, const plan::Pl
     const std::vector<State>& frames_shown = plan.trajectory.frames;
     way_m_.resize(2 * std::max<Eigen::Index>(0, Eigen::Index(frames_shown.size()) - 1), 3);
     for (Eigen::Index row = 0; row < way_m_.rows(); ++row)
-      way_m_.row(row) =
-          fem::center_of_mass_m(world, frames_shown[std::size_t((row + 1) / 2)], world.robot).transpose();
+      way_m_.row(row) = robot_place_m(scene, world, frames_shown[std::size_t((row + 1) / 2)]).transpose();
   }
   if (scene.film.tree) find_tree();
   for (std::size_t b = 0; b < bodies.size(); ++b) {

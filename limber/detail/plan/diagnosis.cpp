@@ -52,8 +52,9 @@ Diagnosis diagnose(const fem::World& world, const FemSystem& system, const plan:
   if (2 * statistics.rejected > statistics.iterations)
     d.text +=
         " Most pushes led to states that are refused: a tet is inverted, a body's volume has changed by more "
-        "than its max_volume_change, or the goal is lost; try a larger max_volume_change or a smaller "
-        "max_force_n.";
+        "than its max_volume_change, one is pressed by more than its max_contact_load_n, or the goal is "
+        "lost; "
+        "try larger limits or a smaller max_force_n.";
 
   const plan::Workspace space = system.workspace();
   const State from = plan.tree.states[std::size_t(plan.legs.back().root)];

@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "fem/observe.h"
+#include "limber/detail/world/goal_terms.h"
 
 namespace limber::detail {
 
@@ -85,8 +86,7 @@ void draw(const View& view, const scenes::Scene& scene, const fem::World& world,
       nodes);
   std::string path;
   for (const State& frame : plan.trajectory.frames)
-    path += fmt::format("{}{}", path.empty() ? "M" : "L",
-                        view.at(fem::center_of_mass_m(world, frame, world.robot)));
+    path += fmt::format("{}{}", path.empty() ? "M" : "L", view.at(robot_place_m(scene, world, frame)));
   svg += fmt::format(
       "<path class=\"path\" d=\"{}\" fill=\"none\" stroke=\"#d22\" stroke-width=\"2.5\" "
       "stroke-linejoin=\"round\"/>\n",

@@ -164,6 +164,12 @@ void plots(const Findings& f, Page& page) {
   plot("Energy of all bodies", "energy (J)", {elastic, kinetic});
   plot("Contact", "sum of forces on a body (N)",
        curves_of([](const BodyFigures& b) { return b.contact_force_n; }, false));
+  std::vector<double> limits_n;
+  for (const fem::Body& body : f.world.bodies)
+    if (std::isfinite(body.max_contact_load_n)) limits_n.push_back(body.max_contact_load_n);
+  if (!limits_n.empty())
+    plot("What presses a body", "sum of magnitudes (N)",
+         curves_of([](const BodyFigures& b) { return b.contact_load_n; }, false), limits_n);
   if (const auto pairs = curves_of_pairs(f); !pairs.empty())
     plot("Contact, pair by pair", "sum of forces of a pair (N)", pairs);
   plot("Largest strain of a tet", "Green's strain",

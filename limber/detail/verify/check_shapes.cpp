@@ -73,6 +73,19 @@ void check_stretch(const MotionFigures& figures, const fem::World& world, Promis
   }
 }
 
+// Of each body that promises it, at every frame: what presses it, as a search measures it.
+void check_contact_loads(const MotionFigures& figures, const fem::World& world, Promises& table) {
+  for (std::size_t b = 0; b < world.bodies.size(); ++b) {
+    const double most = world.bodies[b].max_contact_load_n;
+    if (!std::isfinite(most)) continue;
+    double largest = 0;
+    for (const FrameFigures& frame : figures.frames)
+      largest = std::max(largest, frame.bodies[b].contact_load_n);
+    table.row(fmt::format("{}: is pressed by at most {:g} N", world.bodies[b].name, most), largest <= most,
+              fmt::format("{:.3g} N", largest));
+  }
+}
+
 }  // namespace
 
 // Volumes are |V − V₀|/V₀ of whole bodies. Where contact is on surfaces, how deep cages are in one another
@@ -93,6 +106,7 @@ void check_shapes(const MotionFigures& figures, const fem::World& world, Promise
         fmt::format("{:.4f} m, {:.2f} % ({})", figures.deepest_penetration_m,
                     100 * figures.deepest_penetration_m / figures.robot_size_m, figures.penetration_between));
   check_stretch(figures, world, table);
+  check_contact_loads(figures, world, table);
   check_seen(figures, world.touches_on_surfaces(), table);
 }
 

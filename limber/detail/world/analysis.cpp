@@ -26,7 +26,9 @@ FrameFigures measure_frame(const fem::World& world, const State& state) {
   frame.time_s = fem::time_s(world, state);
   std::vector<Vec3> contact(world.bodies.size(), Vec3::Zero());
   frame.contact_between = between(world, -1, -1);
-  for (const fem::PairForce& pair : fem::pair_forces(fem::contact_forces(world, state))) {
+  const std::vector<fem::ContactForce> forces = fem::contact_forces(world, state);
+  const std::vector<double> loads = fem::contact_loads_n(world, forces);
+  for (const fem::PairForce& pair : fem::pair_forces(forces)) {
     contact[std::size_t(pair.body)] += pair.force_n;
     if (pair.other >= 0) contact[std::size_t(pair.other)] -= pair.force_n;
     frame.pair_force_n[{pair.body, pair.other}] = pair.force_n.norm();
@@ -37,6 +39,7 @@ FrameFigures measure_frame(const fem::World& world, const State& state) {
   for (int b = 0; b < int(world.bodies.size()); ++b) {
     BodyFigures& body = frame.bodies.emplace_back();
     body.contact_force_n = contact[std::size_t(b)].norm();
+    body.contact_load_n = loads[std::size_t(b)];
     if (!world.bodies[std::size_t(b)].moving) continue;
     const fem::Strains strains = fem::strains(world, state, b);
     body.volume_change = fem::volume_m3(world, state, b) / world.bodies[std::size_t(b)].rest_volume_m3 - 1;
@@ -208,7 +211,7 @@ void write_observables(const fs::path& csv, const fem::World& world, const Motio
   std::string text = "time_s";
   for (const fem::Body& body : world.bodies)
     for (const char* what : {"volume_change", "largest_strain", "least_stretch", "largest_stretch",
-                             "elastic_energy_j", "kinetic_energy_j", "contact_force_n"})
+                             "elastic_energy_j", "kinetic_energy_j", "contact_force_n", "contact_load_n"})
       text += fmt::format(",{}.{}", body.name, what);
   text +=
       ",contact_force_n,contact_between,penetration_m,penetration_between,inverted_tets,overlap_m,overlap_"
@@ -221,8 +224,9 @@ void write_observables(const fs::path& csv, const fem::World& world, const Motio
   for (const FrameFigures& frame : figures.frames) {
     text += fmt::format("{}", frame.time_s);
     for (const BodyFigures& b : frame.bodies)
-      text += fmt::format(",{},{},{},{},{},{},{}", b.volume_change, b.largest_strain, b.min_stretch,
-                          b.largest_stretch, b.elastic_energy_j, b.kinetic_energy_j, b.contact_force_n);
+      text += fmt::format(",{},{},{},{},{},{},{},{}", b.volume_change, b.largest_strain, b.min_stretch,
+                          b.largest_stretch, b.elastic_energy_j, b.kinetic_energy_j, b.contact_force_n,
+                          b.contact_load_n);
     text += fmt::format(",{},{},{},{},{}", frame.contact_force_n, frame.contact_between,
                         frame.penetration.depth_m, frame.penetration_between, frame.inverted_tets);
     const SeenFrame& seen = frame.seen;

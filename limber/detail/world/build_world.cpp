@@ -184,6 +184,24 @@ void set_contact(const scenes::Scene& scene, const std::vector<PreparedBody>& pr
 
 }  // namespace
 
+namespace {
+
+void require_patches(const scenes::Scene& scene, const PreparedBody& robot) {
+  const std::vector<int> held =
+      scenes::fixed_nodes(scene.bodies[std::size_t(scene.robot)], scene.bounds_m, robot.cage.positions);
+  for (std::size_t i = 0; i < scene.planner.patches_m.size(); ++i) {
+    const std::vector<int> nodes =
+        scenes::nodes_in(scene.planner.patches_m[i], scene.bounds_m, robot.cage.positions);
+    if (std::includes(held.begin(), held.end(), nodes.begin(), nodes.end()))  // none are, too
+      throw InputError(
+          fmt::format("{}: planner.patches_m[{}] holds no node of the robot's cage that can be pushed; "
+                      "enlarge or move it",
+                      scene.planner.patches_where, i));
+  }
+}
+
+}  // namespace
+
 GoalRules goal_rules_of(const scenes::Scene& scene) {
   const auto rules_of = [](const scenes::Goal& goal) {
     GoalRules rules;
@@ -196,6 +214,7 @@ GoalRules goal_rules_of(const scenes::Scene& scene) {
   };
   GoalRules rules = rules_of(scene.goal);
   for (const scenes::Via& via : scene.via) rules.via.push_back(rules_of(via.goal));
+  rules.patches_m = scene.planner.patches_m, rules.lead = scene.planner.lead;
   return rules;
 }
 
@@ -240,6 +259,7 @@ fem::World build_world(const scenes::Scene& scene, const std::vector<PreparedBod
     fem_body.velocity_m_s = body.velocity_m_s, fem_body.angular_velocity_rad_s = body.angular_velocity_rad_s;
     fem_body.gravity_m_s2 = body.gravity_m_s2;
     fem_body.max_volume_change = body.max_volume_change;
+    if (body.max_contact_load_n) fem_body.max_contact_load_n = *body.max_contact_load_n;
     if (body.max_stretch && *body.max_stretch < scenes::any_stretch) fem_body.max_stretch = *body.max_stretch;
     set_parts(body, prepared[b], share, fem_body);
     if (const auto known = stiffness_shares.find(body.name); known != stiffness_shares.end())
@@ -247,6 +267,7 @@ fem::World build_world(const scenes::Scene& scene, const std::vector<PreparedBod
     spec.bodies.push_back(std::move(fem_body));
   }
   set_script(scene, prepared, spec);
+  require_patches(scene, prepared[std::size_t(scene.robot)]);
   set_contact(scene, prepared, spec);
   spec.robot = scene.robot;
   spec.bounds_m = scene.bounds_m;

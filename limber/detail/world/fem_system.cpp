@@ -4,12 +4,14 @@
 #include <array>
 #include <cmath>
 
+#include "core/error.h"
 #include "core/hash.h"
 #include "core/progress.h"
 #include "core/threads.h"
 #include "fem/batch.h"
 #include "fem/observe.h"
 #include "limber/detail/world/workspace.h"
+#include "scenes/models.h"
 
 namespace limber::detail {
 
@@ -63,6 +65,7 @@ std::uint64_t hash_of_world(const fem::World& world) {
       hasher.value(v);
     for (const auto* of_tets : {&body.youngs_modulus_from_tet_pa, &body.density_from_tet_kg_m3})
       for (const double v : *of_tets) hasher.value(v);
+    if (std::isfinite(body.max_contact_load_n)) hasher.text("contact load").value(body.max_contact_load_n);
     if (m.mass_damping_per_s != 0) hasher.text("mass damping").value(m.mass_damping_per_s);
     if (body.gravity_m_s2 != gravity_m_s2) hasher.text("gravity").matrix(body.gravity_m_s2);
     for (const bool fixed : body.fixed) hasher.value(int(fixed));
@@ -198,9 +201,13 @@ class FemSystem::Propagator final : public plan::Propagator {
     return rollout.control.steps - batch.steps_left(int(lane));
   }
 
-  plan::Observation look(const fem::Batch& batch, int lane, int steps) const {
+  plan::Observation look(const fem::Batch& batch, int lane, int steps) {
     const fem::Batch::Motion robot = batch.motion(lane, system_.world_.robot);
     plan::Observation look{steps, robot.center_m, robot.velocity_m_s};
+    if (!system_.lead_nodes_.empty()) {
+      batch.peek(lane, peeked_);
+      look.center = system_.robot_center(peeked_), look.velocity = system_.robot_velocity(peeked_);
+    }
     if (system_.goal_.body >= 0)
       look.goal_shift = batch.motion(lane, system_.goal_.body).center_m - system_.goal_body_start_m_;
     if (const GoalRules& last = system_.last_->goal_; last.lost_below_m)
@@ -223,6 +230,9 @@ FemSystem::FemSystem(const fem::World& world, const GoalRules& goal, std::option
       given_start_(std::move(start)),
       goal_(goal),
       goal_body_start_m_(Vec3::Zero()),
+      limits_contact_(
+          std::any_of(world.bodies.begin(), world.bodies.end(),
+                      [](const fem::Body& body) { return std::isfinite(body.max_contact_load_n); })),
       hash_(hash_of_world) {
   if (goal.body >= 0) goal_body_start_m_ = fem::center_of_mass_m(world, fem::start_state(world), goal.body);
   Hasher hasher;
@@ -230,7 +240,10 @@ FemSystem::FemSystem(const fem::World& world, const GoalRules& goal, std::option
   for (const int body : {goal.body, goal.above, goal.below, goal.clear_of}) hasher.value(body);
   for (const auto& rule : {goal.lost_below_m, goal.turn_tolerance_deg, goal.shape_tolerance_m})
     hasher.value(int(rule.has_value())).value(rule.value_or(0));
-  for (const GoalRules& rules : goal.via) {
+  if (!goal.patches_m.empty()) find_patches(), hasher.text("patches").value(int(goal.lead));
+  for (const Box& patch : goal.patches_m) hasher.matrix(patch.lower).matrix(patch.upper);
+  for (GoalRules rules : goal.via) {
+    rules.patches_m = goal.patches_m, rules.lead = goal.lead;
     via_.push_back(std::unique_ptr<FemSystem>(new FemSystem(world, rules, given_start_, hash_of_world)));
     via_.back()->last_ = this;
     hasher.value(via_.back()->hash());
@@ -248,10 +261,41 @@ FemSystem::FemSystem(const fem::World& world, const std::vector<PreparedBody>& b
 }
 
 State FemSystem::start() const { return given_start_ ? *given_start_ : fem::start_state(world_); }
+void FemSystem::find_patches() {
+  const fem::Body& robot = world_.bodies[std::size_t(world_.robot)];
+  const auto free_in = [&](const Box& patch) {
+    std::vector<int> nodes = scenes::nodes_in(patch, world_.bounds_m, robot.cage.positions);
+    std::erase_if(nodes, [&](int n) { return robot.fixed[std::size_t(n)]; });
+    LIMBER_CHECK(!nodes.empty(), robot.name);  // build_world has looked
+    return nodes;
+  };
+  for (const Box& patch : goal_.patches_m) {
+    const auto to_middle = [&](int n) {
+      return (robot.cage.positions.row(n).transpose() - patch.center()).squaredNorm();
+    };
+    const std::vector<int> nodes = free_in(patch);
+    patch_nodes_.push_back(*std::min_element(nodes.begin(), nodes.end(),
+                                             [&](int a, int b) { return to_middle(a) < to_middle(b); }));
+  }
+  if (!goal_.lead) return;
+  lead_nodes_ = free_in(goal_.patches_m[0]);
+  for (const int n : lead_nodes_) lead_mass_kg_ += robot.node_mass_kg[std::size_t(n)];
+}
+// Of the nodes that lead, the mean of what the state has of each, by their masses.
+Vec3 FemSystem::mean_of_lead(const std::vector<float>& of_nodes) const {
+  const fem::Body& robot = world_.bodies[std::size_t(world_.robot)];
+  Vec3 sum = Vec3::Zero();
+  for (const int n : lead_nodes_)
+    sum += robot.node_mass_kg[std::size_t(n)] *
+           Eigen::Map<const Vec3f>(&of_nodes[3 * std::size_t(robot.first_node + n)]).cast<double>();
+  return sum / lead_mass_kg_;
+}
 Vec3 FemSystem::robot_center(const State& state) const {
+  if (!lead_nodes_.empty()) return mean_of_lead(state.positions);
   return fem::center_of_mass_m(world_, state, world_.robot);
 }
 Vec3 FemSystem::robot_velocity(const State& state) const {
+  if (!lead_nodes_.empty()) return mean_of_lead(state.velocities);
   return fem::center_velocity_m_s(world_, state, world_.robot);
 }
 double FemSystem::robot_mass_kg() const { return world_.bodies[std::size_t(world_.robot)].mass_kg; }
@@ -259,6 +303,9 @@ double FemSystem::mean_speed(const State& state) const {
   return fem::mean_speed_m_s(world_, state, world_.robot);
 }
 int FemSystem::robot_nodes() const { return world_.bodies[std::size_t(world_.robot)].node_count(); }
+int FemSystem::control_node(int drawn) const {
+  return patch_nodes_.empty() ? drawn : patch_nodes_[std::size_t(drawn) % patch_nodes_.size()];
+}
 Box FemSystem::sample_bounds() const { return world_.bounds_m; }
 double FemSystem::dt_s() const { return world_.dt_s; }
 std::uint64_t FemSystem::hash() const { return hash_; }
@@ -268,7 +315,22 @@ bool FemSystem::acceptable(const State& state) const {
     for (int n = body.first_node; body.moving && n < body.first_node + body.node_count(); ++n)
       if (double(state.positions[std::size_t(3 * n + 2)]) < *last.lost_below_m) return false;
   }
-  return fem::is_sound(world_, state);
+  return fem::is_sound(world_, state) && bears_contact(state);
+}
+// Probes are dear to make and belong to one thread at a time, so they are lent.
+bool FemSystem::bears_contact(const State& state) const {
+  const FemSystem& owner = *last_;
+  if (!owner.limits_contact_) return true;
+  std::unique_ptr<fem::ContactProbe> probe;
+  {
+    const std::lock_guard lock(owner.mutex_);
+    if (!owner.probes_.empty()) probe = std::move(owner.probes_.back()), owner.probes_.pop_back();
+  }
+  if (!probe) probe = std::make_unique<fem::ContactProbe>(world_);
+  const bool bears = fem::within_contact_loads(world_, probe->forces(state));
+  const std::lock_guard lock(owner.mutex_);
+  owner.probes_.push_back(std::move(probe));
+  return bears;
 }
 std::size_t FemSystem::first_refused(std::span<const State> frames) const {
   if (!surfaces_ || !world_.touches_on_surfaces()) return frames.size();

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "fem/cost.h"
+#include "fem/observe.h"
 #include "fem/world.h"
 #include "limber/detail/world/seen.h"
 #include "plan/system.h"
@@ -21,7 +22,12 @@ struct GoalRules {
   std::optional<double> shape_tolerance_m;   // no node is farther from its place in that shape
   int above = -1, below = -1;                // the whole robot is higher, lower than all of this body
   int clear_of = -1;                         // no contact with this body pushes the robot
-  std::vector<GoalRules> via;                // of the goals before it, likewise; lost_below_m is of the last
+  // Where control points are, in world coordinates at the start; empty: at any node. With `lead` the free
+  // nodes in the first are where the robot is taken to be, not its centre of mass. Those of all goals are the
+  // last's.
+  std::vector<Box> patches_m = {};
+  bool lead = false;
+  std::vector<GoalRules> via = {};  // of the goals before it, likewise; lost_below_m is of the last
 };
 
 class FemSystem final : public plan::System {
@@ -41,10 +47,12 @@ class FemSystem final : public plan::System {
   double robot_mass_kg() const override;
   double mean_speed(const State&) const override;
   int robot_nodes() const override;
+  int control_node(int drawn) const override;
   Box sample_bounds() const override;
   double dt_s() const override;
   std::uint64_t hash() const override;
-  bool acceptable(const State&) const override;  // it is sound, and the goal is not lost
+  // It is sound, nothing is pressed by more than it may be, and the goal is not lost.
+  bool acceptable(const State&) const override;
   bool goal_holds(const State&) const override;
   const System& on_leg(int) const override;
   Vec3 goal_shift(const State&) const override;
@@ -64,13 +72,21 @@ class FemSystem final : public plan::System {
   std::optional<State> given_start_;
   GoalRules goal_;
   std::vector<std::unique_ptr<FemSystem>> via_;
+  std::vector<int> patch_nodes_;  // of the robot: of each patch's, the nearest to its middle
+  std::vector<int> lead_nodes_;   // of the robot; empty: no patch leads
+  double lead_mass_kg_ = 0;
   const FemSystem* last_ = this;  // on the leg to the last goal: what is lost to it is lost
+  void find_patches();
+  Vec3 mean_of_lead(const std::vector<float>& of_nodes) const;
+  bool bears_contact(const State&) const;  // nothing is pressed by more than its max_contact_load_n
   Vec3 goal_body_start_m_;
+  bool limits_contact_;  // some body has such a limit
   std::uint64_t hash_;
   std::shared_ptr<const Surfaces> surfaces_;
   double surface_size_m_ = 0;  // of the robot's
   mutable std::mutex mutex_;
   mutable fem::Cost cost_;
+  mutable std::vector<std::unique_ptr<fem::ContactProbe>> probes_;  // that no thread uses now
 };
 
 }  // namespace limber::detail

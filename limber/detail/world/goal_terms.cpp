@@ -3,27 +3,44 @@
 #include <fmt/format.h>
 
 #include "fem/observe.h"
+#include "scenes/models.h"
 
 namespace limber::detail {
 
+Vec3 robot_place_m(const scenes::Scene& scene, const fem::World& world, const State& state) {
+  if (!scene.planner.lead) return fem::center_of_mass_m(world, state, world.robot);
+  const fem::Body& robot = world.bodies[std::size_t(world.robot)];
+  const Points now = fem::body_positions(world, state, world.robot);
+  Vec3 sum = Vec3::Zero();
+  double mass = 0;
+  for (const int n : scenes::nodes_in(scene.planner.patches_m[0], scene.bounds_m, robot.cage.positions)) {
+    if (robot.fixed[std::size_t(n)]) continue;
+    sum += robot.node_mass_kg[std::size_t(n)] * now.row(n).transpose();
+    mass += robot.node_mass_kg[std::size_t(n)];
+  }
+  return sum / mass;
+}
+
 namespace {
 
-GoalTerm place_term(const scenes::Goal& goal, const fem::World& world, const State& state) {
+GoalTerm place_term(const scenes::Scene& scene, const scenes::Goal& goal, const fem::World& world,
+                    const State& state) {
   Vec3 shift = Vec3::Zero();
   if (goal.moves_with >= 0)
     shift = fem::center_of_mass_m(world, state, goal.moves_with) -
             fem::center_of_mass_m(world, fem::start_state(world), goal.moves_with);
-  const Vec3 center = fem::center_of_mass_m(world, state, world.robot) - shift, aim = goal.center_of_mass_m;
+  const Vec3 center = robot_place_m(scene, world, state) - shift, aim = goal.center_of_mass_m;
+  const std::string what = scene.planner.lead ? "the patch that leads" : "centre of mass";
   const std::string moved = goal.moves_with >= 0 ? ", moved along" : "";
   if (goal.box_m) {
     // How far outside, along the axis on which that is most.
     const double outside =
         std::max((goal.box_m->lower - center).maxCoeff(), (center - goal.box_m->upper).maxCoeff());
-    return {"centre of mass in its box" + moved, outside <= 0,
+    return {what + " in its box" + moved, outside <= 0,
             fmt::format("{:.3f} m {}", std::abs(outside), outside <= 0 ? "inside" : "outside")};
   }
   const double distance = (center - aim).norm();
-  return {fmt::format("centre of mass within {:g} m of ({:g} {:g} {:g}){}", goal.radius_m, aim.x(), aim.y(),
+  return {fmt::format("{} within {:g} m of ({:g} {:g} {:g}){}", what, goal.radius_m, aim.x(), aim.y(),
                       aim.z(), moved),
           distance <= goal.radius_m, fmt::format("{:.3f} m from it", distance)};
 }
@@ -40,7 +57,7 @@ GoalTerm over_term(const fem::World& world, const State& state, int higher, int 
 
 std::vector<GoalTerm> terms_of(const scenes::Scene& scene, const scenes::Goal& goal, const fem::World& world,
                                const State& state) {
-  std::vector<GoalTerm> terms{place_term(goal, world, state)};
+  std::vector<GoalTerm> terms{place_term(scene, goal, world, state)};
   const auto name = [&](int body) { return scene.bodies[std::size_t(body)].name; };
   if (goal.above >= 0)
     terms.push_back(

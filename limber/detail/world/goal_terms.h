@@ -16,7 +16,10 @@ struct GoalTerm {
   std::string found;
 };
 
-// The place of the centre of mass (moved along with goal.moves_with since the start), and then turn, shape,
+// Where the robot is taken to be: its centre of mass, or that of its first patch where that leads.
+Vec3 robot_place_m(const scenes::Scene&, const fem::World&, const State&);
+
+// The place of the robot (moved along with goal.moves_with since the start), and then turn, shape,
 // above, below and clear_of, as far as the goal asks for them. Speed is not looked at.
 std::vector<GoalTerm> terms_of(const scenes::Scene&, const scenes::Goal&, const fem::World&, const State&);
 
