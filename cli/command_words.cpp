@@ -105,7 +105,7 @@ _limber() {{
   _limber_values "$command ${{COMP_WORDS[COMP_CWORD-1]}}"
   if ((!value)); then
     _limber_words "$command"
-    if [[ "$current" != -* && "$command" != limber && "$command" != 'limber scene' ]]; then words=''; fi
+    if [[ "$current" != -* && "$command" != limber && "$command" != 'limber scene' && "$command" != 'limber farm' ]]; then words=''; fi
   fi
   COMPREPLY=($(compgen -W "$words" -- "$current"))
 }}

@@ -11,6 +11,8 @@
 #include "limber/detail/bench/bench.h"
 #include "limber/detail/exit_codes.h"
 #include "limber/detail/exports/export_motion.h"
+#include "limber/detail/farm/farm_folder.h"
+#include "limber/detail/farm/work.h"
 #include "limber/detail/film/render.h"
 #include "limber/detail/film/start.h"
 #include "limber/detail/plan/plan.h"
@@ -47,6 +49,12 @@ Outcome verify(const detail::VerifyOptions&);
 Outcome robust(const detail::RobustOptions&);
 Outcome report(const fs::path& folder, const std::optional<fs::path>& file = {});
 Outcome bench(const detail::BenchOptions&);
+
+// Of engine "local" the exit code is that of what ran, else 0.
+Outcome farm_submit(const detail::FarmOptions&);
+Outcome farm_status(const fs::path& folder);
+Outcome farm_cancel(const fs::path& folder);
+Outcome farm_work(const detail::WorkOptions&);
 
 Outcome new_scene(const detail::NewSceneOptions&);
 // Exit code 2, with all that is wrong, where it cannot even be simulated.

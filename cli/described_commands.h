@@ -23,6 +23,7 @@ struct DescribedCommands {
   void add_all() {
     add_prepare_command();
     add_motion_commands();
+    add_farm_commands();
     add_result_commands();
     add_scene_commands();
     add_word_commands();
@@ -35,6 +36,7 @@ struct DescribedCommands {
  private:
   void add_prepare_command();  // prepare. cli/prepare_command.cpp
   void add_motion_commands();  // plan, simulate, render, export, run, bench. cli/motion_commands.cpp
+  void add_farm_commands();    // farm submit, status, cancel, work. cli/farm_commands.cpp
   void add_result_commands();  // verify, report, robust, refine, info. cli/result_commands.cpp
   void add_scene_commands();   // scene new, prepare, check; scenes. cli/scene_commands.cpp
   void add_word_commands();    // completion, man. cli/word_commands.cpp
@@ -50,7 +52,10 @@ struct DescribedCommands {
   detail::StillOptions still_options;
   detail::ExportOptions export_options;
   detail::BenchOptions bench_options;
-  fs::path folder;  // report and info
+  detail::FarmOptions farm_options;
+  detail::WorkOptions work_options;
+  std::string farm_until = "report";  // submit and work
+  fs::path folder;                    // report, info, farm status and cancel
   detail::VerifyOptions verify_options;
   std::optional<fs::path> page;
   detail::RobustOptions robust_options;

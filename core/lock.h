@@ -10,9 +10,10 @@ namespace limber {
 class FolderLock {
  public:
   enum Kind { alone, shared };  // shared: with others that share
-  // Throws InputError, and does not wait, while another holds what does not go with this. The folder is
-  // there.
-  FolderLock(const fs::path& folder, Kind);
+  enum Patience { at_once, waits };
+  // Throws InputError, or waits where it has the patience, while another holds what does not go with this.
+  // The folder is there. Throws Interrupted while it waits.
+  FolderLock(const fs::path& folder, Kind, Patience = at_once);
   ~FolderLock();
   FolderLock(const FolderLock&) = delete;
   FolderLock& operator=(const FolderLock&) = delete;

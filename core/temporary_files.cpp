@@ -14,8 +14,6 @@
 
 namespace limber {
 
-namespace {
-
 const std::string& place_of_processes() {
   static const std::string place = [] {
     char host[256] = "";
@@ -30,8 +28,6 @@ const std::string& place_of_processes() {
   }();
   return place;
 }
-
-}  // namespace
 
 fs::path temporary_name(const fs::path& final_path) {
   static std::atomic<unsigned> counter{0};

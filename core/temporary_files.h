@@ -1,13 +1,18 @@
 // The names that files have while they are written, and what becomes of those that killed processes leave.
 #pragma once
 
+#include <string>
+
 #include "core/file.h"
 
 namespace limber {
 
+// Where the number of a process means something: this machine since it was started, and the same container. 8
+// digits.
+const std::string& place_of_processes();
+
 // In the same folder, with the same extension, and another one each time:
-// .STEM.PLACE.PROCESS.COUNT.tmp.EXTENSION. PLACE stands for where the number of a process means something:
-// this machine since it was started, and the same container.
+// .STEM.PLACE.PROCESS.COUNT.tmp.EXTENSION, PLACE as above.
 fs::path temporary_name(const fs::path& final_path);
 
 // Removes the temporary files that killed processes left in the folder itself, and returns how many: those of

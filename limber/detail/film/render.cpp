@@ -5,6 +5,7 @@
 #include <mutex>
 #include <thread>
 
+#include "core/content_hash.h"
 #include "core/error.h"
 #include "core/events.h"
 #include "core/hash.h"
@@ -14,6 +15,7 @@
 #include "core/progress.h"
 #include "core/temporary_files.h"
 #include "core/threads.h"
+#include "core/version.h"
 #include "limber/detail/film/frame_list.h"
 #include "limber/detail/plan/manifest.h"
 #include "render/film.h"
@@ -22,11 +24,6 @@
 namespace limber::detail {
 
 namespace {
-
-struct Failure {
-  int frame;
-  std::string why;
-};
 
 // The frame's own file last: where it is good, its passes are there.
 void write(const Picture& picture, const FrameFiles& files, int frame, const std::string& hash) {
@@ -39,52 +36,6 @@ void write(const Picture& picture, const FrameFiles& files, int frame, const std
   };
   for (const auto& [pass, image] : picture.passes) put(pass, image);
   put("", picture.frame);
-}
-
-// Paints the frames on all threads. A frame that fails does not stop the others; a full disk does.
-std::vector<Failure> paint_all(const Shot& shot, const std::vector<int>& frames, const FrameFiles& files) {
-  std::vector<Failure> failures;
-  std::atomic<std::size_t> next{0}, done{0};
-  std::exception_ptr fatal;
-  std::mutex mutex;
-  Progress progress("render", std::int64_t(frames.size()));
-  Job* const job = current_job();
-  const auto work = [&] {
-    const WorkingFor working(job);
-    try {
-      Shot::Painter painter(shot);
-      while (stop_signal() == 0) {
-        const std::size_t i = next++;
-        if (i >= frames.size()) break;
-        const auto began = std::chrono::steady_clock::now();
-        Json event{{"event", "frame"}, {"frame", frames[i]}};
-        try {
-          event["hash"] = shot.hash_of(frames[i]);
-          write(painter.paint(frames[i]), files, frames[i], event["hash"]);
-        } catch (const InputError& error) {
-          event = {{"event", "frame_failed"}, {"frame", frames[i]}, {"error", error.what()}};
-          const std::lock_guard lock(mutex);
-          failures.push_back({frames[i], error.what()});
-        }
-        const std::lock_guard lock(mutex);
-        progress.update(std::int64_t(++done));
-        event["seconds"] = std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count();
-        event["done"] = done.load(), event["total"] = frames.size();
-        events::tell(event);
-      }
-    } catch (...) {
-      const std::lock_guard lock(mutex);
-      fatal = std::current_exception();
-      next = frames.size();
-    }
-  };
-  std::vector<std::jthread> workers;
-  const int count = std::min(thread_count(), int(frames.size()));
-  for (int t = 1; t < count; ++t) workers.emplace_back(work);
-  work();
-  workers.clear();
-  if (fatal) std::rethrow_exception(fatal);
-  return failures;
 }
 
 // The plan's scene, filmed otherwise. What would change the motion is refused.
@@ -151,6 +102,18 @@ std::vector<fs::path> Filming::paths() const {
   return paths;
 }
 
+fs::path Filming::video(const RenderOptions& options) const {
+  return options.video.value_or(options.folder / ("film" + suffix + ".mp4"));
+}
+
+std::string Filming::film_hash(const fs::path& video) const {
+  const scenes::FilmSpec& film = planned.scene.film;
+  std::string shown = fmt::format("{} {} {} {} {}", version, film.frames_per_second, film.sheet_columns,
+                                  film.sheet_rows, video.extension().string());
+  for (int f = 0; f < shot->frames(); ++f) shown += " " + shot->hash_of(f);
+  return content_hash(shown);
+}
+
 render::Image8 Filming::sheet() const {
   const scenes::FilmSpec& film = planned.scene.film;
   std::vector<fs::path> shown;
@@ -178,6 +141,79 @@ RenderedFilm Filming::told(const RenderOptions& options) const {
           .sheet = {}};
 }
 
+std::vector<FailedFrame> paint_frames(const Filming& filming, const std::vector<int>& frames,
+                                      Shot::Painter* of_this_thread) {
+  const Shot& shot = *filming.shot;
+  const FrameFiles& files = filming.files;
+  std::vector<FailedFrame> failures;
+  std::atomic<std::size_t> next{0}, done{0};
+  std::exception_ptr fatal;
+  std::mutex mutex;
+  Progress progress("render", std::int64_t(frames.size()));
+  Job* const job = current_job();
+  const auto work = [&](Shot::Painter* given) {
+    const WorkingFor working(job);
+    try {
+      std::optional<Shot::Painter> made;
+      Shot::Painter& painter = given ? *given : made.emplace(shot);
+      while (stop_signal() == 0) {
+        const std::size_t i = next++;
+        if (i >= frames.size()) break;
+        const auto began = std::chrono::steady_clock::now();
+        Json event{{"event", "frame"}, {"frame", frames[i]}};
+        try {
+          event["hash"] = shot.hash_of(frames[i]);
+          write(painter.paint(frames[i]), files, frames[i], event["hash"]);
+        } catch (const InputError& error) {
+          event = {{"event", "frame_failed"}, {"frame", frames[i]}, {"error", error.what()}};
+          const std::lock_guard lock(mutex);
+          failures.push_back({frames[i], error.what()});
+        }
+        const std::lock_guard lock(mutex);
+        progress.update(std::int64_t(++done));
+        event["seconds"] = std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count();
+        event["done"] = done.load(), event["total"] = frames.size();
+        events::tell(event);
+      }
+    } catch (...) {
+      const std::lock_guard lock(mutex);
+      fatal = std::current_exception();
+      next = frames.size();
+    }
+  };
+  std::vector<std::jthread> workers;
+  const int count = std::min(thread_count(), int(frames.size()));
+  for (int t = 1; t < count; ++t) workers.emplace_back(work, nullptr);
+  work(of_this_thread);
+  workers.clear();
+  if (fatal) std::rethrow_exception(fatal);
+  return failures;
+}
+
+namespace {
+
+constexpr const char* hash_of_film = "limber-film-hash";  // in the contact sheet, which is written last
+
+// The film and its sheet are as they were made from just these frames.
+bool film_is_there(const Filming& filming, const fs::path& video, const fs::path& sheet) {
+  const auto info = render::inspect_png(sheet);
+  if (!info || !info->texts.contains("limber-hash") || !info->texts.contains(hash_of_film) ||
+      !fs::is_regular_file(video))
+    return false;
+  return info->texts.at("limber-hash") == filming.film_hash(video) &&
+         info->texts.at(hash_of_film) == content_hash(read_file(video));
+}
+
+void make_film_and_sheet(const Filming& filming, const fs::path& video, const fs::path& sheet) {
+  render::make_film(filming.paths(), filming.planned.scene.film.frames_per_second, video);
+  render::write_png(
+      sheet, filming.sheet(),
+      {{"limber-hash", filming.film_hash(video)}, {hash_of_film, content_hash(read_file(video))}});
+  events::tell({{"event", "film"}, {"file", video.string()}});
+}
+
+}  // namespace
+
 RenderedFilm render(const RenderOptions& options) {
   const Filming filming(options);
   const std::string& suffix = filming.suffix;
@@ -199,7 +235,7 @@ RenderedFilm render(const RenderOptions& options) {
 
   std::vector<int> missing = wanted;
   if (options.resume) std::erase_if(missing, is_good);
-  const fs::path video = options.video.value_or(options.folder / ("film" + suffix + ".mp4"));
+  const fs::path video = filming.video(options);
   const auto comes_or_is_there = [&](int frame) {
     return std::binary_search(wanted.begin(), wanted.end(), frame) || is_good(frame);
   };
@@ -208,22 +244,22 @@ RenderedFilm render(const RenderOptions& options) {
   if (will_be_complete || options.video) render::require_film_possible(film.frames_per_second, video);
   events::tell({{"event", "frames"}, {"wanted", wanted.size()}, {"kept", wanted.size() - missing.size()}});
   const double cpu_before = cpu_seconds();
-  const std::vector<Failure> failures = paint_all(shot, missing, files);
+  const std::vector<FailedFrame> failures = paint_frames(filming, missing);
   const double cpu_s = cpu_seconds() - cpu_before;
   throw_if_stopped();
-  for (const Failure& failure : failures) log::warn("frame {}: {}", failure.frame, failure.why);
+  for (const FailedFrame& failure : failures) log::warn("frame {}: {}", failure.frame, failure.why);
 
   RenderedFilm result = filming.told(options);
   result.wanted = wanted.size();
   result.painted = missing.size() - failures.size(), result.failed = failures.size();
   result.cpu_s = cpu_s;
+  // Several that share the folder may come here at once.
+  const FolderLock makes_film(files.folder, FolderLock::alone, FolderLock::waits);
   bool complete = true;
   for (int f = 0; f < frame_count && complete; ++f) complete = is_good(f);
   if (complete) {
     const fs::path sheet = options.folder / ("sheet" + suffix + ".png");
-    render::write_png(sheet, filming.sheet());
-    render::make_film(filming.paths(), film.frames_per_second, video);
-    events::tell({{"event", "film"}, {"file", video.string()}});
+    if (!options.resume || !film_is_there(filming, video, sheet)) make_film_and_sheet(filming, video, sheet);
     // Frames of an earlier, longer motion would only confuse.
     for (int f = frame_count; fs::remove(files.of(f)); ++f) {
     }

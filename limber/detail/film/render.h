@@ -51,8 +51,10 @@ struct Filming {
   Filming& operator=(const Filming&) = delete;
   bool is_good(int frame) const;        // its files are there, and say the hash of what they should show
   std::vector<fs::path> paths() const;  // of all frames
-  render::Image8 sheet() const;         // of frames that are there
-  RenderedFilm told(const RenderOptions&) const;  // but for what was painted, and written
+  fs::path video(const RenderOptions&) const;
+  std::string film_hash(const fs::path& video) const;  // of what the film shows, when each frame is good
+  render::Image8 sheet() const;                        // of frames that are there
+  RenderedFilm told(const RenderOptions&) const;       // but for what was painted, and written
 
   std::string suffix;  // of its names in the folder
   FrameFiles files;
@@ -64,8 +66,18 @@ struct Filming {
   std::optional<Shot> shot;
 };
 
-// A frame that fails does not stop the others. Throws InputError, DiskError, and Interrupted with the frames
-// that are finished kept.
+// Paints these frames on all threads, this one's with `painter`, which costs to be made (nullptr: makes one).
+// Returns what failed, which does not stop the others. Throws DiskError.
+struct FailedFrame {
+  int frame;
+  std::string why;
+};
+std::vector<FailedFrame> paint_frames(const Filming&, const std::vector<int>& frames,
+                                      Shot::Painter* painter = nullptr);
+
+// A frame that fails does not stop the others. A film that shows these frames already is kept with `resume`,
+// and where several that share the folder find all frames in place, one makes it. Throws InputError,
+// DiskError, and Interrupted with the frames that are finished kept.
 RenderedFilm render(const RenderOptions&);
 Json json_of(const RenderedFilm&);  // as manifest.json has it
 

@@ -217,25 +217,30 @@ KeptPlan plan(const PlanOptions& options) {
 Found find_plan(const scenes::Scene& scene, const FemSystem& system, const PlanOptions& options,
                 std::optional<plan::Plan> earlier, const Json& earlier_summary) {
   const plan::Settings settings = settings_of(scene, options);
-  const bool several = options.portfolio > 1;
-  Found found;
   std::optional<SearchLog> search_log;
   if (options.stats) search_log.emplace(*options.stats, earlier ? earlier->statistics.iterations : 0);
-  plan::PortfolioReport searches;
-  found.plan =
-      several ? plan::portfolio(system, settings, options.portfolio, &searches)
-              : plan::plan(system, settings, std::move(earlier), [&](const plan::SearchProgress& progress) {
-                  if (search_log) search_log->add(progress);
-                });
+  std::optional<plan::PortfolioReport> searches;
+  if (options.portfolio > 1) searches.emplace();
+  plan::Plan searched =
+      searches ? plan::portfolio(system, settings, options.portfolio, &*searches)
+               : plan::plan(system, settings, std::move(earlier), [&](const plan::SearchProgress& progress) {
+                   if (search_log) search_log->add(progress);
+                 });
   if (search_log) search_log->finish();
+  return make_better(scene, system, options, std::move(searched), searches, earlier_summary);
+}
 
+Found make_better(const scenes::Scene& scene, const FemSystem& system, const PlanOptions& options,
+                  plan::Plan searched, const std::optional<plan::PortfolioReport>& searches,
+                  const Json& earlier_summary) {
+  Found found{.plan = std::move(searched), .extra = {}, .how = {}};
   plan::Plan& plan = found.plan;
   const plan::ShortcutSettings shortcuts = shortcuts_of(scene, options, earlier_summary);
   for (const char* later : {"shortcut", "improve", "refine"})
     if (earlier_summary.contains(later)) found.extra[later] = earlier_summary.at(later);
-  if (several) {
-    found.extra["portfolio"] = plan::json_of(searches);
-    found.how.portfolio = std::move(searches);
+  if (searches) {
+    found.extra["portfolio"] = plan::json_of(*searches);
+    found.how.portfolio = searches;
   }
   if (plan.solved() && shortcuts.rounds > shortcuts.rounds_done) {
     found.how.shortcut = plan::shorten(system, plan, shortcuts);

@@ -47,6 +47,9 @@ struct Found {
 };
 Found find_plan(const scenes::Scene&, const FemSystem&, const PlanOptions&,
                 std::optional<plan::Plan> earlier = std::nullopt, const Json& earlier_summary = {});
+// The part that comes after the search, or after those of a portfolio.
+Found make_better(const scenes::Scene&, const FemSystem&, const PlanOptions&, plan::Plan searched,
+                  const std::optional<plan::PortfolioReport>&, const Json& earlier_summary = {});
 
 // A plan or a simulation in its work folder.
 struct KeptPlan {

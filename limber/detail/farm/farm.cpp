@@ -1,0 +1,235 @@
+#include "limber/detail/farm/farm.h"
+
+#include <fmt/ranges.h>
+
+#include <set>
+
+#include "core/content_hash.h"
+#include "core/error.h"
+#include "core/log.h"
+#include "core/threads.h"
+#include "limber/detail/exit_codes.h"
+#include "limber/detail/farm/lease.h"
+#include "limber/detail/farm/run_program.h"
+
+namespace limber::detail {
+
+namespace {
+
+constexpr const char* engine_lease = "engine";  // of who submits, and of the local engine while it runs
+
+std::string with(const fs::path& work, const char* what) {
+  return fmt::format("limber farm {} {}", what, work.string());
+}
+
+std::vector<std::string> jobs_of(const FarmFolder& farm) {
+  return farm.jobs().at("jobs").get<std::vector<std::string>>();
+}
+
+// Whether somebody is at work for what is in the folder already, of which is said who.
+std::string who_is_at_work(const fs::path& work) {
+  for (const auto& [unit, lease] : Leases::look_once(work / "farm" / "leases"))
+    if (unit != engine_lease && !lease.lost) return fmt::format("{} at {}", lease.owner, unit);
+  return "";
+}
+
+std::unique_ptr<Lease> begin_to_submit(const fs::path& work) {
+  const fs::path folder = work / "farm" / "leases";
+  make_folder(folder);
+  const auto held = Leases::look_once(folder);
+  const auto before = held.find(engine_lease);
+  Leases leases(folder);
+  std::unique_ptr<Lease> lease;
+  if (before == held.end() || before->second.lost)
+    lease = leases.take(engine_lease, before == held.end() ? nullptr : &before->second);
+  if (!lease)
+    throw InputError(fmt::format(
+        "{}: is being worked on by another limber farm submit{}; {} tells how far it is, {} ends it",
+        work.string(), before == held.end() ? "" : " (" + before->second.owner + ")", with(work, "status"),
+        with(work, "cancel")));
+  return lease;
+}
+
+std::vector<std::string> told_dry(const FarmFolder& farm) {
+  const FarmOptions& options = farm.spec().options;
+  std::vector<std::string> would{fmt::format("write {}", (farm.folder() / "farm.json").string())};
+  for (const Stage stage : farm.stages()) {
+    const std::size_t units = farm.units(stage).size();
+    would.push_back(stage == Stage::frames && units == 0
+                        ? fmt::format("{}: {}, known when there is a plan", name_of(stage),
+                                      options.chunks > 0 ? fmt::format("{} parts", options.chunks)
+                                                         : fmt::format("{} a unit", options.frames_per_task))
+                        : fmt::format("{}: {} unit{}", name_of(stage), units, units == 1 ? "" : "s"));
+  }
+  if (options.engine == "slurm") {
+    would.push_back(fmt::format("write {}", (farm.folder() / "worker.sh").string()));
+    for (const auto& words : slurm_commands(farm)) would.push_back(fmt::format("{}", fmt::join(words, " ")));
+  } else if (options.engine == "local") {
+    would.push_back(fmt::format("{} times limber farm work {} --wait --threads {}", options.workers,
+                                farm.work().string(), options.threads));
+  } else if (options.engine == "openjd") {
+    would.push_back(fmt::format("write {}", (farm.folder() / "template.yaml").string()));
+  }
+  return would;
+}
+
+FarmSpec spec_to_submit(FarmOptions options) {
+  if (options.engine.empty()) options.engine = slurm_is_there() ? "slurm" : "local";
+  if (options.engine == "slurm" && !slurm_is_there() && !options.dry_run)
+    throw InputError(
+        "--engine slurm: sbatch is not in PATH; submit on a machine of the cluster, or --engine "
+        "local");
+  if (!options.sbatch.empty() && options.engine != "slurm")
+    throw InputError(fmt::format("--sbatch is for Slurm, and the engine is {}", options.engine));
+  if (!options.plan.scene.scene.empty()) return spec_of(std::move(options));
+  // As before, but for who does it.
+  FarmSpec spec = FarmFolder(options.plan.out).spec();
+  options.plan = spec.options.plan, options.film = spec.options.film;
+  const bool another_engine = options.engine != spec.options.engine;
+  if (options.workers == 0 && !another_engine) options.workers = spec.options.workers;
+  if (options.sbatch.empty() && !another_engine) options.sbatch = spec.options.sbatch;
+  options.frames_per_task = spec.options.frames_per_task, options.chunks = spec.options.chunks;
+  return spec_of(std::move(options));
+}
+
+}  // namespace
+
+std::string name_of(FarmStatus::State state) {
+  constexpr const char* names[] = {"done", "at work", "failed", "cancelled", "stopped"};
+  return names[std::size_t(state)];
+}
+
+FarmStatus farm_status(const fs::path& work_folder) {
+  const FarmFolder farm(work_folder);
+  FarmStatus status;
+  status.engine = farm.spec().options.engine;
+  const auto held = Leases::look_once(farm.leases());
+  const auto engine = held.find(engine_lease);
+  status.local_engine_runs = engine != held.end() && !engine->second.lost;
+  const Json plan = farm.told_of(farm.plan_unit());
+  bool all_done = true;
+  for (const Stage stage : farm.stages()) {
+    FarmStatus::OfStage& of = status.stages.emplace_back(FarmStatus::OfStage{.stage = stage});
+    const std::vector<Unit> units = farm.units(stage);
+    of.known = !units.empty();
+    of.units = int(units.size());
+    all_done &= of.known;
+    for (const Unit& unit : units) {
+      const auto owner = held.find(unit.name);
+      if (owner != held.end() && !owner->second.lost) {
+        ++of.running, all_done = false;
+        status.running.push_back(fmt::format("{}: {}", unit.name, owner->second.owner));
+      } else if (farm.is_done(unit)) {
+        ++of.done;
+        const Json seconds = farm.told_of(unit).value("seconds", Json());
+        if (seconds.is_number()) of.seconds += seconds.get<double>();
+      } else if (const auto failure = farm.failure_of(unit)) {
+        ++of.failed, all_done = false;
+        if (status.failed.empty()) status.exit_code = failure->at("exit_code");
+        status.failed.push_back(fmt::format("{}: {}: {}", unit.name, failure->at("reason").get<std::string>(),
+                                            failure->at("message").get<std::string>()));
+      } else {
+        ++of.waiting, all_done = false;
+      }
+    }
+  }
+  if (plan.contains("solved")) status.solved = plan.at("solved") == true;
+  if (plan.contains("explanation") && plan.at("explanation").is_string())
+    status.explanation = plan.at("explanation");
+  for (const Unit& unit : farm.units(Stage::film))
+    if (farm.is_done(unit)) status.film = farm.work() / farm.told_of(unit).at("film").get<std::string>();
+  for (const Unit& unit : farm.units(Stage::report))
+    if (farm.is_done(unit)) status.report = farm.work() / "report.html";
+  if (slurm_is_there()) try {
+      status.tasks = slurm_tasks(jobs_of(farm));
+    } catch (const InputError& error) {
+      status.engine_fails = error.what();
+    }
+  const FarmSpec& spec = farm.spec();
+  if (spec.program != program_hash())
+    status.notes.push_back("it was submitted by another build of limber; submit it anew with this one");
+  try {
+    if (content_hash(read_file(spec.options.plan.scene.scene)) != spec.scene_hash)
+      status.notes.push_back(
+          fmt::format("{} was edited since; submit it anew", spec.options.plan.scene.scene));
+  } catch (const InputError& error) {
+    status.notes.push_back(error.what());
+  }
+  using enum FarmStatus::State;
+  const bool works = !status.running.empty() || !status.tasks.empty() || status.local_engine_runs;
+  status.state = all_done                 ? done
+                 : works                  ? at_work
+                 : farm.is_cancelled()    ? cancelled
+                 : !status.failed.empty() ? failing
+                                          : stopped;
+  return status;
+}
+
+Submitted submit(FarmOptions options) {
+  const FarmSpec spec = spec_to_submit(std::move(options));
+  const fs::path& work = spec.options.plan.out;
+  Submitted result{.engine = spec.options.engine, .would = {}, .jobs = {}, .file = {}, .status = {}};
+  if (spec.options.dry_run) {
+    result.would = told_dry(FarmFolder::imagined(spec));
+    return result;
+  }
+  make_folder(work);
+  std::unique_ptr<Lease> lease = begin_to_submit(work);
+  if (FarmFolder::is_there(work)) {
+    std::string before;
+    try {
+      before = FarmFolder(work).spec().key;
+    } catch (const InputError& error) {
+      log::warn("{}; it is made anew", error.what());
+    }
+    const FarmFolder jobs_before = FarmFolder::imagined(spec);
+    result.jobs = jobs_of(jobs_before);
+    // Where Slurm cannot be asked nothing is sent beside what may be there.
+    if (slurm_is_there()) result.was_at_work = !slurm_tasks(result.jobs).empty();
+    const std::string who = who_is_at_work(work);
+    if (before != spec.key && (result.was_at_work || !who.empty()))
+      throw InputError(
+          fmt::format("{}: is being worked on for something else{}; end that with {}, or name another folder",
+                      work.string(), who.empty() ? "" : " (" + who + ")", with(work, "cancel")));
+    if (result.was_at_work) {
+      result.status = farm_status(work);
+      return result;
+    }
+  }
+  const FarmFolder farm = FarmFolder::begin(spec);
+  result.jobs.clear();
+  farm.write_jobs({{"jobs", Json::array()}, {"rounds", 0}});
+  result.status = farm_status(work);
+  if (result.status.state == FarmStatus::done) {
+    result.was_done = true;
+    return result;
+  }
+  if (result.engine == "slurm") {
+    send_to_slurm(farm, 0);
+    result.jobs = jobs_of(farm);
+  } else if (result.engine == "openjd") {
+    result.file = farm.folder() / "template.yaml";
+    write_file(result.file, openjd_template(farm));
+  } else if (result.engine == "local") {
+    run_here(farm);
+  }
+  lease.reset();
+  result.status = farm_status(work);
+  return result;
+}
+
+Cancelled cancel_farm(const fs::path& work_folder) {
+  const FarmFolder farm(work_folder);
+  const FarmStatus status = farm_status(work_folder);
+  Cancelled result{.jobs = {}, .was_at_work = status.state == FarmStatus::at_work};
+  // First, so that nothing that ends by it is begun again.
+  farm.cancel();
+  if (!status.engine_fails.empty()) throw InputError(status.engine_fails);
+  std::set<std::string> live;
+  for (const SlurmTask& task : status.tasks) live.insert(task.job);
+  result.jobs.assign(live.begin(), live.end());
+  cancel_slurm(result.jobs);
+  return result;
+}
+
+}  // namespace limber::detail

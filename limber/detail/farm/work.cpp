@@ -1,0 +1,473 @@
+#include "limber/detail/farm/work.h"
+
+#include <unistd.h>
+
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <cmath>
+#include <mutex>
+#include <new>
+#include <set>
+
+#include "core/content_hash.h"
+#include "core/error.h"
+#include "core/events.h"
+#include "core/hash.h"
+#include "core/job.h"
+#include "core/lock.h"
+#include "core/log.h"
+#include "core/progress.h"
+#include "core/threads.h"
+#include "limber/detail/body/body_store.h"
+#include "limber/detail/exit_codes.h"
+#include "limber/detail/farm/engines.h"
+#include "limber/detail/farm/lease.h"
+#include "limber/detail/report/report.h"
+#include "limber/detail/world/scene_world.h"
+#include "plan/plan_file.h"
+#include "scenes/library.h"
+
+namespace limber::detail {
+
+namespace {
+
+constexpr int most_taken = 5;   // a unit whose owners were killed that often kills them
+constexpr int most_rounds = 3;  // in which missing frames are sent once more
+constexpr int between_turns_us = 100000;
+constexpr double between_saves_s = 300;  // of a search
+constexpr double between_questions_s = 0.5;
+
+using Clock = std::chrono::steady_clock;
+double elapsed_s(Clock::time_point then) {
+  return std::chrono::duration<double>(Clock::now() - then).count();
+}
+
+// Ends a search that cannot win any more, and, to be kept and gone on with, one that has run for long.
+class SearchWatcher final : public Watcher {
+ public:
+  SearchWatcher(const FarmFolder& farm, std::uint64_t seed) : farm_(farm), seed_(seed) {}
+  void at(std::int64_t iterations) { iterations_ = iterations; }
+  bool stop() override {
+    const std::unique_lock lock(mutex_, std::try_to_lock);
+    if (!lock || elapsed_s(asked_) < between_questions_s) return stop_;
+    asked_ = Clock::now();
+    const std::optional<Best> best = best_search(farm_);
+    stop_ = stop_ || signal() != 0 || (best && iterations_ >= best->most_of(seed_)) || farm_.is_cancelled() ||
+            elapsed_s(began_) > between_saves_s;
+    return stop_;
+  }
+  // Of the process: within the job that is watched, stop_signal() tells of the watcher.
+  static int signal() {
+    const WorkingFor nobody(nullptr);
+    return stop_signal();
+  }
+
+ private:
+  const FarmFolder& farm_;
+  const std::uint64_t seed_;
+  std::atomic<std::int64_t> iterations_{0};
+  std::atomic<bool> stop_{false};
+  std::mutex mutex_;
+  Clock::time_point began_ = Clock::now(), asked_ = began_;
+};
+
+class Worker {
+ public:
+  explicit Worker(const WorkOptions& options)
+      : options_(options), farm_(options.folder), leases_(farm_.leases()) {
+    const FarmSpec& spec = farm_.spec();
+    if (spec.program != program_hash())
+      throw InputError(fmt::format(
+          "{}: was submitted by another build of limber, whose results may have other bytes; submit it anew "
+          "with this one",
+          farm_.work().string()));
+    scene_ = read_scene(spec.options.plan);
+    if (content_hash(scene_.text) != spec.scene_hash)
+      throw InputError(fmt::format("{}: was edited after it was submitted in {}; submit it anew",
+                                   spec.options.plan.scene.scene, farm_.work().string()));
+  }
+
+  WorkDone run() {
+    while (true) {
+      throw_if_ended();
+      const Step step = next();
+      if (step == Step::did_one) continue;
+      if (step == Step::waits && options_.wait) {
+        ::usleep(between_turns_us);
+        continue;
+      }
+      result_.ending = step == Step::waits    ? WorkDone::others_at_work
+                       : step == Step::sent   ? WorkDone::sent_again
+                       : step == Step::failed ? WorkDone::some_failed
+                                              : WorkDone::all_done;
+      return result_;
+    }
+  }
+
+ private:
+  enum class Step { did_one, waits, failed, done, sent };
+
+  void throw_if_ended() const {
+    throw_if_stopped();
+    if (farm_.is_cancelled()) throw Interrupted(SIGTERM);
+  }
+
+  // Of the first stage that is not done takes a unit that nobody has.
+  Step next() {
+    for (const Stage stage : farm_.stages()) {
+      if (stage > options_.until) break;
+      std::vector<Unit> todo;
+      result_.failed.clear();
+      for (Unit& unit : farm_.units(stage)) {
+        if (known_done_.contains(unit.name)) continue;
+        if (const auto failure = farm_.failure_of(unit)) {
+          if (result_.failed.empty()) result_.exit_code = failure->at("exit_code");
+          result_.failed.push_back(fmt::format("{}: {}: {}", unit.name,
+                                               failure->at("reason").get<std::string>(),
+                                               failure->at("message").get<std::string>()));
+        } else {
+          todo.push_back(std::move(unit));
+        }
+      }
+      if (todo.empty() && result_.failed.empty()) continue;
+      if (todo.empty()) return Step::failed;
+      const Step step = do_one_of(stage, todo);
+      if (step != Step::done) return step;
+      if (!result_.failed.empty()) return Step::failed;
+    }
+    return Step::done;
+  }
+
+  // Done: all are.
+  Step do_one_of(Stage stage, const std::vector<Unit>& todo) {
+    const auto held = leases_.look();
+    bool others = false, left = false;
+    for (const Unit& unit : todo) {
+      const auto found = held.find(unit.name);
+      const Leases::Seen* const owner = found == held.end() ? nullptr : &found->second;
+      if (owner && !owner->lost) {
+        others = true;
+        continue;
+      }
+      if (farm_.is_done(unit)) {
+        known_done_.insert(unit.name);
+        continue;
+      }
+      if (owner && owner->taken >= most_taken) {
+        farm_.mark_failed(unit, "crash",
+                          fmt::format("{} processes that did it were killed or crashed; see {}", most_taken,
+                                      farm_.logs().string()),
+                          exit_defect);
+        return Step::did_one;
+      }
+      if (sends_again_ && stage <= Stage::frames) {
+        left = true;
+        continue;
+      }
+      const auto lease = leases_.take(unit.name, owner);
+      if (!lease) {
+        others = true;
+        continue;
+      }
+      if (!farm_.is_done(unit)) do_unit(unit, todo.size());
+      return Step::did_one;
+    }
+    if (others) return Step::waits;
+    return left ? send_again() : Step::done;
+  }
+
+  // Those who were to do it ended before it was done: all of them are sent once more, for one alone would be
+  // long at it.
+  Step send_again() {
+    const int rounds = farm_.jobs().at("rounds").get<int>();
+    if (rounds < most_rounds && slurm_is_there()) {
+      log::warn("some of it is missing; it is sent once more");
+      send_to_slurm(farm_, rounds + 1);
+      return Step::sent;
+    }
+    sends_again_ = false;
+    return Step::did_one;
+  }
+
+  void do_unit(const Unit& unit, std::size_t of_stage) {
+    const FarmOptions& options = farm_.spec().options;
+    // On one machine those that are few share what the others leave.
+    const int at_once = std::min(options.workers, int(of_stage));
+    const int threads = options_.threads > 0 ? options_.threads : options.threads;
+    set_thread_count(options.engine == "local" ? std::max(threads, options.workers * threads / at_once)
+                                               : threads);
+    const Clock::time_point began = Clock::now();
+    const double cpu_before = cpu_seconds();
+    const auto fail = [&](const char* reason, const std::string& message, int exit_code) {
+      log::warn("{}: {}", unit.name, message);
+      farm_.mark_failed(unit, reason, message, exit_code);
+    };
+    try {
+      Json told = result_of(unit);
+      if (told.is_null()) return;
+      told["seconds"] = std::round(1e3 * elapsed_s(began)) / 1e3;
+      told["cpu_s"] = std::round(1e3 * (cpu_seconds() - cpu_before)) / 1e3;
+      told["worker"] = this_worker();
+      farm_.mark_done(unit, told);
+      if (unit.stage == Stage::plan) known_done_.clear();  // there are other frames now
+      known_done_.insert(unit.name);
+      ++result_.units;
+      log::info("{}: {:.2f} s", unit.name, told.at("seconds").get<double>());
+    } catch (const FramesFailed& error) {
+      fail("frames", error.what(), exit_frames_failed);
+    } catch (const InputError& error) {
+      fail("refused", error.what(), exit_bad_input);
+    } catch (const std::bad_alloc&) {
+      fail("memory", not_enough_memory, exit_bad_input);
+    } catch (const InternalError& error) {
+      fail("defect", error.what(), exit_defect);
+    }
+  }
+
+  struct FramesFailed : std::runtime_error {
+    using std::runtime_error::runtime_error;
+  };
+
+  // What is told of it; null: something that it needs has gone, and is done again first.
+  Json result_of(const Unit& unit) {
+    switch (unit.stage) {
+      case Stage::bodies:
+        return do_body(unit);
+      case Stage::search:
+        return do_search(unit);
+      case Stage::plan:
+        return do_plan();
+      case Stage::frames:
+        return do_frames(unit);
+      case Stage::film:
+        return do_film();
+      case Stage::report:
+        return {{"all_kept", report(farm_.work()).all_kept}};
+    }
+    return {};
+  }
+
+  const PlanOptions& plan_options() const { return farm_.spec().options.plan; }
+  const RenderOptions& film_options() const { return farm_.spec().options.film; }
+
+  Json do_body(const Unit& unit) {
+    const SceneOptions& options = plan_options().scene;
+    if (unit.body.empty()) {
+      prepare_beside(scene_, options.data, farm_.work());
+      return Json::object();
+    }
+    std::optional<BodyStore> store;
+    if (!options.store.empty()) store.emplace(options.store);
+    for (const scenes::BodySpec& body : scene_.bodies)
+      if (body.name == unit.body)
+        prepare_body_of(scene_, body, options.data, farm_.work(), store ? &*store : nullptr);
+    return Json::object();
+  }
+
+  struct Setup {
+    std::vector<PreparedBody> bodies;
+    fem::World world;
+    FemSystem system;
+    Setup(const scenes::Scene& scene, const PlanOptions& options)
+        : bodies(prepare_bodies(scene, options.scene.data, options.out, options.scene.store)),
+          world(build_world(scene, bodies)),
+          system(world, bodies, goal_rules_of(scene)) {}
+  };
+  const Setup& setup() {
+    if (!setup_) setup_ = std::make_unique<Setup>(scene_, plan_options());
+    return *setup_;
+  }
+
+  // As `limber plan --seed` searches, but no farther than where another seed has won.
+  Json do_search(const Unit& unit) {
+    plan::Settings settings = settings_of(scene_, plan_options());
+    settings.seed = unit.seed;
+    const std::int64_t most = settings.max_iterations;
+    const fs::path file = farm_.search_file(unit);
+    std::error_code none;
+    const auto told = [&](const char* how, std::int64_t iterations, bool solved) {
+      return Json{{"ended", how}, {"iterations", iterations}, {"solved", solved}};
+    };
+    std::optional<plan::Plan> searched = search_to_go_on_with(unit, settings);
+    while (true) {
+      const std::optional<Best> best = best_search(farm_);
+      settings.max_iterations = best ? std::min(most, best->most_of(unit.seed)) : most;
+      const std::int64_t done = searched ? searched->statistics.iterations : 0;
+      if (settings.max_iterations < most && done >= settings.max_iterations) {
+        fs::remove(file, none);
+        return told("beaten", done, false);
+      }
+      {
+        SearchWatcher watcher(farm_, unit.seed);
+        Job job({.watcher = &watcher, .threads = thread_count()});
+        const WorkingFor working(&job);
+        searched = plan::plan(
+            setup().system, settings, std::move(searched),
+            [&](const plan::SearchProgress& progress) { watcher.at(progress.statistics.iterations); });
+      }
+      const bool at_end = searched->ending == plan::Ending::iterations && settings.max_iterations == most;
+      if (!searched->solved() && !at_end && best_search(farm_)) {
+        const std::optional<Best> now = best_search(farm_);
+        if (searched->statistics.iterations >= now->most_of(unit.seed)) continue;  // beaten
+      }
+      plan::write_plan(file, *searched, Json::object());
+      if (searched->solved() || at_end) {
+        Json json = told(at_end ? "iterations" : "goal", searched->statistics.iterations, !at_end);
+        json["leg"] = searched->leg(), json["distance_m"] = searched->best_distance_m;
+        return json;
+      }
+      throw_if_ended();
+    }
+  }
+
+  std::optional<plan::Plan> search_to_go_on_with(const Unit& unit, const plan::Settings& settings) {
+    const fs::path file = farm_.search_file(unit);
+    if (!fs::exists(file)) return std::nullopt;
+    try {
+      plan::PlanFile kept = plan::read_plan(file);
+      if (kept.plan.system_hash == setup().system.hash() &&
+          plan::first_difference(kept.plan.settings, settings).empty() && !kept.plan.solved())
+        return std::move(kept.plan);
+    } catch (const InputError&) {
+    }
+    log::info("{}: is of something else; searching anew", file.string());
+    return std::nullopt;
+  }
+
+  // Of the search that won; where none did, of that which got farthest.
+  std::optional<Unit> unit_that_won(const std::optional<Best>& best) const {
+    std::optional<Unit> won;
+    int leg = 0;
+    double distance_m = 0;
+    for (const Unit& unit : farm_.units(Stage::search)) {
+      if (best && unit.seed != best->seed) continue;
+      const Json told = farm_.told_of(unit);
+      const auto number = [&](const char* key) {
+        return told.contains(key) && told.at(key).is_number() ? told.at(key).get<double>() : 0;
+      };
+      const int its_leg = int(number("leg"));
+      const bool farther = its_leg > leg || (its_leg == leg && number("distance_m") < distance_m);
+      if (!won || farther) won = unit, leg = its_leg, distance_m = number("distance_m");
+    }
+    return won;
+  }
+
+  // What is told of the others depends on the winner alone, not on how far each happened to get.
+  plan::PortfolioReport portfolio_report(const std::optional<Best>& best, std::int64_t most) const {
+    plan::PortfolioReport report;
+    for (const Unit& unit : farm_.units(Stage::search)) {
+      const bool won = best && unit.seed == best->seed;
+      const std::int64_t iterations = won    ? best->iterations
+                                      : best ? std::max<std::int64_t>(0, best->most_of(unit.seed))
+                                             : most;
+      report.searches.push_back({unit.seed, iterations, won});
+      report.iterations += iterations;
+      const Json cpu_s = farm_.told_of(unit).value("cpu_s", Json());
+      if (cpu_s.is_number()) report.cpu_s += cpu_s.get<double>();
+    }
+    return report;
+  }
+
+  Json do_plan() {
+    const FolderLock lock(farm_.work(), FolderLock::alone, FolderLock::waits);
+    const std::optional<Best> best = best_search(farm_);
+    const std::optional<Unit> won = unit_that_won(best);
+    LIMBER_CHECK(won.has_value());
+    const plan::Settings settings = settings_of(scene_, plan_options());
+    plan::Plan searched;
+    try {
+      searched = plan::read_plan(farm_.search_file(*won)).plan;
+    } catch (const InputError&) {
+      farm_.forget(*won), known_done_.erase(won->name);
+      return {};
+    }
+    searched.settings.max_iterations = settings.max_iterations;
+    std::optional<plan::PortfolioReport> searches;
+    if (plan_options().portfolio > 1) searches = portfolio_report(best, settings.max_iterations);
+    const Setup& of = setup();
+    Found found = make_better(scene_, of.system, plan_options(), std::move(searched), searches);
+    throw_if_ended();
+    const KeptPlan kept =
+        keep_plan(farm_.work(), scene_, of.bodies, of.world, of.system, found.plan, found.extra);
+    throw_if_ended();
+
+    drop_film();
+    const Filming& shown = filming();
+    Json hashes = Json::array();
+    for (int f = 0; f < shown.shot->frames(); ++f) hashes.push_back(shown.shot->hash_of(f));
+    for (const Unit& unit : farm_.units(Stage::search)) {
+      std::error_code none;
+      fs::remove(farm_.search_file(unit), none);
+    }
+    return {{"solved", kept.reached},
+            {"explanation", kept.summary.at("explanation")},
+            {"seed", kept.summary.at("seed")},
+            {"tree_hash", kept.summary.at("tree_hash")},
+            {"trajectory_hash", kept.summary.at("trajectory_hash")},
+            {"plan_file", hex(shown.planned.file_hash)},
+            {"frames_folder", shown.files.folder.filename().string()},
+            {"frame_hashes", hashes}};
+  }
+
+  const Filming& filming() {
+    if (!filming_) filming_ = std::make_unique<Filming>(film_options());
+    return *filming_;
+  }
+  Shot::Painter& painter() {
+    make_folder(filming().files.folder);
+    if (!painter_) painter_ = std::make_unique<Shot::Painter>(*filming().shot);
+    return *painter_;
+  }
+  void drop_film() { painter_.reset(), filming_.reset(); }
+
+  Json do_frames(const Unit& unit) {
+    if (const Json plan = farm_.told_of(farm_.plan_unit());
+        plan.value("plan_file", Json()) != hex(filming().planned.file_hash)) {
+      log::warn("{}: is another plan than was made for these frames; it is made again",
+                (farm_.work() / "plan.npz").string());
+      drop_film();
+      farm_.forget(farm_.plan_unit()), known_done_.clear();
+      return {};
+    }
+    std::vector<int> missing = unit.frames;
+    std::erase_if(missing, [&](int frame) { return filming().is_good(frame); });
+    const FolderLock lock(farm_.work(), FolderLock::shared, FolderLock::waits);
+    const std::vector<FailedFrame> failures =
+        missing.empty() ? std::vector<FailedFrame>{} : paint_frames(filming(), missing, &painter());
+    throw_if_ended();
+    if (!failures.empty())
+      throw FramesFailed(fmt::format("{} of {} frames failed; frame {}: {}", failures.size(), missing.size(),
+                                     failures[0].frame, failures[0].why));
+    return {{"painted", missing.size()}};
+  }
+
+  Json do_film() {
+    drop_film(), setup_.reset();
+    const RenderedFilm film = render(film_options());
+    if (!film.film)
+      throw FramesFailed(
+          fmt::format("{} frames are missing, {} failed", film.frames - int(film.wanted), film.failed));
+    return {{"film", film.film->lexically_relative(farm_.work()).string()},
+            {"sheet", film.sheet->lexically_relative(farm_.work()).string()},
+            {"frames", film.frames},
+            {"painted", film.painted}};
+  }
+
+  const WorkOptions options_;
+  const FarmFolder farm_;
+  Leases leases_;
+  scenes::Scene scene_;
+  bool sends_again_ = options_.again;
+  std::set<std::string> known_done_;
+  std::unique_ptr<Setup> setup_;      // of searches and the plan
+  std::unique_ptr<Filming> filming_;  // of the frames
+  std::unique_ptr<Shot::Painter> painter_;
+  WorkDone result_;
+};
+
+}  // namespace
+
+WorkDone work(const WorkOptions& options) { return Worker(options).run(); }
+
+}  // namespace limber::detail
