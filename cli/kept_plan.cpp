@@ -81,7 +81,7 @@ std::string text_of_parting(const Json& s) {
          fmt::format(
              "               in {} steps{}; no node was moved by more than {:.2f} % of the robot's size\n",
              parted.at("steps").get<int>(),
-             s.contains("dynamics")
+             s.contains("dynamics") && s.at("dynamics").contains("parting_cpu_s")
                  ? fmt::format(", {:.2f} CPU s", s.at("dynamics").at("parting_cpu_s").get<double>())
                  : "",
              100 * parted.at("largest_move_of_robot_size").get<double>());
@@ -120,26 +120,34 @@ std::string text_of_simulation(const Json& s, const std::string& extra, const fs
 }
 
 std::string text_of_search(const Json& s, const std::string& extra, const fs::path& file) {
-  const Json &t = s.at("statistics"), &d = s.at("dynamics");
+  const Json &t = s.at("statistics"), d = s.value("dynamics", Json::object());
+  // Not known where the folder came without timings.json.
+  const std::string seconds =
+      t.contains("wall_s") && t.contains("cpu_s")
+          ? fmt::format("; {:.2f} CPU s, {:.2f} s", t.at("cpu_s").get<double>(), t.at("wall_s").get<double>())
+          : "";
+  const std::string dynamics =
+      d.contains("contact_of_force_step")
+          ? fmt::format(
+                "  dynamics     contact {:.2f} × the force step; a lane takes {:.1f} µs to load, {:.1f} "
+                "µs to store\n",
+                d.at("contact_of_force_step").get<double>(), d.value("load_us", 0.0),
+                d.value("store_us", 0.0))
+          : "";
   return fmt::format(
       "{}\n"
       "{}{}"
-      "  search       {} iterations, {} nodes, {} diverged, {} rejected, {} ways refused; {:.2f} CPU s, "
-      "{:.2f} s\n"
+      "  search       {} iterations, {} nodes, {} diverged, {} rejected, {} ways refused{}\n"
       "  memory       {:.1f} kB a node, {:.1f} where nothing is shared with the parent\n"
-      "  dynamics     contact {:.2f} × the force step; a lane takes {:.1f} µs to load, {:.1f} µs to store\n"
-      "{}"
-      "{}"
+      "{}{}{}"
       "  hashes       tree {}, trajectory {}\n"
       "  file         {}\n",
       s.at("explanation").get<std::string>(), s.contains("parted") ? text_of_parting(s) : "",
       s.contains("legs") ? text_of_legs(s.at("legs")) : "", t.at("iterations").get<std::int64_t>(),
       s.at("nodes").get<int>(), t.at("diverged").get<std::int64_t>(), t.at("rejected").get<std::int64_t>(),
-      t.at("refused").get<std::int64_t>(), t.at("cpu_s").get<double>(), t.at("wall_s").get<double>(),
-      1e-3 * s.at("node_bytes").get<double>(), 1e-3 * s.at("node_bytes_unshared").get<double>(),
-      d.at("contact_of_force_step").get<double>(), d.at("load_us").get<double>(),
-      d.at("store_us").get<double>(), text_of_motion(s), extra, s.at("tree_hash").get<std::string>(),
-      s.at("trajectory_hash").get<std::string>(), file.string());
+      t.at("refused").get<std::int64_t>(), seconds, 1e-3 * s.at("node_bytes").get<double>(),
+      1e-3 * s.at("node_bytes_unshared").get<double>(), dynamics, text_of_motion(s), extra,
+      s.at("tree_hash").get<std::string>(), s.at("trajectory_hash").get<std::string>(), file.string());
 }
 
 }  // namespace

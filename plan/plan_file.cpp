@@ -7,16 +7,16 @@
 #include "core/error.h"
 #include "core/hash.h"
 #include "core/npz.h"
+#include "plan/timings.h"
 
 namespace limber::plan {
 
 namespace {
 
-constexpr const char* format_name = "limber plan 3";
-constexpr const char* unsealed_format_name = "limber plan 2";  // without hash.txt
-constexpr const char* seal_name = "hash.txt";                  // of all other entries
-constexpr std::int64_t max_counted = std::int64_t(1) << 53;    // steps of all rollouts, …
-constexpr const char* earlier_format_name = "limber plan 1";   // the tree as a list of states like any other
+// By edition: 1 had the tree as a list of states like any other, 2 no hash.txt, 3 what the search cost.
+constexpr const char* format_names[] = {"limber plan 1", "limber plan 2", "limber plan 3", "limber plan 4"};
+constexpr const char* seal_name = "hash.txt";                // of all other entries
+constexpr std::int64_t max_counted = std::int64_t(1) << 53;  // steps of all rollouts, …
 
 // A list of states is three arrays: NAME_step (n), NAME_positions and NAME_velocities (n × 3N).
 template <class StateList>
@@ -299,7 +299,7 @@ class Reader {
   const char* command_ = "plan";  // that makes such files
 };
 
-Statistics statistics_from_json(const Reader& reader, const Json& json) {
+Statistics statistics_from_json(const Reader& reader, const Json& json, int edition) {
   const auto count = [&](const char* name) {
     const auto n = json.at(name).get<double>();  // of a whole number beyond 64 bits this, too, is a number
     reader.require(n >= 0 && n <= double(max_counted),
@@ -318,8 +318,9 @@ Statistics statistics_from_json(const Reader& reader, const Json& json) {
       fmt::format("statistics.iterations is {}; it must be at most {}", s.iterations, most_iterations));
   s.diverged = count("diverged"), s.rejected = count("rejected");
   if (json.contains("refused")) s.refused = count("refused");  // since edition 2 of the world
-  s.rollout_steps = count("rollout_steps"), s.rollouts = count("rollouts");
-  s.rollouts_wrong = count("rollouts_wrong");
+  s.rollout_steps = count("rollout_steps");
+  if (edition >= first_without_timings) return s;
+  s.rollouts = count("rollouts"), s.rollouts_wrong = count("rollouts_wrong");
   s.cpu_s = seconds("cpu_s"), s.wall_s = seconds("wall_s");
   return s;
 }
@@ -342,7 +343,7 @@ Json json_of(const Simulation& simulation) {
   return json;
 }
 
-Json json_of_search(const Plan& plan) {
+Json json_of_search(const Plan& plan, int edition) {
   Json meta;
   meta["solved"] = plan.solved();
   meta["ending"] = name_of(plan.ending);
@@ -355,6 +356,10 @@ Json json_of_search(const Plan& plan) {
   if (!plan.measured) meta["measured"] = false;
   meta["settings"] = json_of(plan.settings);
   meta["statistics"] = json_of(plan.statistics);
+  if (edition < first_without_timings) return meta;
+  meta["settings"].erase("in_flight");
+  if (plan.ending != Ending::time) meta["settings"].erase("time_limit_s");
+  meta["statistics"] = without_timings(meta["statistics"]);
   return meta;
 }
 
@@ -380,9 +385,14 @@ void read_simulation(const Reader& reader, const Json& json, double frames_per_s
   plan.best_node = plan.tree.size() - 1;
 }
 
-void read_search(const Reader& reader, const Json& meta, const std::string& file, Plan& plan) {
-  plan.settings = settings_from_json(meta.at("settings"), file);
-  plan.statistics = statistics_from_json(reader, meta.at("statistics"));
+void read_search(const Reader& reader, const Json& meta, int edition, const std::string& file, Plan& plan) {
+  Json settings = meta.at("settings");
+  if (edition >= first_without_timings && settings.is_object()) {
+    settings["in_flight"] = Settings{}.in_flight;
+    settings.emplace("time_limit_s", nullptr);  // it is there where it ended the search
+  }
+  plan.settings = settings_from_json(settings, file);
+  plan.statistics = statistics_from_json(reader, meta.at("statistics"), edition);
   plan.goal_node = reader.whole(meta, "goal_node"), plan.best_node = reader.whole(meta, "best_node");
   meta.at("best_distance_m").get_to(plan.best_distance_m);
   reader.require(plan.best_distance_m >= 0 && std::isfinite(plan.best_distance_m),
@@ -404,7 +414,8 @@ void read_search(const Reader& reader, const Json& meta, const std::string& file
 
 }  // namespace
 
-Npz npz_of(const Plan& plan, const Json& given) {
+Npz npz_of(const Plan& plan, const Json& given, int edition) {
+  LIMBER_CHECK(edition >= first_sealed && edition <= newest_edition, edition);
   Npz file;
   put_shared_states(file, plan.tree.states);
   put_controls(file, "tree", plan.tree.controls);
@@ -425,8 +436,8 @@ Npz npz_of(const Plan& plan, const Json& given) {
   put_states(file, "end", std::vector<State>{plan.trajectory.end});
 
   Json meta;
-  meta["format"] = format_name;
-  meta.update(plan.simulation ? json_of(*plan.simulation) : json_of_search(plan));
+  meta["format"] = format_names[edition - 1];
+  meta.update(plan.simulation ? json_of(*plan.simulation) : json_of_search(plan, edition));
   meta["settle_steps"] = plan.trajectory.settle_steps;
   meta["frames_per_second"] = plan.trajectory.frames_per_second;
   meta["system_hash"] = hex(plan.system_hash);
@@ -448,15 +459,15 @@ PlanFile read_plan(const fs::path& path) {
   reader.say_to_run(meta.contains("simulation") ? "simulate" : "plan");
   try {
     PlanFile file;
-    file.sealed = meta.at("format") == format_name;
-    const bool shared = file.sealed || meta.at("format") == unsealed_format_name;
-    reader.require(shared || meta.at("format") == earlier_format_name, "it is not of this version's format");
+    const auto format = std::find(std::begin(format_names), std::end(format_names), meta.at("format"));
+    reader.require(format != std::end(format_names), "it is not of this version's format");
+    file.edition = int(format - std::begin(format_names)) + 1;
     Plan& plan = file.plan;
-    plan.tree = reader.tree(shared);
+    plan.tree = reader.tree(file.edition > 1);
     if (meta.contains("simulation"))
       read_simulation(reader, meta.at("simulation"), meta.at("frames_per_second").get<double>(), plan);
     else
-      read_search(reader, meta, path.string(), plan);
+      read_search(reader, meta, file.edition, path.string(), plan);
 
     Trajectory& t = plan.trajectory;
     t.controls = reader.controls("path", -1);
@@ -475,7 +486,7 @@ PlanFile read_plan(const fs::path& path) {
     reader.require(meta.at("trajectory_hash") == hex(hash_of(t)),
                    "the path was changed since it was written");
     reader.require_path_nodes(path_to(plan.tree, plan.best_node));
-    if (file.sealed) reader.require_seal();
+    if (file.sealed()) reader.require_seal();
     file.given = meta.at("given");
     return file;
   } catch (const Json::exception& trouble) {

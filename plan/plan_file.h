@@ -7,15 +7,22 @@
 
 namespace limber::plan {
 
+// Layouts that there have been, by number. Files of all of them are read.
+inline constexpr int first_sealed = 3;           // one hash stands over all entries
+inline constexpr int first_without_timings = 4;  // nor costs: the same search, the same bytes
+inline constexpr int newest_edition = 4;
+
 struct PlanFile {
-  Plan plan;
-  Json given;           // the caller's own: scene text, versions
-  bool sealed = false;  // one hash stood over all entries; not in files of former formats
+  Plan plan;   // since first_without_timings without costs (plan/timings.h), in_flight, a time limit not
+               // reached
+  Json given;  // the caller's own: scene text, versions
+  int edition = newest_edition;
+  bool sealed() const { return edition >= first_sealed; }
 };
 
 void write_plan(const fs::path&, const Plan&, const Json& given);
-// Its entries, as write_plan has them.
-Npz npz_of(const Plan&, const Json& given);
+// Its entries, as write_plan has them; those of a former edition that was sealed, as it had them.
+Npz npz_of(const Plan&, const Json& given, int edition = newest_edition);
 
 // Throws InputError when the file is cut short, lacks an entry, contradicts itself, or was changed since it
 // was written (its hashes are checked).

@@ -26,6 +26,36 @@ class Habits : public Program {
 };
 using Habits_slow = Habits;  // stays out of the sanitizer runs
 
+// What a run cost stands in timings.json and, of bodies, in their reports; all else has the same bytes.
+TEST_F(Habits_slow, TwoRunsWriteTheSameBytesOnAnyNumberOfThreads) {
+  const auto files_of = [&](const std::string& name, const std::vector<std::string>& more) {
+    std::vector<std::string> words{"plan", scene(), "-o", out(name), "--shortcut", "2"};
+    words.insert(words.end(), more.begin(), more.end());
+    const Result planned = limber_program(words);
+    EXPECT_EQ(planned.code, exit_done) << planned.err;
+    auto files = contents(out(name));
+    std::erase_if(files, [](const auto& file) {
+      const std::string base = fs::path(file.first).filename().string();
+      return base == "timings.json" || base == "report.json";
+    });
+    return files;
+  };
+  const auto one = files_of("one", {"--threads", "1", "--in-flight", "1"});
+  const auto other = files_of("other", {"--threads", "2", "--in-flight", "40", "--time-limit", "10min"});
+  ASSERT_EQ(one.size(), other.size());
+  for (std::size_t i = 0; i < one.size(); ++i) {
+    EXPECT_EQ(one[i].first, other[i].first);
+    EXPECT_TRUE(one[i].second == other[i].second) << one[i].first;
+  }
+  // Costs are told all the same, also of a plan that is up to date.
+  EXPECT_TRUE(fs::exists(fs::path(out("one")) / "timings.json"));
+  const Result again = limber_program({"plan", scene(), "-o", out("one"), "--shortcut", "2", "--json"});
+  EXPECT_NE(again.err.find("up to date"), std::string::npos) << again.err;
+  for (const char* pointer :
+       {"/statistics/cpu_s", "/statistics/rollouts", "/dynamics/load_us", "/shortcut/wall_s"})
+    EXPECT_TRUE(again.json().contains(Json::json_pointer(pointer))) << pointer;
+}
+
 // Every tenth iteration and the last; nothing ever gets worse; the last line is what the plan says. Cut and
 // resumed, the file tells the same search.
 TEST_F(Habits_slow, StatisticsTellTheSearchInOrderAlsoWhenItIsResumed) {

@@ -14,7 +14,6 @@
 #include <numbers>
 #include <set>
 
-#include "core/npz.h"
 #include "core/random.h"
 #include "tests/cli/program.h"
 #include "tests/places.h"
@@ -65,13 +64,6 @@ std::string essence(const fs::path& path) {
     std::string text;
     std::istringstream lines(read_file(path));
     for (std::string line; std::getline(lines, line);) text += without_costs(line) + "\n";
-    return text;
-  }
-  if (path.filename() == "plan.npz") {
-    Npz npz = read_npz(path);
-    npz.texts.at("meta.json") = without_costs(npz.texts.at("meta.json"));
-    std::string text = npz.texts.at("meta.json");
-    for (const auto& [name, array] : npz.arrays) text += name + npy_file(array);
     return text;
   }
   // Its tables and curves are of times: that it is whole is all there is to compare.

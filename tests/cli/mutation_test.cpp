@@ -20,6 +20,7 @@
 #include "meshing/convex_hull.h"
 #include "meshing/shell_check.h"
 #include "plan/plan_file.h"
+#include "plan/timings.h"
 #include "tests/cli/program.h"
 
 namespace limber::detail {
@@ -116,7 +117,7 @@ struct Mutant {
   }
   void write_summary() {
     write_plan_folder(folder, planned.plan, planned.scene, bodies, planned.summary);
-    update_manifest(folder, "plan", planned.summary);
+    update_manifest(folder, "plan", plan::without_timings(planned.summary));
   }
 
   fs::path folder;
@@ -268,8 +269,6 @@ List of_the_plan() {
   add("how many were rejected", counts, [](plan::Plan& p) { ++p.statistics.rejected; });
   add("how many ways were refused", counts, [](plan::Plan& p) { ++p.statistics.refused; });
   add("steps of rollouts", counts, [](plan::Plan& p) { --p.statistics.rollout_steps; });
-  add("fewer rollouts than iterations", counts, [](plan::Plan& p) { p.statistics.rollouts = 1; });
-  add("rollouts in vain", counts, [](plan::Plan& p) { ++p.statistics.rollouts_wrong; });
 
   add("another seed", tree, [](plan::Plan& p) { ++p.settings.seed; });
   using Settings = plan::Settings;
@@ -322,9 +321,8 @@ List of_the_summary(const Json& summary) {
     if (value.is_string()) return value.get<std::string>() + "?";
     return Json(7);
   };
-  const Json flat = summary.flatten();
+  const Json flat = plan::without_timings(summary).flatten();
   for (const auto& [pointer, value] : flat.items()) {
-    if (pointer.starts_with("/dynamics")) continue;  // what it cost: nobody can know that any more
     list.push_back({"summary" + pointer, "what the plan tells of itself",
                     [pointer = pointer, value = other(value)](Mutant& m) {
                       m.planned.summary.at(Json::json_pointer(pointer)) = value;
@@ -653,7 +651,7 @@ List of_files() {
   list.push_back(
       {"no manifest.json", "manifest.json", [](Mutant& m) { fs::remove(m.folder / "manifest.json"); }});
   list.push_back({"a manifest of another plan", "manifest.json", [](Mutant& m) {
-                    Json summary = m.planned.summary;
+                    Json summary = plan::without_timings(m.planned.summary);
                     summary["trajectory_hash"] = "0123456789abcdef";
                     update_manifest(m.folder, "plan", summary);
                   }});
@@ -662,17 +660,28 @@ List of_files() {
     list.push_back({std::string("no ") + name, name,
                     [=](Mutant& m) { fs::remove(m.folder / "bodies" / "ball" / name); }});
   list.push_back({"a plan without its hash", "one hash stands over all of plan.npz", [](Mutant& m) {
-                    Npz npz = read_npz(m.folder / "plan.npz");
+                    const plan::PlanFile file = plan::read_plan(m.folder / "plan.npz");
+                    Npz npz = plan::npz_of(file.plan, file.given, 3);
                     npz.texts.erase("hash.txt");
                     std::string& meta = npz.texts.at("meta.json");
                     meta.replace(meta.find("limber plan 3"), 13, "limber plan 2");
                     write_npz(m.folder / "plan.npz", npz);
                   }});
-  list.push_back({"what a search cost, without the hash", "an entry was changed", [](Mutant& m) {
+  list.push_back({"how many diverged, without the hash", "an entry was changed", [](Mutant& m) {
                     Npz npz = read_npz(m.folder / "plan.npz");
                     std::string& meta = npz.texts.at("meta.json");
-                    meta.replace(meta.find("\"cpu_s\": "), 9, "\"cpu_s\": 1");
+                    meta.replace(meta.find("\"diverged\": "), 12, "\"diverged\": 1");
                     write_npz(m.folder / "plan.npz", npz);
+                  }});
+  list.push_back({"costs within plan.npz", "plan.npz holds what limber writes", [](Mutant& m) {
+                    plan::PlanFile file = plan::read_plan(m.folder / "plan.npz");
+                    file.given["summary"]["statistics"]["cpu_s"] = 1e-3;
+                    plan::write_plan(m.folder / "plan.npz", file.plan, file.given);
+                  }});
+  list.push_back({"costs in the manifest", "manifest.json", [](Mutant& m) {
+                    Json summary = plan::without_timings(m.planned.summary);
+                    summary["statistics"]["cpu_s"] = 1e-3;
+                    update_manifest(m.folder, "plan", summary);
                   }});
   list.push_back({"the hash of a cage", "bodies/ball", [](Mutant& m) {
                     m.bodies[ball].cage.positions(0, 0) -= 0.01;  // its files stay

@@ -133,6 +133,48 @@ TEST_F(Strangers_slow, ATextWhereANumberBelongsIsRefused) {
   expect_refused("given.summary: dynamics is a text");
 }
 
+// A plan's folder without timings.json, or with one that is damaged or another plan's, is the same plan.
+TEST_F(Strangers_slow, NothingDependsOnWhatAPlanCost) {
+  const fs::path timings = fs::path(out()) / "timings.json";
+  plan::write_plan(file(), good_.plan, good_.given);
+  const auto facts = [&] {
+    const Result info = limber_program({"info", out(), "--json"});
+    EXPECT_EQ(info.code, exit_done) << info.err;
+    return info.json();
+  };
+  ASSERT_TRUE(fs::exists(timings));
+  const std::string good = read_file(timings);
+  EXPECT_TRUE(facts().at("statistics").contains("cpu_s"));
+  for (const char* what : {"missing", "cut", "another's"}) {
+    Json of_another = Json::parse(good);
+    of_another["of"][0] = "0123456789abcdef";
+    write_file(timings, *what == 'c' ? good.substr(0, good.size() / 2) : of_another.dump());
+    if (*what == 'm') fs::remove(timings);
+    EXPECT_FALSE(facts().at("statistics").contains("cpu_s")) << what;
+    EXPECT_FALSE(facts().contains("dynamics")) << what;
+    for (const char* command : {"verify", "report"})
+      EXPECT_EQ(limber_program({command, out()}).code, exit_done) << command << what;
+  }
+  for (const auto& [named, change] : std::vector<std::pair<std::string, std::function<void(Json&)>>>{
+           {"summary: statistics.cpu_s is a text",
+            [](Json& j) { j["summary"]["statistics"]["cpu_s"] = "much"; }},
+           {"summary: statistics.rollouts is a number",
+            [](Json& j) { j["summary"]["statistics"]["rollouts"] = 0.5; }},
+           {"summary: dynamics is a text", [](Json& j) { j["summary"]["dynamics"] = "fast"; }},
+           {"summary: dynamics.load_us is a text", [](Json& j) { j["summary"]["dynamics"]["load_us"] = ""; }},
+           {"summary is a list", [](Json& j) { j["summary"] = Json::array(); }},
+           {"of is missing", [](Json& j) { j.erase("of"); }}}) {
+    Json edited = Json::parse(good);
+    change(edited);
+    write_file(timings, edited.dump());
+    const Result result = limber_program({"info", out()});
+    EXPECT_EQ(result.code, exit_bad_input) << named << result.out;
+    EXPECT_NE(result.err.find("timings.json: " + named), std::string::npos) << result.err;
+    EXPECT_NE(result.err.find("remove the file"), std::string::npos) << result.err;
+  }
+  write_file(timings, good);
+}
+
 TEST_F(Strangers_slow, PipesAreRefusedWhereverFilesAreRead) {
   fs::remove(file());
   ASSERT_EQ(mkfifo(file().c_str(), 0600), 0);

@@ -16,6 +16,7 @@
 #include "limber/detail/world/analysis.h"
 #include "limber/detail/world/fem_system.h"
 #include "limber/detail/world/scene_world.h"
+#include "plan/timings.h"
 #include "scenes/library.h"
 
 namespace limber::detail {
@@ -347,7 +348,7 @@ KeptPlan keep_measured_plan(const fs::path& folder, const scenes::Scene& scene,
   for (const char* name : {"volume.svg", "volume.png", "tree.svg"})
     if (!pictures.contains(name)) fs::remove(folder / name);  // of what was here before
   for (const auto& [name, bytes] : pictures) write_file(folder / name, bytes);
-  update_manifest(folder, "plan", summary);
+  update_manifest(folder, "plan", plan::without_timings(summary));
   const bool is_simulation = plan.simulation.has_value();
   return {.file = folder / "plan.npz",
           .summary = std::move(summary),
@@ -377,7 +378,7 @@ bool plan_is_up_to_date(const PlanOptions& options, const scenes::Scene& scene) 
            folder.plan.measured && folder.plan.settings.frames_per_second == settings.frames_per_second &&
            (!options.improve || folder.summary.contains("improve")) &&
            // Written after the pictures, so that they are there.
-           read_manifest(options.out).value("plan", Json()) == folder.summary &&
+           read_manifest(options.out).value("plan", Json()) == kept_summary(folder) &&
            (!folder.plan.solved() || shortened(folder.summary, shortcuts_of(scene, options, {})));
   } catch (const InputError& error) {
     log::info("planning anew: {}", error.what());

@@ -3,13 +3,33 @@
 #include "core/error.h"
 #include "core/hash.h"
 #include "core/json_shape.h"
+#include "core/log.h"
 #include "core/version.h"
 #include "limber/detail/world/scene_world.h"
 #include "plan/plan_file.h"
+#include "plan/timings.h"
 
 namespace limber::detail {
 
 namespace {
+
+constexpr const char* timings_file = "timings.json";
+const Json cpu_and_wall{{"cpu_s", 0.5}, {"wall_s", 0.5}};
+const Json timings_like{
+    {"statistics", {{"rollouts", 1}, {"rollouts_wrong", 1}, {"cpu_s", 0.5}, {"wall_s", 0.5}}},
+    {"dynamics",
+     {{"elastic_cpu_s", 0.5},
+      {"contact_cpu_s", 0.5},
+      {"controls_cpu_s", 0.5},
+      {"integration_cpu_s", 0.5},
+      {"parting_cpu_s", 0.5},
+      {"contact_of_force_step", 0.5},
+      {"load_us", 0.5},
+      {"store_us", 0.5}}},
+    {"shortcut", cpu_and_wall},
+    {"improve", cpu_and_wall},
+    {"portfolio", cpu_and_wall},
+    {"refine", {{"replay_cpu_s", 0.5}, {"track_cpu_s", 0.5}, {"search_cpu_s", 0.5}}}};
 
 Json given_of(const std::string& by_version, const scenes::Scene& scene,
               const std::vector<PreparedBody>& bodies, const Json& summary) {
@@ -25,6 +45,36 @@ Json given_of(const std::string& by_version, const scenes::Scene& scene,
   return given;
 }
 
+// Which motion the costs are of: a file that was left from another tells nothing of this one.
+Json motion_of(const plan::Plan& plan) {
+  return {hex(plan::hash_of(plan.tree)), hex(plan::hash_of(plan.trajectory))};
+}
+
+// Nothing depends on them: a damaged file is as none. Throws InputError where a text stands for a number and
+// the like.
+void add_timings(const fs::path& folder, PlanFolder& planned) {
+  const fs::path file = folder / timings_file;
+  if (planned.edition < plan::first_without_timings || !fs::exists(file)) return;
+  Json read;
+  try {
+    read = read_json(file);
+  } catch (const InputError& error) {
+    log::warn("{}; what the motion cost is not known", error.what());
+    return;
+  }
+  constexpr const char* remedy = "remove the file";
+  require_like(read, {{"of", Json::array({""})}, {"summary", Json::object()}}, Keys::all, file.string(),
+               remedy);
+  require_like(read.at("summary"), timings_like, Keys::those_there, file.string() + ": summary", remedy);
+  if (read.at("of") != motion_of(planned.plan)) return;
+  planned.summary = plan::with_timings(std::move(planned.summary), read.at("summary"));
+  const Json statistics = planned.summary.value("statistics", Json::object());
+  plan::Statistics& s = planned.plan.statistics;
+  s.rollouts = statistics.value("rollouts", s.rollouts);
+  s.rollouts_wrong = statistics.value("rollouts_wrong", s.rollouts_wrong);
+  s.cpu_s = statistics.value("cpu_s", s.cpu_s), s.wall_s = statistics.value("wall_s", s.wall_s);
+}
+
 void require_summary(const PlanFolder& planned, const fs::path& file) {
   constexpr const char* remedy = "plan anew with limber plan";
   const auto kinds_of = [&](const Json& value, const Json& example, const char* name) {
@@ -34,18 +84,14 @@ void require_summary(const PlanFolder& planned, const fs::path& file) {
       {"duration_s", 0.5}, {"effort_n_s", 0.5}, {"strain_energy_j", 0.5}, {"volume_change", 0.5}};
   kinds_of(planned.summary,
            {{"explanation", ""},
-            {"dynamics",
-             {{"elastic_cpu_s", 0.5},
-              {"contact_cpu_s", 0.5},
-              {"controls_cpu_s", 0.5},
-              {"integration_cpu_s", 0.5}}},
+            {"statistics", timings_like.at("statistics")},
+            {"dynamics", timings_like.at("dynamics")},
             {"improve", Json::object()}},
            "summary");
   if (planned.summary.contains("shortcut"))
-    require_like(
-        planned.summary.at("shortcut"),
-        {{"cost", ""}, {"rounds", -1}, {"accepted", -1}, {"cpu_s", 0.5}, {"before", costs}, {"after", costs}},
-        Keys::all, file.string() + ": given.summary.shortcut", remedy);
+    require_like(planned.summary.at("shortcut"),
+                 {{"cost", ""}, {"rounds", -1}, {"accepted", -1}, {"before", costs}, {"after", costs}},
+                 Keys::all, file.string() + ": given.summary.shortcut", remedy);
   if (planned.summary.contains("stiffness_shares")) {
     const Json& shares = planned.summary.at("stiffness_shares");
     kinds_of(shares, Json::object(), "summary.stiffness_shares");
@@ -80,14 +126,26 @@ void require_summary(const PlanFolder& planned, const fs::path& file) {
 
 void write_plan_folder(const fs::path& folder, const plan::Plan& plan, const scenes::Scene& scene,
                        const std::vector<PreparedBody>& bodies, const Json& summary) {
-  plan::write_plan(folder / "plan.npz", plan, given_of(version, scene, bodies, summary));
+  plan::write_plan(folder / "plan.npz", plan,
+                   given_of(version, scene, bodies, plan::without_timings(summary)));
+  Json timings = plan::timings_of(summary);
+  if (std::error_code ignored; timings.is_null())
+    fs::remove(folder / timings_file, ignored);
+  else
+    write_json(folder / timings_file, {{"of", motion_of(plan)}, {"summary", std::move(timings)}});
+}
+
+Json kept_summary(const PlanFolder& planned) {
+  return planned.edition < plan::first_without_timings ? planned.summary
+                                                       : plan::without_timings(planned.summary);
 }
 
 std::string odd_entry(const fs::path& folder, const PlanFolder& planned,
                       const std::vector<PreparedBody>& bodies) {
   const Npz now = read_npz(folder / "plan.npz"),
-            again =
-                plan::npz_of(planned.plan, given_of(planned.version, planned.scene, bodies, planned.summary));
+            again = plan::npz_of(planned.plan,
+                                 given_of(planned.version, planned.scene, bodies, kept_summary(planned)),
+                                 planned.edition);
   for (const auto& [name, array] : now.arrays)
     if (!again.arrays.contains(name) || again.arrays.at(name) != array) return name + ".npy";
   for (const auto& [name, text] : now.texts)
@@ -103,7 +161,7 @@ PlanFolder read_plan_folder(const fs::path& folder) {
   PlanFolder result;
   plan::PlanFile read = plan::read_plan(file);
   result.plan = std::move(read.plan);
-  result.sealed = read.sealed;
+  result.edition = read.edition;
   const Json& extra = read.given;
   try {
     scenes::ScriptText script;
@@ -117,6 +175,7 @@ PlanFolder read_plan_folder(const fs::path& folder) {
     result.cage_hashes = extra.at("cage_hashes");
     result.version = extra.at("version").get<std::string>();
     require_summary(result, file);
+    add_timings(folder, result);
   } catch (const Json::exception& error) {
     throw InputError(fmt::format("{}: its meta.json is not limber's ({}); plan anew with limber plan",
                                  file.string(), error.what()));

@@ -1,5 +1,5 @@
 // plan.npz with what it takes to rebuild its world: the scene's text, the edits made to it, and the hashes of
-// the bodies.
+// the bodies; beside it timings.json, of what it cost, on which nothing depends.
 #pragma once
 
 #include <map>
@@ -9,6 +9,7 @@
 #include "limber/detail/body/body.h"
 #include "limber/detail/world/analysis.h"
 #include "limber/detail/world/fem_system.h"
+#include "plan/plan_file.h"
 #include "plan/search.h"
 #include "scenes/scene.h"
 
@@ -17,15 +18,20 @@ namespace limber::detail {
 struct PlanFolder {
   plan::Plan plan;
   scenes::Scene scene;
-  Json summary;             // as `limber plan --json` printed it
+  Json summary;  // as `limber plan --json` printed it; without costs where timings.json is not there
   std::uint64_t file_hash;  // of plan.npz
   Json cage_hashes;         // by body name
   std::string version;      // of the limber that wrote it
-  bool sealed;              // as plan::PlanFile
+  int edition;              // as plan::PlanFile
+  bool sealed() const { return edition >= plan::first_sealed; }
 };
 
+// Of the summary what it cost goes to timings.json.
 void write_plan_folder(const fs::path& folder, const plan::Plan&, const scenes::Scene&,
                        const std::vector<PreparedBody>&, const Json& summary);
+
+// The summary as plan.npz and manifest.json have it: without costs, but in those of older limbers.
+Json kept_summary(const PlanFolder&);
 
 // Of what a signal ended nothing is measured, so that it ends at once: no figures, no pictures.
 inline bool is_unmeasured(const plan::Plan& plan) {

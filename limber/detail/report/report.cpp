@@ -80,7 +80,7 @@ void summary(const Findings& f, Page& page) {
                      double(f.plan().trajectory.end.step - f.plan().tree.states.steps()[0]) * f.world.dt_s),
          fmt::format("{} frames, step {:.3g} ms", f.frames().size(), 1e3 * f.world.dt_s));
   if (!f.plan().simulation)
-    figure("Search", fmt::format("{:.2f} CPU s", s.cpu_s),
+    figure("Search", s.cpu_s > 0 ? fmt::format("{:.2f} CPU s", s.cpu_s) : "done",
            fmt::format("{} iterations, {} nodes", s.iterations, f.plan().tree.size()));
   figure("Volume change", fmt::format("{:.2f} %", 100 * volume), "at most, of any body");
   figure("Penetration",
@@ -313,7 +313,8 @@ void tables(const Findings& f, Page& page) {
   page.add("<h2>Timings</h2>\n");
   const plan::Statistics& s = f.plan().statistics;
   const bool searched = !f.plan().simulation;
-  if (searched) times.push_back({"search", seconds(s.cpu_s)});
+  const bool known = searched && s.wall_s > 0;  // where timings.json is there
+  if (known) times.push_back({"search", seconds(s.cpu_s)});
   const Json& dynamics = f.planned.summary.value("dynamics", Json::object());
   for (const char* part : {"elastic", "contact", "controls", "integration"})
     if (const auto key = std::string(part) + "_cpu_s"; dynamics.contains(key))
@@ -322,7 +323,7 @@ void tables(const Findings& f, Page& page) {
   if (const Json entries = read_manifest(f.folder); entries.contains("render"))
     times.push_back({"render, last run", seconds(entries.at("render").value("cpu_s", 0.0))});
   page.table({"stage", "CPU s"}, times);
-  if (searched)
+  if (known)
     page.add(
         "<p class=\"note\">Wall time of the search: {:.3f} s. {} rollouts computed for {} iterations.</p>\n",
         s.wall_s, s.rollouts, s.iterations);

@@ -4,12 +4,13 @@
 // without doing everything again (rounds of shortcuts, further searches, the searches of a portfolio that did
 // not win): of those it is checked that they could be so, and that they end in what the path costs now. A key
 // that limber does not write there is a fault as well: so nobody can hide a claim beside those that are
-// checked.
+// checked. What the plan cost is no claim.
 #include <set>
 
 #include "core/error.h"
 #include "limber/detail/verify/plan_checks.h"
 #include "plan/shortcut.h"
+#include "plan/timings.h"
 
 namespace limber::detail {
 
@@ -54,19 +55,17 @@ std::string wrong_of_later(const Json& summary, const plan::Plan& plan, const Js
   bool told = false, now = false;
   if (summary.contains("shortcut")) {
     const Json& s = summary.at("shortcut");
-    if (!has_just(s, {"rounds", "cost", "accepted", "before", "after", "cpu_s", "wall_s"}) ||
+    if (!has_just(s, {"rounds", "cost", "accepted", "before", "after"}) ||
         cost_of(s.at("after"), s.at("cost")) > cost_of(s.at("before"), s.at("cost")))
       return "shortcut";
     told = true, now = now || s.at("after") == costs_now;
   }
   if (summary.contains("improve")) {
     const Json& s = summary.at("improve");
-    if (!has_just(s,
-                  {"cost", "first", "improvements", "searches", "solved", "iterations", "cpu_s", "wall_s"}))
-      return "improve";
+    if (!has_just(s, {"cost", "first", "improvements", "searches", "solved", "iterations"})) return "improve";
     Json last = s.at("first");
     for (const Json& better : s.at("improvements")) {
-      if (!has_just(better, {"wall_s", "iterations", "search", "costs"}) ||
+      if (!has_just(better, {"iterations", "search", "costs"}) ||
           cost_of(better.at("costs"), s.at("cost")) >= cost_of(last, s.at("cost")) ||
           better.at("iterations") > s.at("iterations") || better.at("search") > s.at("searches"))
         return "improve.improvements";
@@ -79,8 +78,7 @@ std::string wrong_of_later(const Json& summary, const plan::Plan& plan, const Js
   if (told && plan.solved() && !now) return summary.contains("improve") ? "improve" : "shortcut.after";
   if (!summary.contains("refine")) return "";
   const Json& s = summary.at("refine");
-  std::set<std::string> keys{"how",         "tracked_s",    "largest_error_m", "iterations", "replay_cpu_s",
-                             "track_cpu_s", "search_cpu_s", "coarse_tets",     "tets"};
+  std::set<std::string> keys{"how", "tracked_s", "largest_error_m", "iterations", "coarse_tets", "tets"};
   if (s.contains("replay_distance_m")) keys.insert("replay_distance_m");  // not told by older limbers
   if (!has_just(s, keys) || s.at("tets") != tets) return "refine";
   const std::string how = s.at("how");
@@ -89,8 +87,9 @@ std::string wrong_of_later(const Json& summary, const plan::Plan& plan, const Js
   // A chain of nodes, each an iteration of no search, before those that came later.
   plan::Statistics none;
   none.iterations = plan.statistics.iterations;
-  none.cpu_s = plan.statistics.cpu_s, none.wall_s = plan.statistics.wall_s;
-  if (plan::json_of(none) != plan::json_of(plan.statistics) || s.at("iterations") != 0) return "refine";
+  if (plan::without_timings(plan::json_of(none)) != plan::without_timings(plan::json_of(plan.statistics)) ||
+      s.at("iterations") != 0)
+    return "refine";
   const std::vector<std::int64_t>& of = plan.tree.iterations;
   for (std::size_t n = 1; n < of.size(); ++n)
     if (of[n] != (std::int64_t(n) <= none.iterations ? std::int64_t(n) - 1 : -1)) return "refine";
@@ -137,26 +136,25 @@ void check_claims(const PlanFolder& planned, const fem::World& world, const FemS
   if (plan.solved() != (plan.ending == plan::Ending::goal) ||
       (plan.ending == plan::Ending::iterations && plan.statistics.iterations < settings.max_iterations))
     wrong = "ending";
-  Json facts = facts_of(plan, world, system, figures);
-  if (!planned.summary.contains("stiffness_shares")) facts.erase("stiffness_shares");  // plans of before
+  const Json told = plan::without_timings(planned.summary);
+  Json facts = plan::without_timings(facts_of(plan, world, system, figures));
+  if (!told.contains("stiffness_shares")) facts.erase("stiffness_shares");  // plans of before
   for (const auto& [key, value] : facts.items())
-    if (const std::string within = first_difference(value, planned.summary.value(key, Json()));
-        !within.empty())
+    if (const std::string within = first_difference(value, told.value(key, Json())); !within.empty())
       wrong = "summary." + key + (within == "." ? "" : "." + within);
-  for (const auto& [key, value] : planned.summary.items())
-    if (!facts.contains(key) && key != "dynamics" && key != "shortcut" && key != "improve" &&
-        key != "refine" && key != "portfolio" && key != "from")
+  for (const auto& [key, value] : told.items())
+    if (!facts.contains(key) && key != "shortcut" && key != "improve" && key != "refine" &&
+        key != "portfolio" && key != "from")
       wrong = "summary." + key;
-  if (planned.summary.contains("portfolio") && !is_quickest(plan, planned.summary.at("portfolio")))
-    wrong = "summary.portfolio";
+  if (told.contains("portfolio") && !is_quickest(plan, told.at("portfolio"))) wrong = "summary.portfolio";
   std::vector<Control> controls = plan.trajectory.controls;
   if (plan.trajectory.settle_steps > 0) controls.pop_back();
   std::int64_t tets = 0;
   for (const fem::Body& body : world.bodies) tets += body.cage.tets.rows();
-  const bool came_later = planned.summary.contains("shortcut") || planned.summary.contains("improve");
+  const bool came_later = told.contains("shortcut") || told.contains("improve");
   const Json costs = came_later ? plan::json_of(plan::path_of(system, settings, controls).costs) : Json();
   try {
-    const std::string later = wrong_of_later(planned.summary, plan, costs, tets);
+    const std::string later = wrong_of_later(told, plan, costs, tets);
     if (!later.empty()) wrong = "summary." + later;
   } catch (const Json::exception& error) {
     wrong = fmt::format("its summary ({})", error.what());

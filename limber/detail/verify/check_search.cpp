@@ -75,9 +75,6 @@ plan::Plan searched_again(const FemSystem& system, plan::Settings settings, cons
 // The search once more, as far as the plan's went. What came after it, shortcuts and better paths, hangs on
 // its tree as nodes of no iteration. A plan that `refine` carried over comes from no search in this world: of
 // it only the start is compared, and every node is replayed.
-//
-// Of the counts, how many rollouts were computed in vain depends on the threads of then; with a lag there are
-// none.
 void check_search(const PlanFolder& planned, const FemSystem& system, const plan::Settings& settings,
                   Promises& table) {
   const plan::Plan& plan = planned.plan;
@@ -96,9 +93,7 @@ void check_search(const PlanFolder& planned, const FemSystem& system, const plan
     const plan::Statistics &now = found.statistics, &then = plan.statistics;
     const bool counted = now.iterations == then.iterations && now.diverged == then.diverged &&
                          now.rejected == then.rejected && now.refused == then.refused &&
-                         now.rollout_steps == then.rollout_steps && then.rollouts >= then.iterations &&
-                         then.rollouts_wrong <= then.rollouts &&
-                         (settings.search_options.lag == 0 || then.rollouts_wrong == 0);
+                         now.rollout_steps == then.rollout_steps;
     searched = found.tree.size();  // none where it went astray
     const bool later = planned.summary.contains("shortcut") || planned.summary.contains("improve");
     same = searched > 0 && searched <= tree.size() && same_nodes(found.tree, tree, searched) &&

@@ -60,11 +60,12 @@ void check_following(const fs::path& folder, const PlanFolder& planned, const fe
 // where these are read.
 void check_claims_of_simulation(const PlanFolder& planned, const fem::World& world, const FemSystem& system,
                                 const MotionFigures& figures, Promises& table) {
+  const Json told = kept_summary(planned);
   Json facts = facts_of(planned.plan, world, system, figures);
-  if (!planned.summary.contains("stiffness_shares")) facts.erase("stiffness_shares");  // of before
+  if (!told.contains("stiffness_shares")) facts.erase("stiffness_shares");  // of before
   for (const char* key : {"from", "follows"})
-    if (planned.summary.contains(key)) facts[key] = planned.summary.at(key);
-  const std::string other = first_difference(facts, planned.summary);
+    if (told.contains(key)) facts[key] = told.at(key);
+  const std::string other = first_difference(facts, told);
   table.row("what the simulation tells of itself is so", other.empty(),
             other.empty() ? "" : "summary." + other + " is not");
 }

@@ -103,9 +103,9 @@ void check_forces(const plan::Plan& plan, const plan::Settings& settings, const 
 void check_plan(const fs::path& folder, const PlanFolder& planned, const std::vector<PreparedBody>& bodies,
                 const fem::World& world, MotionFigures& figures, Promises& table) {
   const plan::Plan& plan = planned.plan;
-  table.row("one hash stands over all of plan.npz", planned.sealed,
-            planned.sealed ? "" : "it is of an older limber, and has none; plan anew");
-  const std::string odd = planned.sealed ? odd_entry(folder, planned, bodies) : "";
+  table.row("one hash stands over all of plan.npz", planned.sealed(),
+            planned.sealed() ? "" : "it is of an older limber, and has none; plan anew");
+  const std::string odd = planned.sealed() ? odd_entry(folder, planned, bodies) : "";
   table.row("plan.npz holds what limber writes, and no more", odd.empty(),
             odd.empty() ? "" : odd + " is not as limber writes it");
   if (plan.simulation) return check_simulation(folder, planned, bodies, world, figures, table);
@@ -139,7 +139,7 @@ void check_pictures(const fs::path& folder, const PlanFolder& planned, const fem
                     const MotionFigures& figures, Promises& table) {
   const Json manifest = read_manifest(folder);
   const Json entry = manifest.value("plan", Json());
-  const std::string other = first_difference(planned.summary, entry);
+  const std::string other = first_difference(kept_summary(planned), entry);
   const std::string what = planned.plan.simulation ? "simulation" : "plan";
   table.row("manifest.json tells of this " + what, other.empty(),
             other.empty() ? "" : (other == "." ? "plan" : "plan." + other) + " is another's");
