@@ -9,6 +9,7 @@
 #include "limber/detail/authoring/scene_check.h"
 #include "limber/detail/batch/prepare_many.h"
 #include "limber/detail/bench/bench.h"
+#include "limber/detail/body/export.h"
 #include "limber/detail/exit_codes.h"
 #include "limber/detail/exports/export_motion.h"
 #include "limber/detail/farm/farm_folder.h"
@@ -44,6 +45,7 @@ Outcome render(const detail::RenderOptions&);
 // plan and render; what is up to date is skipped.
 Outcome run(const detail::PlanOptions&, const detail::RenderOptions&);
 Outcome export_motion(const detail::ExportOptions&);
+Outcome export_body(const detail::BodyExportOptions&);
 
 Outcome verify(const detail::VerifyOptions&);
 Outcome robust(const detail::RobustOptions&);

@@ -51,6 +51,7 @@ struct DescribedCommands {
   bool still = false, watch = false;
   detail::StillOptions still_options;
   detail::ExportOptions export_options;
+  double export_density_kg_m3 = detail::BodyExportOptions{}.density_kg_m3;
   detail::BenchOptions bench_options;
   detail::FarmOptions farm_options;
   detail::WorkOptions work_options;

@@ -1,6 +1,6 @@
 #include "limber/detail/exports/export_motion.h"
 
-#include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include "cli/commands.h"
 
@@ -15,6 +15,13 @@ Outcome export_motion(const detail::ExportOptions& options) {
                         written.files > 1 ? fmt::format("{} files, ", written.files) : "",
                         1e-6 * double(written.bytes));
   return {exit_done, json_of(exported), text};
+}
+
+Outcome export_body(const detail::BodyExportOptions& options) {
+  const detail::ExportedBody exported = detail::export_body_folder(options);
+  return {exit_done,
+          {{"folder", exported.folder.string()}, {"files", exported.files}},
+          fmt::format("{}: {}\n", exported.folder.string(), fmt::join(exported.files, ", "))};
 }
 
 }  // namespace limber::cli

@@ -4,6 +4,7 @@
 // command_options.h. run writes into the same structs as plan and render: only one command is ever given.
 #include <CLI/CLI.hpp>
 
+#include <algorithm>
 #include <map>
 
 #include "cli/described_commands.h"
@@ -216,27 +217,58 @@ void DescribedCommands::add_motion_commands() {
   });
 
   CLI::App& export_command =
-      *program.add_subcommand("export", "path → files for viewers, Blender, USD programs and ParaView");
-  export_command.add_option("DIR", export_options.folder, "work folder with a plan")->required();
+      *program.add_subcommand("export", "path, or body → files for viewers, simulators and ParaView");
+  export_command.add_option("DIR", export_options.folder, "work folder with a plan, or a body's folder")
+      ->required();
+  std::vector<std::string> formats = detail::motion_formats;
+  for (const std::string& of_a_body : detail::export_formats)
+    if (std::find(formats.begin(), formats.end(), of_a_body) == formats.end()) formats.push_back(of_a_body);
   export_command
       .add_option(
           "--format", export_options.formats,
-          "any of gltf (motion.glb), pc2 (pc2/: OBJ and point caches for Blender), usd (motion.usda), "
-          "vtu (vtu/: cages and surfaces for ParaView)")
+          "of a plan any of gltf (motion.glb), pc2 (pc2/: OBJ and point caches for Blender), usd "
+          "(motion.usda), vtu (vtu/: cages and surfaces for ParaView); of a body those of prepare --export, "
+          "and msh")
       ->required()
       ->type_name("FORMAT[,FORMAT…]")
       ->delimiter(',')
-      ->check(CLI::IsMember(detail::motion_formats))
+      ->check(CLI::IsMember(formats))
       ->allow_extra_args(false);
   export_command
-      .add_option("-o,--out", export_options.out, "folder for them; default: export in the work folder")
+      .add_option("-o,--out", export_options.out,
+                  "folder for them; default: export in the work folder, or the body's folder itself")
       ->type_name("DIR");
   export_command
       .add_option("--frames", export_options.frames,
                   "frames to export: 0-300:2; beyond the last is left out with a warning; default: all")
       ->check(no_empty_list());
+  CLI::Option* density_option =
+      export_command
+          .add_option("--density", export_density_kg_m3, "kg/m³, of the masses in a body's files; 1e-6 … 1e6")
+          ->check(within(1e-6, 1e6))
+          ->capture_default_str();
   add_global(export_command, global);
-  export_command.callback([&] { chosen = [&] { return cli::export_motion(export_options); }; });
+  export_command.callback([&, density_option] {
+    chosen = [&, density_option] {
+      const fs::path& folder = export_options.folder;
+      const bool of_body = fs::exists(folder / "report.json") && !fs::exists(folder / "plan.npz");
+      const auto refuse = [&](const std::string& what) {
+        throw InputError(fmt::format("{} is of {}, and {} holds {}", what, of_body ? "motions" : "bodies",
+                                     folder.string(),
+                                     of_body ? "a body; its formats are those of limber prepare --export"
+                                             : "no body by itself; the formats of motions are gltf, pc2, "
+                                               "usd, vtu"));
+      };
+      const std::vector<std::string>& formats = of_body ? detail::export_formats : detail::motion_formats;
+      for (const std::string& format : export_options.formats)
+        if (std::find(formats.begin(), formats.end(), format) == formats.end())
+          refuse("the format " + format);
+      if (of_body && !export_options.frames.empty()) refuse("--frames");
+      if (!of_body && density_option->count() > 0) refuse("--density");
+      if (!of_body) return cli::export_motion(export_options);
+      return cli::export_body({folder, export_options.formats, export_options.out, export_density_kg_m3});
+    };
+  });
 
   CLI::App& run_command =
       *program.add_subcommand("run", "all of it: prepare, plan, render; what is up to date is skipped");

@@ -83,7 +83,7 @@ void DescribedCommands::add_prepare_command() {
           "surface.obj), vtk (Drake, Bullet: cage.vtk), inp (Abaqus: cage.inp), urdf, sdf, mjcf (one OBJ a "
           "shell in hulls, mass.json, and body.urdf, body.sdf, or MuJoCo's body.xml and flex.xml), usd "
           "(body.usda: the cage as a soft TetMesh), usd-omni (the same by the names of Omni Physics), sofa "
-          "(body.scn)")
+          "(body.scn); with -interior behind it of a cage without tets that have all nodes on the boundary")
       ->type_name("FORMAT[,FORMAT…]")
       ->delimiter(',')
       ->check(CLI::IsMember(detail::export_formats))

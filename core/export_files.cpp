@@ -201,12 +201,24 @@ void write_legacy_vtk(const fs::path& path, const TetMesh& mesh) {
   write_file(path, text);
 }
 
+namespace {
+
+// A number in a field of 20 characters, of which Abaqus and CalculiX read no more: what is longer loses
+// digits.
+std::string in_a_field(double value) {
+  std::string text = fmt::format("{}", value);
+  for (int digits = 17; text.size() > 20; --digits) text = fmt::format("{:.{}g}", value, digits);
+  return text;
+}
+
+}  // namespace
+
 void write_inp(const fs::path& path, const TetMesh& mesh, const std::vector<int>& label) {
   check_label(mesh, label);
   std::string text = "*HEADING\nlimber cage\n*NODE\n";
   for (Eigen::Index v = 0; v < mesh.positions.rows(); ++v)
-    fmt::format_to(std::back_inserter(text), "{}, {}, {}, {}\n", v + 1, mesh.positions(v, 0),
-                   mesh.positions(v, 1), mesh.positions(v, 2));
+    fmt::format_to(std::back_inserter(text), "{}, {}, {}, {}\n", v + 1, in_a_field(mesh.positions(v, 0)),
+                   in_a_field(mesh.positions(v, 1)), in_a_field(mesh.positions(v, 2)));
   text += "*ELEMENT, TYPE=C3D4, ELSET=ALL\n";
   for (Eigen::Index t = 0; t < mesh.tets.rows(); ++t)
     fmt::format_to(std::back_inserter(text), "{}, {}, {}, {}, {}\n", t + 1, mesh.tets(t, 0) + 1,

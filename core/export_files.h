@@ -1,6 +1,6 @@
 // Mesh files for other programs. limber writes them and never reads them; in those of text each number
-// has the digits that bring back the same double. Which program reads what: docs/files.md. Each throws
-// DiskError (core/file.h).
+// has the digits that bring back the same double (but in .inp, where it has 20 characters). Which program
+// reads what: docs/files.md. Each throws DiskError (core/file.h).
 #pragma once
 
 #include <string>

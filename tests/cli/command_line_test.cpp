@@ -4,7 +4,11 @@
 #include <sys/resource.h>
 #include <sys/wait.h>
 
+#include <fmt/ranges.h>
+
+#include <Eigen/Core>
 #include <algorithm>
+#include <array>
 #include <cstdlib>
 #include <fstream>
 #include <numeric>
@@ -15,6 +19,7 @@
 #include "core/mesh_files.h"
 #include "core/progress.h"
 #include "limber/detail/body/body.h"
+#include "limber/detail/body/export.h"
 #include "limber/detail/body/preview.h"
 #include "limber/detail/exit_codes.h"
 #include "render/png_file.h"
@@ -400,16 +405,24 @@ TEST_F(Program_slow, ExportsAreWrittenAlsoOfABodyThatIsUpToDateAndGoWithIt) {
   const std::string model = (folder / "tetrahedron.obj").string();
   std::ofstream(model) << "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n";
   ASSERT_EQ(limber_program({"prepare", model, "-o", out(), "--tets", "100"}).code, exit_done);
+  const std::string formats = fmt::format("{}", fmt::join(export_formats, ","));
   const Result exported = limber_program(
-      {"prepare", model, "-o", out(), "--tets", "100", "--export",
-       "vtu,node,interp,vtk,vtk-interior,inp,urdf,sdf,mjcf,usd,usd-omni,sofa", "--density", "500", "--json"});
+      {"prepare", model, "-o", out(), "--tets", "100", "--export", formats, "--density", "500", "--json"});
   ASSERT_EQ(exported.code, exit_done) << exported.err;
   EXPECT_NE(exported.err.find("up to date"), std::string::npos) << exported.err;
   const Json files = exported.json().at("also_written");
-  EXPECT_EQ(files.size(), 19);  // one of them the only hull
+  EXPECT_EQ(files.size(), 28);  // one of them the only hull
   const Json mass = Json::parse(read_file(fs::path(out()) / "mass.json"));
   EXPECT_NEAR(mass.at("whole").at("mass_kg").get<double>(), 500. / 6, 1e-9);
   for (const Json& name : files) EXPECT_TRUE(fs::exists(fs::path(out()) / name)) << name;
+
+  // Of the body alone, elsewhere: the same files, and the cage with them.
+  const Result elsewhere = limber_program(
+      {"export", out(), "--format", formats, "-o", out("elsewhere"), "--density", "500", "--json"});
+  ASSERT_EQ(elsewhere.code, exit_done) << elsewhere.err;
+  EXPECT_EQ(elsewhere.json().at("files").size(), files.size() + 1);
+  for (const auto& [name, bytes] : contents(out("elsewhere")))
+    EXPECT_EQ(bytes, read_file(fs::path(out()) / name)) << name;
 
   const std::string command = std::string(limber_source_dir) + "/tools/check_exports '" + out() + "'";
   const int status = std::system(command.c_str());
@@ -423,6 +436,95 @@ TEST_F(Program_slow, ExportsAreWrittenAlsoOfABodyThatIsUpToDateAndGoWithIt) {
   EXPECT_EQ(limber_program({"prepare", model, "-o", out(), "--export", "stl"}).code, exit_bad_input);
   if (WEXITSTATUS(status) == 77) GTEST_SKIP() << "no other program's reader is installed: see " << command;
   EXPECT_EQ(WEXITSTATUS(status), 0);
+}
+
+// Two boxes apart: masses, centres and moments of each and of both are those of the book, by Steiner's
+// theorem. Shells stand off by a millionth.
+TEST_F(Program_slow, MassesOfHullsAndOfTheWholeAreThoseOfTheBook) {
+  struct Brick {
+    Vec3 lower, upper;
+    double mass() const { return 500 * (upper - lower).prod(); }
+    Vec3 center() const { return (lower + upper) / 2; }
+    Eigen::Matrix3d inertia() const {
+      const Vec3 square = (upper - lower).cwiseAbs2();
+      return (mass() / 12 * (Vec3::Constant(square.sum()) - square)).asDiagonal();
+    }
+  };
+  const std::array bricks{Brick{{0, 0, 0}, {1, 2, 3}}, Brick{{2, 0, 0.5}, {2.5, 1, 1.5}}};
+  const std::string model = (folder / "bricks.obj").string();
+  {
+    std::ofstream file(model);
+    for (const Brick& b : bricks)
+      for (int corner = 0; corner < 8; ++corner)
+        file << fmt::format("v {} {} {}\n", (corner & 1 ? b.upper : b.lower).x(),
+                            (corner & 2 ? b.upper : b.lower).y(), (corner & 4 ? b.upper : b.lower).z());
+    for (const int first : {1, 9})
+      for (const auto& [a, b, c, d] :
+           {std::array{0, 2, 3, 1}, {4, 5, 7, 6}, {0, 1, 5, 4}, {2, 6, 7, 3}, {0, 4, 6, 2}, {1, 3, 7, 5}})
+        file << fmt::format("f {} {} {} {}\n", first + a, first + b, first + c, first + d);
+  }
+  ASSERT_EQ(limber_program({"prepare", model, "-o", out(), "--tets", "100", "--shells", "2", "--export",
+                            "mjcf,urdf", "--density", "500"})
+                .code,
+            exit_done);
+  const Json told = Json::parse(read_file(fs::path(out()) / "mass.json"));
+  const auto expect = [](const Json& one, double mass, const Vec3& center, const Eigen::Matrix3d& inertia,
+                         double to) {
+    EXPECT_NEAR(one.at("mass_kg").get<double>(), mass, to * mass);
+    for (std::size_t i = 0; i < 3; ++i) {
+      EXPECT_NEAR(one.at("center_m").at(i).get<double>(), center[Eigen::Index(i)], to);
+      for (std::size_t j = 0; j < 3; ++j)
+        EXPECT_NEAR(one.at("inertia_kg_m2").at(i).at(j).get<double>(),
+                    inertia(Eigen::Index(i), Eigen::Index(j)), to * mass)
+            << i << j;
+    }
+  };
+  const Json& hulls = told.at("hulls");
+  ASSERT_EQ(hulls.size(), 2);
+  const bool swapped = hulls.at(0).at("mass_kg") < hulls.at(1).at("mass_kg");
+  Eigen::Matrix3d inertia = Eigen::Matrix3d::Zero();
+  const double mass = bricks[0].mass() + bricks[1].mass();
+  const Vec3 center = (bricks[0].mass() * bricks[0].center() + bricks[1].mass() * bricks[1].center()) / mass;
+  for (std::size_t b = 0; b < 2; ++b) {
+    expect(hulls.at(swapped ? 1 - b : b), bricks[b].mass(), bricks[b].center(), bricks[b].inertia(), 1e-4);
+    const Vec3 way = bricks[b].center() - center;
+    inertia += bricks[b].inertia() +
+               bricks[b].mass() * (way.squaredNorm() * Eigen::Matrix3d::Identity() - way * way.transpose());
+  }
+  expect(told.at("whole"), mass, center, inertia, 1e-9);
+  const std::string xml = read_file(fs::path(out()) / "body.xml");
+  for (std::size_t hull = 0; hull < 2; ++hull)
+    EXPECT_NE(xml.find(fmt::format("mesh=\"hull_00{}\" group=\"3\" mass=\"{}\"", hull,
+                                   hulls.at(hull).at("mass_kg").get<double>())),
+              std::string::npos)
+        << xml;
+}
+
+TEST_F(Program_slow, ExportsOfABodyAskForABody) {
+  const std::string model = (folder / "tetrahedron.obj").string();
+  std::ofstream(model) << "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n";
+  for (const char* name : {"one", "two"})
+    ASSERT_EQ(limber_program({"prepare", model, "-o", out(name), "--tets", "100"}).code, exit_done);
+  fs::create_directory(out("empty"));
+  const auto expect_refused = [&](std::vector<std::string> words, const std::string& why) {
+    words.insert(words.begin(), "export");
+    const Result result = limber_program(words);
+    EXPECT_EQ(result.code, exit_bad_input) << why;
+    EXPECT_NE(result.err.find(why), std::string::npos) << result.err;
+  };
+  const auto before = contents(folder.path());
+  expect_refused({out("one"), "--format", "gltf"}, "the format gltf is of motions");
+  expect_refused({out("one"), "--format", "vtk", "--frames", "0"}, "--frames is of motions");
+  expect_refused({out("empty"), "--format", "vtk"}, "the format vtk is of bodies");
+  expect_refused({out("empty"), "--format", "vtu", "--density", "1"}, "--density is of bodies");
+  expect_refused({out("one"), "--format", "msh", "-o", out("two")}, "the folder of another body");
+  EXPECT_EQ(contents(folder.path()), before);
+  const Result beside = limber_program({"export", out("one"), "--format", "vtk,msh", "--json"});
+  EXPECT_EQ(beside.code, exit_done) << beside.err;
+  EXPECT_EQ(beside.json().at("files"), Json::array({"cage.vtk"}));  // the cage is there already
+  EXPECT_TRUE(fs::exists(fs::path(out("one")) / "cage.vtk"));
+  fs::remove(fs::path(out("one")) / "cage.msh");
+  expect_refused({out("one"), "--format", "vtk"}, "cage.msh");
 }
 
 TEST_F(Program_slow, PreviewPaintsTheSamePicturesEachTime) {

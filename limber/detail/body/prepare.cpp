@@ -106,7 +106,7 @@ PreparedModel prepare(const PrepareOptions& options, const fs::path& file) {
   if (!options.exports.empty() || options.preview) {
     const PreparedBody body = read_body(options.out);
     const std::vector<std::string> exported =
-        export_body(body, options.exports, options.density_kg_m3, options.out);
+        export_body(body, options.exports, options.density_kg_m3, options.out, options.out);
     written.insert(written.end(), exported.begin(), exported.end());
     if (options.preview) {
       write_previews(body, read_obj_shells(options.out / "shells.obj"), options.out);

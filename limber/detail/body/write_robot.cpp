@@ -44,6 +44,12 @@ BodyMass mass_of(const PreparedBody& body) {
   return {mass_properties(body.cage), false};
 }
 
+std::vector<MassProperties> mass_of_each(const std::vector<ConvexShell>& shells) {
+  std::vector<MassProperties> masses;
+  for (const ConvexShell& shell : shells) masses.push_back(mass_properties(shell.vertices, shell.triangles));
+  return masses;
+}
+
 std::vector<std::string> write_hulls(const PreparedBody& body, const BodyMass& whole,
                                      const std::vector<ConvexShell>& shells, double density,
                                      const fs::path& folder) {
@@ -55,7 +61,7 @@ std::vector<std::string> write_hulls(const PreparedBody& body, const BodyMass& w
   for (const ConvexShell& shell : shells) {
     const std::string file = hull_file(int(written.size()) - 1);
     write_obj(folder / file, SurfaceMesh{shell.vertices, shell.triangles});
-    Json hull = json_of(mass_properties(shell.vertices, shell.triangles), density);
+    Json hull = json_of(whole.hulls[written.size() - 1], density);
     hull["file"] = file;
     json["hulls"].push_back(hull);
     written.push_back(file);
@@ -64,8 +70,7 @@ std::vector<std::string> write_hulls(const PreparedBody& body, const BodyMass& w
   return written;
 }
 
-void write_urdf(const fs::path& path, const PreparedBody& body, const BodyMass& whole, int hulls,
-                double density) {
+void write_urdf(const fs::path& path, const PreparedBody& body, const BodyMass& whole, double density) {
   const MassProperties& m = whole.of;
   const Eigen::Matrix3d i = density * m.inertia_m5;
   std::string xml = fmt::format(
@@ -76,14 +81,13 @@ void write_urdf(const fs::path& path, const PreparedBody& body, const BodyMass& 
       "filename=\"surface.obj\"/></geometry>\n</visual>\n",
       name_of(body), text_of(m.center_m), density * m.volume_m3, i(0, 0), i(0, 1), i(0, 2), i(1, 1), i(1, 2),
       i(2, 2));
-  for (int hull = 0; hull < hulls; ++hull)
+  for (int hull = 0; hull < int(whole.hulls.size()); ++hull)
     xml += fmt::format("<collision>\n<geometry><mesh filename=\"{}\"/></geometry>\n</collision>\n",
                        hull_file(hull));
   write_file(path, xml + "</link>\n</robot>\n");
 }
 
-void write_sdf(const fs::path& path, const PreparedBody& body, const BodyMass& whole, int hulls,
-               double density) {
+void write_sdf(const fs::path& path, const PreparedBody& body, const BodyMass& whole, double density) {
   const MassProperties& m = whole.of;
   const Eigen::Matrix3d i = density * m.inertia_m5;
   std::string xml = fmt::format(
@@ -94,15 +98,14 @@ void write_sdf(const fs::path& path, const PreparedBody& body, const BodyMass& w
       "<geometry><mesh><uri>surface.obj</uri></mesh></geometry>\n</visual>\n",
       name_of(body), text_of(m.center_m), density * m.volume_m3, i(0, 0), i(0, 1), i(0, 2), i(1, 1), i(1, 2),
       i(2, 2));
-  for (int hull = 0; hull < hulls; ++hull)
+  for (int hull = 0; hull < int(whole.hulls.size()); ++hull)
     xml += fmt::format(
         "<collision name=\"hull_{:03}\">\n<geometry><mesh><uri>{}</uri></mesh></geometry>\n</collision>\n",
         hull, hull_file(hull));
   write_file(path, xml + "</link>\n</model>\n</sdf>\n");
 }
 
-void write_mjcf(const fs::path& path, const PreparedBody& body, const BodyMass& whole, int hulls,
-                double density) {
+void write_mjcf(const fs::path& path, const PreparedBody& body, const BodyMass& whole, double density) {
   const MassProperties& m = whole.of;
   const Eigen::Matrix3d i = density * m.inertia_m5;
   // What is seen need not be closed, nor weigh anything.
@@ -110,16 +113,19 @@ void write_mjcf(const fs::path& path, const PreparedBody& body, const BodyMass& 
       assets = "<mesh name=\"surface\" file=\"surface.obj\" inertia=\"shell\"/>\n",
       geoms =
           "<geom type=\"mesh\" mesh=\"surface\" contype=\"0\" conaffinity=\"0\" group=\"2\" mass=\"0\"/>\n";
-  for (int hull = 0; hull < hulls; ++hull) {
+  for (int hull = 0; hull < int(whole.hulls.size()); ++hull) {
     assets += fmt::format("<mesh name=\"hull_{:03}\" file=\"{}\"/>\n", hull, hull_file(hull));
-    geoms += fmt::format("<geom type=\"mesh\" mesh=\"hull_{:03}\" group=\"3\"/>\n", hull);
+    geoms += fmt::format("<geom type=\"mesh\" mesh=\"hull_{:03}\" group=\"3\" mass=\"{}\"/>\n", hull,
+                         density * whole.hulls[std::size_t(hull)].volume_m3);
   }
-  write_file(path,
-             fmt::format("<mujoco model=\"{0}\">\n<asset>\n{1}</asset>\n<worldbody>\n<body name=\"{0}\">\n"
-                         "<freejoint/>\n<inertial pos=\"{2}\" mass=\"{3}\" fullinertia=\"{4} {5} {6} {7} "
-                         "{8} {9}\"/>\n{10}</body>\n</worldbody>\n</mujoco>\n",
-                         name_of(body), assets, text_of(m.center_m), density * m.volume_m3, i(0, 0), i(1, 1),
-                         i(2, 2), i(0, 1), i(0, 2), i(1, 2), geoms));
+  write_file(
+      path, fmt::format("<mujoco model=\"{0}\">\n<!-- What the body weighs stands in inertial. The mass of a "
+                        "hull is that of the hull by itself, and hulls overlap. "
+                        "-->\n<asset>\n{1}</asset>\n<worldbody>\n<body name=\"{0}\">\n"
+                        "<freejoint/>\n<inertial pos=\"{2}\" mass=\"{3}\" fullinertia=\"{4} {5} {6} {7} "
+                        "{8} {9}\"/>\n{10}</body>\n</worldbody>\n</mujoco>\n",
+                        name_of(body), assets, text_of(m.center_m), density * m.volume_m3, i(0, 0), i(1, 1),
+                        i(2, 2), i(0, 1), i(0, 2), i(1, 2), geoms));
 }
 
 void write_mjcf_flex(const fs::path& path, const PreparedBody& body, const BodyMass& whole, double density) {

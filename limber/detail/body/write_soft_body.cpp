@@ -82,7 +82,8 @@ void write_usd_body(const fs::path& path, const PreparedBody& body, const BodyMa
   write_file(path, usda);
 }
 
-void write_sofa_scene(const fs::path& path, const BodyMass& whole, double density) {
+void write_sofa_scene(const fs::path& path, const std::string& cage_file, const BodyMass& whole,
+                      double density) {
   std::string plugins;
   for (const char* name :
        {"Sofa.Component.IO.Mesh", "Sofa.Component.LinearSolver.Iterative", "Sofa.Component.Mapping.Linear",
@@ -91,19 +92,20 @@ void write_sofa_scene(const fs::path& path, const BodyMass& whole, double densit
         "Sofa.Component.Topology.Container.Dynamic", "Sofa.GL.Component.Rendering3D"})
     plugins += fmt::format("  <RequiredPlugin name=\"{}\"/>\n", name);
   write_file(
-      path, fmt::format(
-                "<?xml version=\"1.0\"?>\n<!-- No material is known here: set youngModulus and poissonRatio. "
-                "-->\n<Node name=\"root\" dt=\"0.01\" gravity=\"0 0 -9.81\">\n{0}  <DefaultAnimationLoop/>\n"
-                "  <Node name=\"body\">\n    <EulerImplicitSolver rayleighMass=\"0.1\" "
-                "rayleighStiffness=\"0.1\"/>\n    <CGLinearSolver iterations=\"100\" tolerance=\"1e-9\" "
-                "threshold=\"1e-9\"/>\n    <MeshVTKLoader name=\"loader\" filename=\"cage.vtk\"/>\n"
-                "    <TetrahedronSetTopologyContainer src=\"@loader\"/>\n    <MechanicalObject/>\n"
-                "    <UniformMass totalMass=\"{1}\"/>\n    <TetrahedronFEMForceField youngModulus=\"{2}\" "
-                "poissonRatio=\"{3}\" method=\"large\"/>\n    <Node name=\"surface\">\n"
-                "      <MeshOBJLoader name=\"loader\" filename=\"surface.obj\"/>\n"
-                "      <OglModel src=\"@loader\"/>\n      <BarycentricMapping/>\n    </Node>\n  </Node>\n"
-                "</Node>\n",
-                plugins, density * whole.of.volume_m3, soft_youngs_modulus_pa, soft_poissons_ratio));
+      path,
+      fmt::format(
+          "<?xml version=\"1.0\"?>\n<!-- No material is known here: set youngModulus and poissonRatio. "
+          "-->\n<Node name=\"root\" dt=\"0.01\" gravity=\"0 0 -9.81\">\n{0}  <DefaultAnimationLoop/>\n"
+          "  <Node name=\"body\">\n    <EulerImplicitSolver rayleighMass=\"0.1\" "
+          "rayleighStiffness=\"0.1\"/>\n    <CGLinearSolver iterations=\"100\" tolerance=\"1e-9\" "
+          "threshold=\"1e-9\"/>\n    <MeshVTKLoader name=\"loader\" filename=\"{4}\"/>\n"
+          "    <TetrahedronSetTopologyContainer src=\"@loader\"/>\n    <MechanicalObject/>\n"
+          "    <UniformMass totalMass=\"{1}\"/>\n    <TetrahedronFEMForceField youngModulus=\"{2}\" "
+          "poissonRatio=\"{3}\" method=\"large\"/>\n    <Node name=\"surface\">\n"
+          "      <MeshOBJLoader name=\"loader\" filename=\"surface.obj\"/>\n"
+          "      <OglModel src=\"@loader\"/>\n      <BarycentricMapping/>\n    </Node>\n  </Node>\n"
+          "</Node>\n",
+          plugins, density * whole.of.volume_m3, soft_youngs_modulus_pa, soft_poissons_ratio, cage_file));
 }
 
 }  // namespace limber::detail

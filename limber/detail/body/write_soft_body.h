@@ -15,7 +15,7 @@ enum class UsdNames { physics, omniphysics };
 // USDA: a TetMesh and the surface, each with its bind pose, and a material.
 void write_usd_body(const fs::path&, const PreparedBody&, const BodyMass&, double density_kg_m3, UsdNames);
 
-// A scene of SOFA's for cage.vtk and surface.obj beside it, which falls by its weight.
-void write_sofa_scene(const fs::path&, const BodyMass&, double density_kg_m3);
+// A scene of SOFA's for a legacy .vtk of the cage and surface.obj beside it, which falls by its weight.
+void write_sofa_scene(const fs::path&, const std::string& cage_file, const BodyMass&, double density_kg_m3);
 
 }  // namespace limber::detail
