@@ -5,6 +5,7 @@
 
 #include "core/error.h"
 #include "render/detail/lettering.h"
+#include "render/label_places.h"
 #include "render/plot.h"
 
 namespace limber::render {
@@ -127,6 +128,61 @@ void draw_caption(Image8& image, const std::string& line, const std::string& sma
   };
   put(small_line, at.small_baseline, at.small_px, Weight::regular);
   put(line, at.baseline, at.large_px, Weight::semibold);
+}
+
+namespace {
+
+void mix_in(Image8& image, int x, int y, const Vec3& color_srgb, double cover) {
+  if (x < 0 || x >= image.width || y < 0 || y >= image.height || cover <= 0) return;
+  std::uint8_t* p = &image.rgb[3 * (std::size_t(y) * image.width + std::size_t(x))];
+  for (int c = 0; c < 3; ++c) p[c] = std::uint8_t(std::lround(p[c] + cover * (255 * color_srgb[c] - p[c])));
+}
+
+// With round ends; along the axis in which it is longer, a few pixels across at each.
+void stroke(Image8& image, const Eigen::Vector2d& from, const Eigen::Vector2d& to, double width_px,
+            const Vec3& color_srgb, double opacity) {
+  const Eigen::Vector2d way = to - from;
+  const int along = std::abs(way.x()) >= std::abs(way.y()) ? 0 : 1;
+  const double radius = 0.5 * width_px, reach = radius + 1, length2 = std::max(way.squaredNorm(), 1e-12),
+               slope = way[along] != 0 ? way[1 - along] / way[along] : 0;
+  const int size = along == 0 ? image.width : image.height;
+  const int first = int(std::max(0.0, std::floor(std::min(from[along], to[along]) - reach))),
+            last = int(std::min(size - 1.0, std::ceil(std::max(from[along], to[along]) + reach)));
+  for (int i = first; i <= last; ++i) {
+    const double inside =
+        std::clamp(i + 0.5, std::min(from[along], to[along]), std::max(from[along], to[along]));
+    const double middle = from[1 - along] + slope * (inside - from[along]), half = 1.5 * reach;
+    for (int k = int(std::floor(middle - half)); k <= int(std::ceil(middle + half)); ++k) {
+      const Eigen::Vector2d p =
+          along == 0 ? Eigen::Vector2d(i + 0.5, k + 0.5) : Eigen::Vector2d(k + 0.5, i + 0.5);
+      const double share = std::clamp((p - from).dot(way) / length2, 0.0, 1.0);
+      const double distance = (p - from - share * way).norm();
+      mix_in(image, int(std::floor(p.x())), int(std::floor(p.y())), color_srgb,
+             opacity * std::clamp(radius + 0.5 - distance, 0.0, 1.0));
+    }
+  }
+}
+
+constexpr Weight label_weight = Weight::semibold;
+
+}  // namespace
+
+double width_of_words(const std::string& words, double letter_px) {
+  return text_width(words, letter_px, label_weight);
+}
+
+void draw_label(Image8& image, const std::string& words, const LabelPlace& place, const Eigen::Vector2d& end,
+                double letter_px, bool on_dark, double share) {
+  const Vec3 color = on_dark ? white : ink, rim = on_dark ? ink : white;
+  const double line = std::max(1.0, 0.11 * letter_px), dot = 0.36 * letter_px,
+               edge = std::max(1.0, 0.09 * letter_px);
+  stroke(image, place.foot, end, line + 2 * edge, rim, 0.7 * share);
+  stroke(image, end, end, dot + 2 * edge, rim, share);
+  stroke(image, place.foot, end, line, color, share);
+  stroke(image, end, end, dot, color, share);
+  detail::TextLook look = on_picture(letter_px, label_weight, on_dark);
+  look.opacity = share;
+  detail::draw_text(image, words, place.left_px, place.baseline_px, look);
 }
 
 void draw_scale_bar(Image8& image, const std::string& words, double length_px, const CaptionLook& look) {

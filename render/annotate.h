@@ -38,6 +38,12 @@ void draw_caption(Image8&, const std::string& line, const std::string& small_lin
 Eigen::Vector4d place_of_caption(int width, int height, const std::string& line,
                                  const std::string& small_line, Corner);
 
+// A name beside what it names, and a line from it to there; `share` 0 … 1 is how much of both is seen.
+struct LabelPlace;
+void draw_label(Image8&, const std::string& words, const LabelPlace&, const Eigen::Vector2d& end,
+                double letter_px, bool on_dark, double share = 1);
+double width_of_words(const std::string&, double letter_px);  // of labels
+
 // How long a length is on the picture: a bar of `length_px` and words over it, in a lower corner.
 void draw_scale_bar(Image8&, const std::string& words, double length_px, const CaptionLook&);
 

@@ -210,13 +210,16 @@ void make_film(const std::vector<fs::path>& frames, double frames_per_second, co
   pending.commit();
 }
 
-Image8 contact_sheet(const std::vector<fs::path>& frames, const std::vector<std::string>& captions,
-                     const SheetLook& look) {
-  if (frames.empty()) throw InputError("there is no frame to put on a contact sheet; render first");
-  LIMBER_CHECK(captions.empty() || captions.size() == frames.size(), captions.size(), frames.size());
+namespace {
+
+// `frame_at` gives a frame, `name_of` says which one is meant.
+template <class FrameAt, class NameOf>
+Image8 sheet_of(int count, const FrameAt& frame_at, const NameOf& name_of,
+                const std::vector<std::string>& captions, const SheetLook& look) {
+  if (count == 0) throw InputError("there is no frame to put on a contact sheet; render first");
+  LIMBER_CHECK(captions.empty() || int(captions.size()) == count, captions.size(), count);
   LIMBER_CHECK(look.tile_width_px > 0 && look.margin_px >= 0 && look.columns >= 0, look.tile_width_px,
                look.margin_px, look.columns);
-  const int count = int(frames.size());
   const int columns = look.columns > 0 ? std::min(look.columns, count) : int(std::ceil(std::sqrt(count)));
   const int rows = (count + columns - 1) / columns;
   double longest = 1;  // as wide as so many capitals are high
@@ -232,7 +235,7 @@ Image8 contact_sheet(const std::vector<fs::path>& frames, const std::vector<std:
                   &sheet.rgb[3 * (std::size_t(top + y) * sheet.width + left)]);
   };
   for (int f = 0; f < count; ++f) {
-    Image8 frame = read_png(frames[f]);
+    Image8 frame = frame_at(f);
     if (f == 0) {
       tile_width = std::min(look.tile_width_px, frame.width);
       tile_height = std::max(1, int(std::lround(double(frame.height) * tile_width / frame.width)));
@@ -246,8 +249,7 @@ Image8 contact_sheet(const std::vector<fs::path>& frames, const std::vector<std:
                  rows * (tile_height + caption_band + look.margin_px) + look.margin_px, look.background_srgb);
     }
     if (frame.width < tile_width || frame.height < tile_height)
-      throw InputError(
-          fmt::format("{}: is smaller than {}; render them alike", frames[f].string(), frames[0].string()));
+      throw InputError(fmt::format("{}: is smaller than {}; render them alike", name_of(f), name_of(0)));
     frame = shrunk(frame, tile_width, tile_height);
     const int left = look.margin_px + f % columns * (tile_width + look.margin_px);
     const int top = look.margin_px + f / columns * (tile_height + caption_band + look.margin_px);
@@ -259,6 +261,23 @@ Image8 contact_sheet(const std::vector<fs::path>& frames, const std::vector<std:
     place(band, left, top + tile_height);
   }
   return sheet;
+}
+
+}  // namespace
+
+Image8 contact_sheet(const std::vector<fs::path>& frames, const std::vector<std::string>& captions,
+                     const SheetLook& look) {
+  const auto file = [&](int f) -> const fs::path& { return frames[std::size_t(f)]; };
+  return sheet_of(
+      int(frames.size()), [&](int f) { return read_png(file(f)); }, [&](int f) { return file(f).string(); },
+      captions, look);
+}
+
+Image8 contact_sheet_of(const std::vector<Image8>& frames, const std::vector<std::string>& captions,
+                        const SheetLook& look) {
+  return sheet_of(
+      int(frames.size()), [&](int f) { return frames[std::size_t(f)]; },
+      [](int f) { return fmt::format("picture {}", f + 1); }, captions, look);
 }
 
 std::vector<int> spread_over(int frames, int count) {

@@ -32,6 +32,10 @@ struct SheetLook {
 Image8 contact_sheet(const std::vector<fs::path>& frames, const std::vector<std::string>& captions,
                      const SheetLook& = {});
 
+// The same of pictures in memory.
+Image8 contact_sheet_of(const std::vector<Image8>& frames, const std::vector<std::string>& captions,
+                        const SheetLook& = {});
+
 // `count` frames spread evenly over a sequence, first and last among them; all when there are no more.
 std::vector<int> spread_over(int frames, int count);
 

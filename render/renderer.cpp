@@ -18,6 +18,7 @@
 
 #include "core/error.h"
 #include "core/progress.h"
+#include "render/cut.h"
 #include "render/detail/line_quads.h"
 #include "render/detail/outward.h"
 #include "render/detail/renderer_impl.h"
@@ -29,6 +30,9 @@ using detail::image_on_card;
 using detail::line_corner_floats;
 
 namespace {
+
+constexpr double cap_shade = 0.86, rim_shade = 0.6;  // of the mesh's color, sRGB
+constexpr double rim_px = 1.6;
 
 // ---- what is asked for, checked ----
 
@@ -180,6 +184,8 @@ bool Renderer::Impl::has_veils() const {
 void Renderer::Impl::draw(const Camera& from, const RowReader& read, Passes* passes, StageTimes* times) {
   render::validate(from);
   context.make_current();
+  remove_caps();  // of a picture that failed
+  add_caps();
   double before = times ? cpu_seconds() : 0;
   const auto done = [&](double StageTimes::*stage) {
     if (!times) return;
@@ -204,6 +210,7 @@ void Renderer::Impl::draw(const Camera& from, const RowReader& read, Passes* pas
   if (passes) *passes = finish_passes();
   finish(read);
   done(&StageTimes::finish_s);
+  remove_caps();
 }
 
 // In linear light, for whoever computes with it or writes 16 bits a channel.
@@ -252,6 +259,7 @@ int Renderer::add_mesh(const Triangles& triangles, const Points& rest_positions,
   LIMBER_CHECK(images.size() == appearance.images.size(), look.name, images.size(), appearance.images.size());
   impl_->meshes.push_back({look, GpuMesh(triangles, rest_positions, look.crease_angle_deg, appearance)});
   Mesh& made = impl_->meshes.back();
+  made.number = int(impl_->meshes.size()) - 1;
   made.materials = appearance.materials;
   made.outward = look.seen && detail::looks_outward(rest_positions, triangles);
   std::map<std::pair<int, bool>, ImageOnCard> on_card;  // an image once, as colors and as numbers
@@ -330,15 +338,57 @@ void Renderer::set_opacity(int number, double opacity) {
 }
 
 // Planes are kept with unit normals, so that n·p + d is a distance in metres.
-void Renderer::set_clip_planes(const std::vector<Plane>& planes) {
-  require(planes.size() <= max_clip_planes,
-          fmt::format("{} clip planes: at most {}", planes.size(), max_clip_planes));
-  impl_->clip_planes.clear();
-  for (std::size_t i = 0; i < planes.size(); ++i) {
+void Renderer::set_clip_planes(int number, const std::vector<Plane>& planes) {
+  Mesh& mesh = impl_->mesh_with(number, 0, true);
+  require(planes.size() <= max_clip_planes, fmt::format("mesh '{}': {} clip planes: at most {}",
+                                                        mesh.look.name, planes.size(), max_clip_planes));
+  for (std::size_t i = 0; i < planes.size(); ++i)
     require(planes[i].allFinite() && planes[i].head<3>().norm() > 0,
-            fmt::format("clip plane {}: its normal is zero, or a number is not finite", i));
-    impl_->clip_planes.push_back(planes[i] / planes[i].head<3>().norm());
+            fmt::format("mesh '{}': clip plane {}: its normal is zero, or a number is not finite",
+                        mesh.look.name, i));
+  mesh.planes.clear();
+  for (const Plane& plane : planes) mesh.planes.push_back(plane / plane.head<3>().norm());
+  if (mesh.planes.empty() || mesh.solid) return;
+  mesh.triangles = mesh.card.triangles();
+  mesh.solid = has_inside(mesh.triangles);
+}
+
+// A cap is a mesh of the frame, cut by the other planes; in passes it is of the mesh that it closes. Casters
+// that are not seen cast by their far sides alone, and the cap of what they stand in for is seen.
+void Renderer::Impl::add_caps() {
+  for (std::size_t m = 0, count = meshes.size(); m < count; ++m) {
+    if (meshes[m].planes.empty() || !*meshes[m].solid || !meshes[m].drawn()) continue;
+    const Points positions = meshes[m].card.positions();
+    for (std::size_t i = 0; i < meshes[m].planes.size(); ++i) {
+      const SurfaceMesh cap = cap_of(positions, meshes[m].triangles, meshes[m].planes[i]);
+      if (cap.triangles.rows() == 0) continue;
+      MeshLook look = meshes[m].look;
+      look.color_srgb *= cap_shade;
+      look.roughness = std::max(look.roughness, 0.7), look.metallic = look.sheen = 0;
+      look.grain = look.translucency = 0;
+      look.edges.reset();
+      Mesh made{look, GpuMesh(cap.triangles, cap.positions, 180)};
+      made.number = meshes[m].number;
+      made.planes = meshes[m].planes;
+      made.planes.erase(made.planes.begin() + std::ptrdiff_t(i));
+      made.solid = true;
+      meshes.push_back(std::move(made));
+      ++caps;
+      if (look.opacity == 1) continue;  // a veil's is hardly seen without its rim
+      lines.push_back(
+          {{.color_srgb = rim_shade * meshes[m].look.color_srgb, .width_px = rim_px, .opacity = 0.9},
+           rim_of(cap)});
+      ++rims;
+    }
   }
+}
+
+void Renderer::Impl::remove_caps() {
+  for (; caps > 0; --caps) {
+    meshes.back().card.release();
+    meshes.pop_back();
+  }
+  for (; rims > 0; --rims) lines.pop_back();
 }
 
 int Renderer::add_lines(const Points& ends, const LineLook& look) {

@@ -125,10 +125,11 @@ class Renderer {
   // Of a veil: the look's opacity from now on, 0 ≤ … < 1. At 0 the picture is as without the mesh.
   void set_opacity(int mesh, double);
 
-  // What lies where n·p + d < 0 for one of the planes is cut off all meshes and edges, not off other lines,
-  // and casts no shadow. Insides seen through the cut are drawn flat and darker; meshes must be wound
-  // outwards for that. Throws InputError when there are more than max_clip_planes or a normal is zero.
-  void set_clip_planes(const std::vector<Plane>&);
+  // What of the mesh and its edges lies where n·p + d < 0 for one of the planes is cut off, and casts no
+  // shadow. A closed mesh is solid: the cut is closed by a face of a darker color (cut.h), which is of the
+  // mesh in passes. Of an open one insides are drawn flat. Throws InputError when there are more than
+  // max_clip_planes or a normal is zero.
+  void set_clip_planes(int mesh, const std::vector<Plane>&);
 
   // ends: row 2i to row 2i + 1. Lines are hidden by what is before them and cast no shadow.
   int add_lines(const Points& ends, const LineLook&);

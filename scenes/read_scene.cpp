@@ -79,7 +79,12 @@ Scene read(const std::string& toml, const std::string& name_for_messages,
   fill_in_max_stretch(scene);
   if (all_bodies) complaints.during([&] { scene.cameras = read_cameras(root, scene); });
   complaints.during([&] { scene.film = read_film(child(root, "film")); });
-  if (all_bodies) complaints.during([&] { check_inset(child(root, "film"), scene); });
+  if (all_bodies) {
+    const Node& film = child(root, "film");
+    complaints.during([&] { check_inset(film, scene); });
+    complaints.during([&] { read_labels(film, scene); });
+    complaints.during([&] { read_cuts(film, scene); });
+  }
   scene.text = toml;
   scene.sets = sets;
   scene.script = script;

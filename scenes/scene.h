@@ -252,6 +252,20 @@ struct CardSpec {
   bool plain = false;  // on a plain ground, instead of the first or last picture, blurred
 };
 
+// Words beside a body, with a line to it.
+struct LabelSpec {
+  int body = -1;  // of bodies and, after those, of scenery
+  std::string text;
+};
+
+// A plane that opens bodies in the picture.
+struct CutSpec {
+  Vec3 point_m = Vec3::Zero();
+  Vec3 normal = Vec3::UnitX();  // unit; what lies on its side is taken away
+  std::vector<int> bodies;      // of bodies and, after those, of scenery
+};
+constexpr int max_cuts = 6;
+
 struct FilmSpec {
   int width_px = 0, height_px = 0;
   int frames_per_second = 0;
@@ -272,6 +286,8 @@ struct FilmSpec {
   bool cages = false, forces = false, path = false, tree = false, side_by_side = false;
   bool panes = false;     // where bodies touch walls that are not drawn
   bool outlines = false;  // silhouettes and creases as dark lines
+  std::vector<LabelSpec> labels;
+  std::vector<CutSpec> cuts;
   std::optional<InsetSpec> inset;
   std::optional<CardSpec> title, end_card;
   int sheet_columns = 0, sheet_rows = 0;

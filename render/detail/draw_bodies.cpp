@@ -42,7 +42,7 @@ Vec3 toward_soft_box(const RenderSettings& settings) {
 // What is below the ground is cut off, too, where the eye sees it from above. The undersides of veils, which
 // are seen through them, stay whole where they stand on it and sink in a little.
 std::vector<Plane> Renderer::Impl::planes_of(const Mesh& mesh) const {
-  std::vector<Plane> planes = clip_planes;
+  std::vector<Plane> planes = mesh.planes;
   Plane plane = ground_plane;
   if (mesh.transparent()) plane[3] += 0.005 * stage_box.size().norm();
   bool below = false;
@@ -112,7 +112,7 @@ const Program& Renderer::Impl::use_mesh(const Mesh& mesh, const std::string& def
   if (mesh.card.tinted()) all += "#define TINTED\n";
   if (mesh.translucent()) all += "#define TRANSLUCENT\n";
   if (mesh.grained()) all += "#define GRAINED\n";
-  if (!clip_planes.empty()) all += "#define FLAT_INSIDE\n";
+  if (!mesh.planes.empty() && !(mesh.transparent() && *mesh.solid)) all += "#define FLAT_INSIDE\n";
   const Program& p = mesh_programs.with(all);
   p.use();
   set_planes(p, planes);
@@ -179,7 +179,7 @@ const Program& Renderer::Impl::use_mesh(const Mesh& mesh, const std::string& def
     p.set("normal_image", 6);
     paint.normal_image->texture.bind(6);
   }
-  p.set("object", int(&mesh - meshes.data()));
+  p.set("object", mesh.number);
   return p;
 }
 
@@ -199,7 +199,7 @@ bool Renderer::Impl::hides_its_back(const Mesh& mesh) const {
   const Box& box = mesh.card.box();
   const bool outside =
       (camera.eye.array() < box.lower.array()).any() || (camera.eye.array() > box.upper.array()).any();
-  return mesh.outward && clip_planes.empty() && outside;
+  return mesh.outward && mesh.planes.empty() && outside;
 }
 
 // Clears all targets and draws what is opaque, colours and depth; with `passes` also normal, scalar and

@@ -36,9 +36,8 @@ GpuMesh::GpuMesh(const Triangles& triangles, const Points& rest_positions, doubl
   glGenVertexArrays(1, &array_);
   position_buffer_ = new_attribute(array_, at_position, 3, GL_FLOAT);
   normal_buffer_ = new_attribute(array_, at_normal, 3, GL_FLOAT);
-  GLuint corners = 0;
-  glGenBuffers(1, &corners);
-  glBindBuffer(GL_ELEMENT_ARRAY_BUFFER, corners);
+  glGenBuffers(1, &corner_buffer_);
+  glBindBuffer(GL_ELEMENT_ARRAY_BUFFER, corner_buffer_);
   glBufferData(GL_ELEMENT_ARRAY_BUFFER, GLsizeiptr(drawn_.corners.size() * sizeof drawn_.corners[0]),
                drawn_.corners.data(), GL_STATIC_DRAW);
   if (!drawn_.uv.empty()) upload(new_attribute(array_, at_uv, 2, GL_FLOAT), drawn_.uv);
@@ -85,6 +84,28 @@ void GpuMesh::draw(std::size_t first_corner, std::size_t corners) const {
   if (scalar_buffer_ == 0) glVertexAttrib1f(at_scalar, 0);
   glDrawElements(GL_TRIANGLES, GLsizei(corners), GL_UNSIGNED_INT,
                  reinterpret_cast<void*>(first_corner * sizeof(std::uint32_t)));
+}
+
+Points GpuMesh::positions() const {
+  Points rows = Points::Zero(vertices_, 3);
+  for (std::size_t d = 0; d < drawn_.vertex_from_drawn.size(); ++d)
+    for (int i = 0; i < 3; ++i)
+      rows(drawn_.vertex_from_drawn[d], i) = drawn_.positions[3 * d + std::size_t(i)];
+  return rows;
+}
+
+Triangles GpuMesh::triangles() const {
+  Triangles rows(Eigen::Index(drawn_.corners.size() / 3), 3);
+  for (std::size_t c = 0; c < drawn_.corners.size(); ++c)
+    rows(Eigen::Index(c / 3), int(c % 3)) = drawn_.vertex_from_drawn[drawn_.corners[c]];
+  return rows;
+}
+
+void GpuMesh::release() {
+  glDeleteVertexArrays(1, &array_);
+  for (const GLuint buffer :
+       {position_buffer_, normal_buffer_, tint_buffer_, scalar_buffer_, rest_buffer_, corner_buffer_})
+    glDeleteBuffers(1, &buffer);
 }
 
 Points GpuMesh::edge_ends() {

@@ -23,6 +23,11 @@ class GpuMesh {
   void draw(std::size_t first_corner, std::size_t corners) const;
   Points edge_ends();  // each edge once, row 2i to row 2i + 1
 
+  // As the caller has them.
+  Points positions() const;
+  Triangles triangles() const;
+  void release();  // the buffers; the card's memory goes with the context else
+
   const DrawnMesh& drawn() const { return drawn_; }
   Eigen::Index vertices() const { return vertices_; }
   const Box& box() const { return box_; }
@@ -33,7 +38,7 @@ class GpuMesh {
   Eigen::Index vertices_;  // rows the caller hands over
   Box box_;
   unsigned array_ = 0, position_buffer_ = 0, normal_buffer_ = 0, tint_buffer_ = 0, scalar_buffer_ = 0,
-           rest_buffer_ = 0;
+           rest_buffer_ = 0, corner_buffer_ = 0;
   std::vector<std::pair<int, int>> edges_;  // drawn vertices; found when first asked for
 };
 

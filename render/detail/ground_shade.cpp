@@ -138,8 +138,8 @@ GroundFrame ground_frame(const Vec3& up, double height_m) {
 }
 
 ShadeMap shade_ground(std::span<const GroundCaster> casters, const GroundFrame& frame,
-                      const Vec3& toward_light, std::span<const double> spreads, const Box& stage, int cells,
-                      std::span<const Eigen::Vector4d> planes) {
+                      const Vec3& toward_light, std::span<const double> spreads, const Box& stage,
+                      int cells) {
   const Vec3 light = toward_light / frame.up.dot(toward_light);
   const double widest = *std::max_element(spreads.begin(), spreads.end());
   const auto height = [&](const Vec3& p) { return std::max(0.0, frame.up.dot(p) - frame.height_m); };
@@ -164,14 +164,14 @@ ShadeMap shade_ground(std::span<const GroundCaster> casters, const GroundFrame& 
 
   Raster raster{map.columns, map.rows, {}, {}};
   std::vector<Corner> corners;
-  for (const auto& [mesh, blocks] : casters) {
+  for (const auto& [mesh, blocks, planes] : casters) {
     corners.resize(mesh->vertex_from_drawn.size());
     for (std::size_t v = 0; v < corners.size(); ++v) {
       const Vec3 p(mesh->positions[3 * v], mesh->positions[3 * v + 1], mesh->positions[3 * v + 2]);
       const Eigen::Vector2d at = (onto_ground(p) - map.lower) / map.cell_m;
       corners[v] = {at.x(), at.y(), height(p) / band_0_m};
     }
-    const auto is_cut = [&, mesh = mesh](std::size_t c) {
+    const auto is_cut = [&, mesh = mesh, planes = planes](std::size_t c) {
       Vec3 middle = Vec3::Zero();
       for (std::size_t i = 0; i < 3; ++i)
         for (std::size_t k = 0; k < 3; ++k)

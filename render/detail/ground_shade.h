@@ -30,15 +30,15 @@ struct ShadeMap {
 struct GroundCaster {
   const DrawnMesh* mesh;
   float blocks = 1;
+  // Triangles whose middle has n·p + d < 0 for a plane (n, d) cast nothing.
+  std::span<const Eigen::Vector4d> planes = {};
 };
 
 // Rays arrive from `toward_light` (above the horizon). What is at height h is blurred by the average of
 // Gaussians with the deviations spreads[i] × h metres. The map is large enough for `stage` and its longer
 // side has about `cells` cells; at its border it fades out. Of two casters that cover a cell at a height, the
-// darker counts. Triangles whose middle has n·p + d < 0 for a
-// plane (n, d) cast nothing.
+// darker counts.
 ShadeMap shade_ground(std::span<const GroundCaster> casters, const GroundFrame&, const Vec3& toward_light,
-                      std::span<const double> spreads, const Box& stage, int cells,
-                      std::span<const Eigen::Vector4d> planes = {});
+                      std::span<const double> spreads, const Box& stage, int cells);
 
 }  // namespace limber::render::detail

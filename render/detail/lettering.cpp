@@ -97,7 +97,8 @@ double for_each_letter(FT_Face face, std::string_view text, Visit visit) {
   return x_px;
 }
 
-void blend(Image8& image, Owned<FT_Glyph> glyph, double x_px, double y_px, const Vec3& color_srgb) {
+void blend(Image8& image, Owned<FT_Glyph> glyph, double x_px, double y_px, const Vec3& color_srgb,
+           double opacity) {
   FT_Vector shift{std::lround(64 * (x_px - std::floor(x_px))), std::lround(64 * (std::ceil(y_px) - y_px))};
   FT_Glyph drawn = glyph.release();
   const FT_Error error = FT_Glyph_To_Bitmap(&drawn, FT_RENDER_MODE_NORMAL, &shift, 1);
@@ -108,7 +109,7 @@ void blend(Image8& image, Owned<FT_Glyph> glyph, double x_px, double y_px, const
   const FT_Bitmap& bits = map->bitmap;
   for (int row = std::max(0, -top); row < int(bits.rows) && top + row < image.height; ++row)
     for (int column = std::max(0, -left); column < int(bits.width) && left + column < image.width; ++column) {
-      const double cover = bits.buffer[row * bits.pitch + column] / 255.0;
+      const double cover = opacity * bits.buffer[row * bits.pitch + column] / 255.0;
       std::uint8_t* p = &image.rgb[3 * (std::size_t(top + row) * image.width + std::size_t(left + column))];
       for (int c = 0; c < 3; ++c)
         p[c] = std::uint8_t(std::lround(p[c] + cover * (255 * color_srgb[c] - p[c])));
@@ -152,11 +153,11 @@ void draw_text(Image8& image, std::string_view text, double left_px, double base
       const FT_Error error = FT_Glyph_StrokeBorder(&wide, fonts.stroker(), 0, 1);
       glyph.reset(wide);
       check(error);
-      blend(image, std::move(glyph), left_px + x_px, baseline_px, look.rim_srgb);
+      blend(image, std::move(glyph), left_px + x_px, baseline_px, look.rim_srgb, look.opacity);
     });
   }
   for_each_letter(face, text, [&](double x_px) {
-    blend(image, glyph_of(face), left_px + x_px, baseline_px, look.color_srgb);
+    blend(image, glyph_of(face), left_px + x_px, baseline_px, look.color_srgb, look.opacity);
   });
 }
 

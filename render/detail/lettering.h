@@ -20,6 +20,7 @@ struct TextLook {
   Weight weight = Weight::regular;
   double rim_px = 0;  // of another colour round each letter, so that it reads on any ground
   Vec3 rim_srgb = Vec3::Ones();
+  double opacity = 1;
 };
 void draw_text(Image8&, std::string_view, double left_px, double baseline_px, const TextLook&);
 // The letter that begins at a byte, and how many bytes it takes; a byte that is no UTF-8 is U+FFFD.

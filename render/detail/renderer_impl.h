@@ -15,6 +15,7 @@
 #include <cstdint>
 #include <functional>
 #include <map>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -44,6 +45,10 @@ struct Mesh {
   std::vector<SurfaceMaterial> materials = {};               // empty: no appearance
   std::vector<ImageOnCard> images = {}, normal_images = {};  // a material; 0: none
   bool outward = false;                                      // as looks_outward() says, at rest
+  int number = 0;                                            // by which the caller knows it
+  std::vector<render::Plane> planes = {};                    // that cut it
+  Triangles triangles = {};                                  // of what is cut; as has_inside() says of them:
+  std::optional<bool> solid = {};
 
   // A veil: drawn into the lists of layers (detail/draw_veils.cpp), not with the opaque bodies.
   bool transparent() const { return look.opacity < 1; }
@@ -134,7 +139,10 @@ struct Renderer::Impl {
   void finish(const RowReader&);
   Passes finish_passes();
 
-  // The planes that cut a mesh: the user's, and the ground's where the mesh reaches below it.
+  // The faces of cuts, behind all other meshes while a picture is drawn.
+  void add_caps();
+  void remove_caps();
+  // The planes that cut a mesh: its own, and the ground's where the mesh reaches below it.
   bool hides_its_back(const Mesh&) const;
   std::vector<Plane> planes_of(const Mesh&) const;
   // Programs for what is drawn next, with all their uniforms.
@@ -161,7 +169,7 @@ struct Renderer::Impl {
   unsigned empty_array, line_array, line_buffer;  // the first for whole pictures, whose shader has no input
   std::vector<Mesh> meshes;
   std::vector<Lines> lines;
-  std::vector<Plane> clip_planes;
+  int caps = 0, rims = 0;  // the last of meshes and lines, while a picture is drawn
 
   // Left by one stage for the next.
   Camera camera;

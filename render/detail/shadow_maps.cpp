@@ -119,7 +119,7 @@ void Renderer::Impl::draw_shadow_map() {
   for (Mesh& mesh : meshes) {
     if (!mesh.casts()) continue;
     (mesh.look.seen ? glDisable : glEnable)(GL_CULL_FACE);
-    use_depth(clip_from, clip_planes);
+    use_depth(clip_from, mesh.planes);
     mesh.card.draw();
   }
   glDisable(GL_CULL_FACE);
@@ -136,7 +136,7 @@ void Renderer::Impl::draw_shadow_map() {
   glClear(GL_DEPTH_BUFFER_BIT);
   for (Mesh& mesh : meshes) {
     if (!mesh.casts()) continue;
-    use_depth(clip_from, clip_planes);
+    use_depth(clip_from, mesh.planes);
     mesh.card.draw();
   }
 }
@@ -150,11 +150,11 @@ void Renderer::Impl::shade_ground_maps() {
   if (settings.ground_height_m)
     for (const Mesh& mesh : meshes)
       if (mesh.blocks() > 0)
-        casters.push_back({&mesh.card.drawn(), float(mesh.blocks())}), box.include(mesh.card.box());
+        casters.push_back({&mesh.card.drawn(), float(mesh.blocks()), mesh.planes}),
+            box.include(mesh.card.box());
   const double key_spreads[] = {0.5 * std::tan(settings.key_size_deg * std::numbers::pi / 180)};
-  key_shade =
-      shade_ground(casters, ground, settings.toward_key, key_spreads, box, ground_key_cells, clip_planes);
-  sky_shade = shade_ground(casters, ground, settings.up, sky_spreads, box, ground_sky_cells, clip_planes);
+  key_shade = shade_ground(casters, ground, settings.toward_key, key_spreads, box, ground_key_cells);
+  sky_shade = shade_ground(casters, ground, settings.up, sky_spreads, box, ground_sky_cells);
   fill(targets.ground_sky_map, sky_shade.columns, sky_shade.rows, sky_shade.blocked.data());
 }
 

@@ -5,6 +5,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <cctype>
 
 #include "core/words.h"
 #include "scenes/detail/scene_parts.h"
@@ -66,6 +67,94 @@ void check_inset(const Node& film, const Scene& scene) {
     complain(child(child(film, "inset"), "camera"),
              fmt::format("film.inset.camera: the scene has no camera \"{}\"; there are: {}",
                          scene.film.inset->camera, fmt::join(names, ", ")));
+}
+
+namespace {
+
+// Of bodies and, after those, of scenery.
+int seen_called(const Node& node, const std::string& name, const Scene& scene, const char* key) {
+  std::vector<std::string> names;
+  for (const auto* bodies : {&scene.bodies, &scene.scenery})
+    for (const BodySpec& body : *bodies) names.push_back(body.name);
+  const auto at = std::find(names.begin(), names.end(), name);
+  if (at == names.end()) {
+    const std::string meant = nearest(name, names);
+    complain(node, fmt::format("{}: the scene has no body \"{}\"; {}", key, name,
+                               meant.empty() ? fmt::format("there are: {}", fmt::join(names, ", "))
+                                             : fmt::format("did you mean \"{}\"?", meant)));
+  }
+  return int(at - names.begin());
+}
+
+// lung_left is "Left lung", vertebrae_L5 "Vertebrae L5".
+std::string called(const std::string& name) {
+  std::string words = name;
+  std::replace(words.begin(), words.end(), '_', ' ');
+  for (const std::string side : {" left", " right"})
+    if (words.ends_with(side) && words.size() > side.size())
+      words = side.substr(1) + " " + words.substr(0, words.size() - side.size());
+  words[0] = char(std::toupper(static_cast<unsigned char>(words[0])));
+  return words;
+}
+
+}  // namespace
+
+void read_labels(const Node& film, Scene& scene) {
+  const Node& node = child(film, "labels");
+  std::vector<LabelSpec>& labels = scene.film.labels;
+  constexpr std::size_t longest = 60;  // bytes
+  const auto add = [&](const Node& where, const std::string& name, const std::string& words) {
+    const int body = seen_called(where, name, scene, "film.labels");
+    if (std::any_of(labels.begin(), labels.end(), [&](const LabelSpec& l) { return l.body == body; }))
+      complain(where, fmt::format("film.labels names {} twice; leave one out", name));
+    const auto unseen = [](unsigned char c) { return c < ' ' || c == 127; };
+    if (words.find_first_not_of(' ') == words.npos || std::any_of(words.begin(), words.end(), unseen))
+      complain(where, fmt::format("film.labels: the name of {} is empty, or has letters that cannot be seen; "
+                                  "it is one line",
+                                  name));
+    if (words.size() > longest)
+      complain(where, fmt::format("film.labels: the name of {} is longer than {} bytes; write a shorter one",
+                                  name, longest));
+    labels.push_back({body, words});
+  };
+  if (const bool* all = std::get_if<bool>(&node.value)) {
+    for (const auto* bodies : {&scene.bodies, &scene.scenery})
+      for (const BodySpec& body : *bodies)
+        if (*all) add(node, body.name, called(body.name));
+  } else if (const Array* some = node.array()) {
+    for (const Node& one : *some) add(one, as_text(one), called(as_text(one)));
+  } else {
+    for (const Entry& entry : *node.table()) add(entry.value, entry.key, as_text(entry.value));
+  }
+  if (!labels.empty() && scene.film.side_by_side)
+    complain(node, "film.labels have no room where film.side_by_side shows two pictures; take one of them");
+}
+
+void read_cuts(const Node& film, Scene& scene) {
+  const Array& tables = list(film, "cuts");
+  if (tables.size() > max_cuts)
+    complain(child(film, "cuts"),
+             fmt::format("film.cuts has {} planes; at most {} are cut at a time", tables.size(), max_cuts));
+  for (const Node& table : tables) {
+    CutSpec cut{vector(table, "point_m"), direction(table, "normal", "film.cuts.normal"), {}};
+    if (const Node* named = table.find("bodies")) {
+      if (named->array()->empty()) complain(*named, "film.cuts.bodies is empty; name some, or leave it out");
+      for (const Node& one : *named->array())
+        cut.bodies.push_back(seen_called(one, as_text(one), scene, "film.cuts.bodies"));
+    } else {
+      int number = 0;
+      for (const auto* bodies : {&scene.bodies, &scene.scenery})
+        for (const BodySpec& body : *bodies) {
+          if (body.opacity < 1 || bodies == &scene.scenery) cut.bodies.push_back(number);
+          ++number;
+        }
+      if (cut.bodies.empty())
+        complain(table,
+                 "film.cuts cuts scenery and bodies that are seen through, and there are none; name "
+                 "bodies = [\"…\"]");
+    }
+    scene.film.cuts.push_back(std::move(cut));
+  }
 }
 
 namespace {

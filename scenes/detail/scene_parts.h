@@ -35,6 +35,9 @@ PlannerSpec read_planner(const Node& table);
 // camera, [[cameras]] and film. scenes/detail/read_film.cpp
 std::vector<CameraSpec> read_cameras(const Node& root, const Scene&);
 FilmSpec read_film(const Node& table);
+// Labels and cuts, which name bodies and scenery.
+void read_labels(const Node& film, Scene&);
+void read_cuts(const Node& film, Scene&);
 // That the inset's camera is one of the scene's.
 void check_inset(const Node& film, const Scene&);
 

@@ -942,6 +942,28 @@ constexpr Key all_keys[] = {
      "dark lines along the silhouettes and creases of all that is opaque",
      "",
      ""},
+    {"film.labels",
+     Type::labels,
+     {},
+     0,
+     "false",
+     "names beside what is seen, with lines to it: of all bodies; of those in a list; or of those in a "
+     "table, "
+     "called as it says. A body lung_left is called Left lung. A name is there where its body is seen",
+     "",
+     ""},
+    {"film.cuts", Type::tables, {}, 0, "[]", "planes that open bodies in the picture, at most six", "", ""},
+    {"film.cuts[].point_m", Type::vector, any, 3, required, "m; a point of the plane", "", ""},
+    {"film.cuts[].normal", Type::vector, any, 3, required,
+     "of any length but 0; what lies on its side of the plane is taken away", "", ""},
+    {"film.cuts[].bodies",
+     Type::names,
+     {},
+     0,
+     may_lack,
+     "bodies that it cuts; else scenery, and bodies with an opacity below 1",
+     "",
+     ""},
     {"film.inset", Type::table, {}, 0, may_lack, "a second camera's picture, in a corner", "", ""},
     {"film.inset.camera",
      Type::text,
@@ -1124,6 +1146,22 @@ void check_fixed(const Key& key, const std::string& shown, Node& node, const Com
   }
 }
 
+void check_names(const Key& key, const std::string& shown, const Node& node) {
+  const Array* elements = node.array();
+  if (!elements) complain_of_type(key, shown, node);
+  for (std::size_t i = 0; i < elements->size(); ++i)
+    checked_text(key, fmt::format("{}[{}]", shown, i), (*elements)[i]);
+}
+
+void check_labels(const Key& key, const std::string& shown, const Node& node) {
+  if (std::holds_alternative<bool>(node.value)) return;
+  if (!node.table()) return check_names(key, shown, node);
+  for (const Entry& entry : *node.table())
+    if (!std::holds_alternative<std::string>(entry.value.value))
+      complain(entry.value.where, fmt::format("{}.{} is {}; it must be a text, what the body is called",
+                                              shown, entry.key, entry.value.type_name()));
+}
+
 // "bodies.robot" for the body of that name, else "bodies[2]".
 std::string shown_element(const std::string& shown, std::size_t i, const Node& element) {
   const Node* name = element.find("name");
@@ -1169,6 +1207,10 @@ void check_value(const Key& key, const std::string& shown, Node& node, const Com
       return check_color(key, shown, node);
     case Type::fixed:
       return check_fixed(key, shown, node, complaints);
+    case Type::names:
+      return check_names(key, shown, node);
+    case Type::labels:
+      return check_labels(key, shown, node);
     case Type::table:
       if (!node.table()) complain_of_type(key, shown, node);
       return check_table(node, std::string(key.path), shown, complaints);
@@ -1289,6 +1331,10 @@ std::string Key::expected() const {
       return "a colour \"#rrggbb\"";
     case Type::fixed:
       return "\"walls\", or a list of \"walls\" and { box_m = [[x, y, z], [x, y, z]] }";
+    case Type::names:
+      return "a list of texts";
+    case Type::labels:
+      return "true or false, a list of bodies, or a table BODY = \"name\"";
     case Type::table:
       return "a table";
     case Type::tables:
@@ -1335,6 +1381,10 @@ std::string Key::example() const {
         return "\"#c0392b\"";
       case Type::fixed:
         return "\"walls\"";
+      case Type::names:
+        return "[\"…\"]";
+      case Type::labels:
+        return "true";
       case Type::table:
         return "{ … }";
       case Type::tables:

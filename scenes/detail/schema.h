@@ -30,6 +30,8 @@ enum class Type {
   points,  // two at least
   color,
   fixed,
+  names,   // a list of texts
+  labels,  // true or false, a list of texts, or a table of texts
   table,
   tables
 };

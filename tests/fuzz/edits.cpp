@@ -478,6 +478,12 @@ std::string value_for(const scenes::Key& key, const std::vector<std::string>& bo
       return script.below(4) == 0 ? script.word() : "\"#102030\"";
     case Type::fixed:
       return script.below(2) == 0 ? "walls" : fmt::format("[{{ box_m = {} }}]", box_for(key, script));
+    case Type::names:
+    case Type::labels: {
+      const std::string& body = bodies[std::size_t(script.below(int(bodies.size())))];
+      if (key.type == Type::names || script.below(3) == 0) return fmt::format("[\"{}\"]", body);
+      return script.below(2) == 0 ? "true" : fmt::format("{{ {} = \"{}\" }}", body, script.word());
+    }
     case Type::choice: {
       std::vector<std::string> choices{""};
       for (const char c : key.choices)

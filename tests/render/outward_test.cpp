@@ -26,8 +26,7 @@ Image seen_from(const Vec3& eye, const SurfaceMesh& mesh, const std::vector<Plan
   RenderSettings settings;
   settings.width = 160, settings.height = 120, settings.transparent_background = true;
   Renderer renderer(settings);
-  renderer.add_mesh(mesh.triangles, mesh.positions, {});
-  renderer.set_clip_planes(planes);
+  renderer.set_clip_planes(renderer.add_mesh(mesh.triangles, mesh.positions, {}), planes);
   Camera camera;
   camera.eye = eye, camera.target = eye + Vec3(0, 1, 0);
   return renderer.draw(camera);

@@ -411,8 +411,8 @@ SurfaceMesh upright_quad(double y, double half = 1) {
   return quad_mesh({-half, y, -half}, {half, y, -half}, {half, y, half}, {-half, y, half});
 }
 
-void add(Renderer& renderer, const SurfaceMesh& mesh, const MeshLook& look) {
-  renderer.add_mesh(mesh.triangles, mesh.positions, look);
+int add(Renderer& renderer, const SurfaceMesh& mesh, const MeshLook& look) {
+  return renderer.add_mesh(mesh.triangles, mesh.positions, look);
 }
 
 // Colour and alpha, premultiplied.
@@ -696,30 +696,88 @@ TEST(Renderer, AnUnseenCasterShadesAllButWhatItEncloses) {
   EXPECT_NEAR(double(shaded) / shaded_by_ball, 1.15, 0.2);
 }
 
-// What is left of a box cut in half covers what half a box covers: its inside shows through the cut, flat.
-TEST(Renderer, ACutBoxCoversWhatIsLeftOfIt) {
+// What is left of a box cut twice is the box that is left, but for the cut's darker color.
+TEST(Renderer, ACutBoxIsTheBoxThatIsLeft) {
   const RenderSettings look = small_look();
   const Camera camera = camera_from({2, -4, 1.5});
-  Renderer renderer(look);
-  add(renderer, box_mesh({-0.5, -0.5, -0.5}, {0.5, 0.5, 0.5}), {"box", {0.9, 0.2, 0.1}});
-  renderer.set_clip_planes({Plane(-2, 0, 0, 0.2), Plane(0, 0, -1, 0.3)});  // x < 0.1, z < 0.3
-  const Image cut = renderer.draw(camera);
-  const Image rest = picture_of(box_mesh({-0.5, -0.5, -0.5}, {0.1, 0.5, 0.3}), look, camera);
-  for (std::size_t i = 3; i < cut.rgba.size(); i += 4) ASSERT_NEAR(cut.rgba[i], rest.rgba[i], 0.51) << i / 4;
-  EXPECT_NEAR(covered_pixels(cut) / covered_pixels(rest), 1, 0.002);
-  // Two places on the cut, of different insides behind it.
-  const auto at = [&](double y, double z) {
-    const Vec3 p = pixel_from_world(camera, {0.1, y, z}, look.width, look.height);
-    return rgba(cut, int(p.x()), int(p.y()));
+  const SurfaceMesh whole = box_mesh({-0.5, -0.5, -0.5}, {0.5, 0.5, 0.5}),
+                    rest = box_mesh({-0.5, -0.5, -0.5}, {0.1, 0.5, 0.3});
+  Renderer renderer(look), of_rest(look);
+  const int box = add(renderer, whole, {"box", {0.9, 0.2, 0.1}});
+  add(of_rest, rest, {"box", {0.9, 0.2, 0.1}});
+  renderer.set_clip_planes(box, {Plane(-2, 0, 0, 0.2), Plane(0, 0, -1, 0.3)});  // x < 0.1, z < 0.3
+  Passes cut_passes, rest_passes;
+  const Image cut = renderer.draw(camera, &cut_passes), left = of_rest.draw(camera, &rest_passes);
+  for (std::size_t i = 3; i < cut.rgba.size(); i += 4) ASSERT_NEAR(cut.rgba[i], left.rgba[i], 0.51) << i / 4;
+  EXPECT_NEAR(covered_pixels(cut) / covered_pixels(left), 1, 0.002);
+  int differ = 0;
+  for (std::size_t i = 0; i < cut_passes.object.size(); ++i) {
+    if (cut_passes.object[i] != rest_passes.object[i])
+      ++differ;
+    else if (cut_passes.object[i] == box &&
+             !(std::abs(cut_passes.depth_m[i] - rest_passes.depth_m[i]) < 1e-3))
+      ++differ;
+  }
+  EXPECT_LT(differ, 0.002 * covered_pixels(left));
+  const auto at = [&](const Image& image, const Vec3& place) {
+    const Vec3 p = pixel_from_world(camera, place, look.width, look.height);
+    return rgba(image, int(p.x()), int(p.y()));
   };
-  EXPECT_EQ(at(-0.4, 0.2), at(0.4, -0.4));
-  renderer.set_clip_planes({});
-  EXPECT_EQ(
-      renderer.draw(camera).rgba,
-      picture_of(box_mesh({-0.5, -0.5, -0.5}, {0.5, 0.5, 0.5}), look, camera, {"box", {0.9, 0.2, 0.1}}).rgba);
-  EXPECT_THROW(renderer.set_clip_planes({Plane(0, 0, 0, 1)}), InputError);
-  EXPECT_THROW(renderer.set_clip_planes(std::vector<Plane>(max_clip_planes + 1, Plane(1, 0, 0, 0))),
+  // On the two cuts darker, beside them the same.
+  for (const Vec3& place : {Vec3(0.1, 0, -0.1), Vec3(-0.2, 0, 0.3)})
+    EXPECT_LT(at(cut, place)[0], 0.9 * at(left, place)[0]);
+  EXPECT_NEAR(at(cut, {-0.2, -0.5, 0})[0], at(left, {-0.2, -0.5, 0})[0], 1e-3);
+  renderer.set_clip_planes(box, {});
+  EXPECT_EQ(renderer.draw(camera).rgba, picture_of(whole, look, camera, {"box", {0.9, 0.2, 0.1}}).rgba);
+  EXPECT_THROW(renderer.set_clip_planes(box, {Plane(0, 0, 0, 1)}), InputError);
+  EXPECT_THROW(renderer.set_clip_planes(box, std::vector<Plane>(max_clip_planes + 1, Plane(1, 0, 0, 0))),
                InputError);
+}
+
+// Of a ball of radius r cut off at height h the face is a disk of radius √(r² − h²), seen face on from so far
+// away that it is as large as there (pixels on its rim count); of a shell it is the ring between two such
+// disks.
+TEST(Renderer, TheFaceOfACutIsWhereTheSurfaceIsWoundRound) {
+  RenderSettings look = small_look();
+  Camera camera = camera_from({0, -400, 0});
+  camera.fov_deg = 0.2;
+  const double pixels_a_metre = 0.5 * look.height / std::tan(0.1 * std::numbers::pi / 180) / 400;
+  const SurfaceMesh ball = sphere_mesh({0, 0, 0}, 0.5, 60);
+  SurfaceMesh shell = sphere_mesh({0, 0, 0}, 0.3, 60);
+  shell.triangles.col(1).swap(shell.triangles.col(2));
+  const Eigen::Index before = shell.positions.rows();
+  shell.triangles.conservativeResize(shell.triangles.rows() + ball.triangles.rows(), 3);
+  shell.triangles.bottomRows(ball.triangles.rows()) = ball.triangles.array() + int(before);
+  shell.positions.conservativeResize(before + ball.positions.rows(), 3);
+  shell.positions.bottomRows(ball.positions.rows()) = ball.positions;
+  for (const bool hollow : {false, true})
+    for (const double height : {0.0, 0.2}) {
+      Renderer renderer(look);
+      const int mesh = add(renderer, hollow ? shell : ball, {"ball"});
+      renderer.set_clip_planes(mesh, {Plane(0, 1, 0, height)});  // y > −height
+      Passes passes;
+      renderer.draw(camera, &passes);
+      int on_face = 0;
+      for (std::size_t i = 0; i < passes.object.size(); ++i)
+        on_face += int(passes.object[i] == mesh && std::abs(passes.depth_m[i] - (400 - height)) < 0.004);
+      const double wanted = std::numbers::pi *
+                            (0.25 - height * height - (hollow ? 0.09 - height * height : 0)) *
+                            pixels_a_metre * pixels_a_metre;
+      EXPECT_NEAR(on_face / wanted, 1, 0.03) << hollow << " " << height;
+    }
+}
+
+// A ray through a cut veil passes two layers, the face and what is behind it, as through the whole one.
+TEST(Renderer, AVeilThatIsCutIsClosedToo) {
+  const RenderSettings look = small_look();
+  const Camera camera = camera_from({0, -4, 0});
+  const SurfaceMesh ball = sphere_mesh({0, 0, 0}, 0.5, 60);
+  Renderer renderer(look);
+  MeshLook veil{"veil", {0.3, 0.3, 0.3}};
+  veil.opacity = 0.4;
+  const int mesh = add(renderer, ball, veil);
+  renderer.set_clip_planes(mesh, {Plane(0, 1, 0, 0)});
+  EXPECT_NEAR(alpha(renderer.draw(camera), look.width / 2, look.height / 2), 1 - 0.6 * 0.6, 2e-3);
 }
 
 // An edge is seen when one of its two faces looks towards the eye.
@@ -730,7 +788,7 @@ TEST(Renderer, EdgesAreDrawnOverTheSurfaceThatHidesTheOthers) {
   Renderer renderer(look);
   MeshLook mesh_look{"box", {0.9, 0.9, 0.9}};
   mesh_look.edges = LineLook{{1, 0, 0}, 3, 1};
-  add(renderer, box, mesh_look);
+  const int number = add(renderer, box, mesh_look);
   const Image image = renderer.draw(camera);
   int seen = 0, hidden = 0;
   const Points ends = edges_of(bounding_box(box.positions));
@@ -748,7 +806,7 @@ TEST(Renderer, EdgesAreDrawnOverTheSurfaceThatHidesTheOthers) {
   EXPECT_EQ(hidden, 3);
 
   // Cut with the box: nothing is left of the edge x = 0.5, y = −0.5.
-  renderer.set_clip_planes({Plane(-1, 0, 0, 0.1)});
+  renderer.set_clip_planes(number, {Plane(-1, 0, 0, 0.1)});
   const Vec3 gone = pixel_from_world(camera, {0.5, -0.5, 0.2}, look.width, look.height);
   EXPECT_EQ(alpha(renderer.draw(camera), int(gone.x()), int(gone.y())), 0);
 }
@@ -763,9 +821,9 @@ TEST(Renderer, WhatIsCutOffCastsNothing) {
     Renderer renderer(look);
     if (on_body) add(renderer, floor, {"floor"});
     const Image without = renderer.draw(camera);
-    add(renderer, box_mesh({-0.5, -0.5, 0.5}, {0.5, 0.5, 1}), {"box"});
+    const int box = add(renderer, box_mesh({-0.5, -0.5, 0.5}, {0.5, 0.5, 1}), {"box"});
     EXPECT_GT(difference(renderer.draw(camera), without).mean, 1);
-    renderer.set_clip_planes({Plane(0, 0, -1, 0.4)});  // z < 0.4
+    renderer.set_clip_planes(box, {Plane(0, 0, -1, 0.4)});  // z < 0.4
     EXPECT_LE(difference(renderer.draw(camera), without).largest, 2);
   }
 }

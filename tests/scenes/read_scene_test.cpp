@@ -1,3 +1,4 @@
+#include <fmt/ranges.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -669,6 +670,8 @@ std::string another_value(const Key& key) {
       {"forces[].box_m", "[[0, 0, 0], [1, 2, 2]]"},
       {"motions[].body", "\"shutter\""},
       {"film.inset.camera", "\"main\""},
+      {"film.labels", "[\"gate\"]"},
+      {"film.cuts[].bodies", "[\"gate\"]"},
   };
   if (const auto at = particular.find(key.path); at != particular.end()) return at->second;
   switch (key.type) {
@@ -743,6 +746,8 @@ TEST(Keys, EveryKeyChangesTheScene) {
     if (key.path == "cameras[].subject") sets = {"cameras=[{ name = \"side\" }]"};
     if (key.path == "film.length_s" || key.path == "film.pace_range") sets = {"film.pace=contact"};
     if (key.path.starts_with("film.inset.")) sets = {"film.inset={ camera = \"side\" }"};
+    if (key.path.starts_with("film.cuts[]"))
+      sets = {"film.cuts=[{ point_m = [1, 2, 3], normal = [0, 0, 1], bodies = [\"robot\"] }]"};
     for (const std::string_view card : {"film.title", "film.end_card"})
       if (key.parent() == card) sets = {fmt::format("{}={{ text = \"Before\" }}", card)};
     if (key.path == "bodies[].texture") sets = {"bodies.robot.color=\"#123456\""};  // a color turns it off
@@ -766,6 +771,7 @@ TEST(Keys, EveryKeyChangesTheScene) {
     if (path.starts_with("bodies[]")) path = replaced(path, "bodies[]", body);
     if (fixed && path.ends_with(".box_m")) path = replaced(path, "[]", ".1");
     if (path.find("parts[]") != path.npos) path = replaced(path, "parts[]", "parts.0");
+    if (path.starts_with("film.cuts[]")) path = replaced(path, "cuts[]", "cuts.0");
     if (path.starts_with("cameras[]")) path = replaced(path, "cameras[]", "cameras.side");
     if (path.find("keyframes[]") != path.npos) path = replaced(path, "keyframes[]", "keyframes.0");
     const std::string text = key.path == "motions[].body" ? good + shutter : good,
@@ -776,6 +782,57 @@ TEST(Keys, EveryKeyChangesTheScene) {
     ++leaves;
   }
   EXPECT_GT(leaves, 60);
+}
+
+TEST(ReadScene, LabelsNameBodiesOnceAndInWords) {
+  const std::string skin =
+      good +
+      "[[bodies]]\nname = \"lung_left\"\nrole = \"scenery\"\nmodel = { sphere = { diameter_m = 1 } }\n";
+  const auto labels = [&](const std::string& value) {
+    std::string all;
+    for (const LabelSpec& label : read_scene(skin, "s", {"film.labels=" + value}).film.labels)
+      all += fmt::format("{} {}, ", label.body, label.text);
+    return all;
+  };
+  EXPECT_EQ(labels("false"), "");
+  EXPECT_EQ(labels("true"), "0 Robot, 1 Gate, 2 Left lung, ");
+  EXPECT_EQ(labels("[\"lung_left\", \"gate\"]"), "2 Left lung, 1 Gate, ");
+  EXPECT_EQ(labels("{ gate = \"Ψ door\" }"), "1 Ψ door, ");
+  const auto said = [&](const std::string& set) { return complaint(skin, {"film.labels=" + set}); };
+  EXPECT_THAT(said("[\"lung_let\"]"), HasSubstr("did you mean \"lung_left\"?"));
+  EXPECT_THAT(said("[\"xyzw\"]"), HasSubstr("there are: robot, gate, lung_left"));
+  EXPECT_THAT(said("[\"gate\", \"gate\"]"), HasSubstr("names gate twice"));
+  EXPECT_THAT(said("{ gate = 3 }"), HasSubstr("film.labels.gate is a whole number; it must be a text"));
+  EXPECT_THAT(said("{ gate = \"  \" }"), HasSubstr("is empty"));
+  EXPECT_THAT(said("{ gate = \"a\\nb\" }"), HasSubstr("cannot be seen"));
+  EXPECT_THAT(said("{ gate = \"" + std::string(61, 'x') + "\" }"), HasSubstr("longer than 60 bytes"));
+  EXPECT_THAT(said("7"), HasSubstr("true or false, a list of bodies, or a table"));
+  EXPECT_THAT(complaint(skin, {"film.labels=true", "film.side_by_side=true"}), HasSubstr("take one of them"));
+}
+
+TEST(ReadScene, CutsOpenWhatIsSeenThroughOrIsNamed) {
+  const std::string skin = good +
+                           "[[bodies]]\nname = \"skin\"\nrole = \"scenery\"\nmodel = { sphere = { diameter_m "
+                           "= 1 } }\n",
+                    plane = "point_m = [0, 0, 1], normal = [0, 0, 2]";
+  const auto cut = [&](const std::string& text, const std::string& more, std::vector<std::string> sets) {
+    sets.push_back(fmt::format("film.cuts=[{{ {}{} }}]", plane, more));
+    return read_scene(text, "s", sets).film.cuts.at(0);
+  };
+  EXPECT_EQ(cut(skin, "", {}).bodies, std::vector<int>{2});
+  EXPECT_EQ(cut(skin, "", {"bodies.gate.opacity=0.5"}).bodies, (std::vector<int>{1, 2}));
+  EXPECT_EQ(cut(skin, ", bodies = [\"skin\", \"robot\"]", {}).bodies, (std::vector<int>{2, 0}));
+  EXPECT_EQ(cut(skin, "", {}).normal, Vec3(0, 0, 1));
+  const auto said = [&](const std::string& text, const std::string& cuts) {
+    return complaint(text, {"film.cuts=" + cuts});
+  };
+  EXPECT_THAT(said(good, "[{ " + plane + " }]"), HasSubstr("there are none; name bodies"));
+  EXPECT_THAT(said(skin, "[{ " + plane + ", bodies = [] }]"), HasSubstr("is empty"));
+  EXPECT_THAT(said(skin, "[{ " + plane + ", bodies = [\"skim\"] }]"), HasSubstr("did you mean \"skin\"?"));
+  EXPECT_THAT(said(skin, "[{ point_m = [0, 0, 1], normal = [0, 0, 0] }]"), HasSubstr("points nowhere"));
+  std::string seven = "[";
+  for (int i = 0; i < 7; ++i) seven += "{ " + plane + " },";
+  EXPECT_THAT(said(skin, seven + "]"), HasSubstr("has 7 planes; at most 6"));
 }
 
 TEST(Keys, DefaultsAreInTheirRanges) {
@@ -913,6 +970,9 @@ std::string all_of(const Scene& s) {
   t += fmt::format(" {} {} {} {} {} {} {} {}", int(f.look), int(f.pace), f.slowest, f.quickest,
                    f.length_s.value_or(-1), int(f.end), f.panes, f.outlines);
   t += fmt::format(" {}", f.ground_m.value_or(-1));
+  for (const LabelSpec& label : f.labels) t += fmt::format(" {} {}", label.body, label.text);
+  for (const CutSpec& cut : f.cuts)
+    t += fmt::format(" {} {} {}", v(cut.point_m), v(cut.normal), fmt::join(cut.bodies, " "));
   if (f.inset) t += fmt::format(" {} {}", f.inset->camera, f.inset->size);
   for (const auto& card : {f.title, f.end_card})
     if (card) t += fmt::format(" {} {} {}", fmt::join(card->lines, "|"), card->duration_s, card->plain);

@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include <list>
 #include <set>
 
 #include "fem/observe.h"
@@ -11,6 +12,7 @@
 #include "render/card.h"
 #include "render/caster.h"
 #include "render/color_map.h"
+#include "render/cut.h"
 #include "render/occlusion.h"
 #include "render/outline.h"
 
@@ -114,8 +116,10 @@ struct Shot::Painter::View {
     for (std::size_t b = 0; b < shot.bodies_.size(); ++b) add_body(b);
     for (std::size_t s = 0; s < shot.scenery_.size(); ++s)
       if (shot.scenery_[s].triangles.rows() > 0)
-        renderer.add_mesh(shot.scenery_[s].triangles, shot.scenery_[s].positions,
-                          look_of(shot.scene_.scenery[s], size_of(shot.scenery_[s])));
+        renderer.set_clip_planes(
+            renderer.add_mesh(shot.scenery_[s].triangles, shot.scenery_[s].positions,
+                              look_of(shot.scene_.scenery[s], size_of(shot.scenery_[s]))),
+            shot.cuts_of(int(shot.bodies_.size() + s)));
     for (std::size_t b = 0; b < shot.bodies_.size(); ++b) add_caster(b);
     const scenes::FilmSpec& film = shot.scene_.film;
     if (film.bounds_lines) renderer.add_lines(render::edges_of(shot.scene_.bounds_m), {});
@@ -179,6 +183,7 @@ struct Shot::Painter::View {
                      : shot.shows_own_colors(b) ? renderer.add_mesh(fine.triangles, fine.positions, look,
                                                                     prepared.appearance, shot.images_[b])
                                                 : renderer.add_mesh(fine.triangles, fine.positions, look));
+    renderer.set_clip_planes(meshes.back(), shot.cuts_of(int(b)));
     rest_normals.push_back(vertex_normals(prepared.surface.positions, prepared.surface.triangles));
     hulls.push_back(prepared.cage.positions);
     boxes.push_back(bounding_box(prepared.surface.positions));
@@ -198,6 +203,7 @@ struct Shot::Painter::View {
     made.stand_in = render::coarse_caster(surface_at_rest, triangles_of_caster);
     made.mesh =
         renderer.add_mesh(made.stand_in.triangles, made.stand_in.positions(surface_at_rest.positions), look);
+    renderer.set_clip_planes(made.mesh, shot.cuts_of(int(b)));
   }
 
   // From the nodes of a body's cage to the rows of its mesh, by the weights of the binding. Where only some
@@ -267,8 +273,17 @@ struct Shot::Painter::View {
   void occlude() {
     if (!shot.output_.occlusion) return;
     std::vector<render::Occluder> occluders;
-    for (std::size_t b = 0; b < hulls.size(); ++b)
-      if (shot.scene_.bodies[b].opacity == 1) occluders.push_back({hulls[b], shot.world_.bodies[b].surface});
+    std::list<SurfaceMesh> left;  // of what is cut
+    for (std::size_t b = 0; b < hulls.size(); ++b) {
+      if (shot.scene_.bodies[b].opacity < 1) continue;
+      const std::vector<render::Plane> cuts = shot.cuts_of(int(b));
+      if (cuts.empty()) {
+        occluders.push_back({hulls[b], shot.world_.bodies[b].surface});
+        continue;
+      }
+      left.push_back(render::cut_coarsely({hulls[b], shot.world_.bodies[b].surface}, cuts));
+      occluders.push_back({left.back().positions, left.back().triangles});
+    }
     for (std::size_t b = 0; b < hulls.size(); ++b) {
       Eigen::VectorXd hidden = hidden_by(occluders, b);
       if (crevices[b].size() > 0) hidden = 1 - (1 - hidden.array()) * crevices[b];
@@ -359,6 +374,9 @@ render::Image8 Shot::Painter::annotated(render::Image8 image, int frame) const {
                 .high = shot_.high_,
                 .color_srgb = film.color_by == scenes::ColorBy::volume ? render::diverging_srgb
                                                                        : render::sequential_srgb});
+  for (const Name& name : shot_.names_at(frame))
+    render::draw_label(image, name.words, name.place, name.end, shot_.letter_px_, shot_.words_.on_dark,
+                       name.share);
   const std::string clock = shot_.clock_at(frame);
   if (!film.caption.empty() || !clock.empty()) render::draw_caption(image, film.caption, clock, shot_.words_);
   if (film.scale_bar) {

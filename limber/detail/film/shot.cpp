@@ -2,11 +2,11 @@
 // itself.
 //
 // All of it is found once, before the first frame is painted: which moment each frame shows (shot_time.cpp),
-// the camera's path (shot_camera.cpp), where words and insets stand (shot_places.cpp), pushes, touches,
-// arrows and panes (shot_forces.cpp), and ranges of colours and depths (shot_passes.cpp). After that a shot
-// never changes, and a frame is a function of its number: any worker paints any frame, in any order, and gets
-// the same picture. The hash by which a frame is known is made in shot_hash.cpp; the painting is in
-// painter.cpp. Method: docs/rendering.md.
+// the camera's path (shot_camera.cpp), where words and insets stand (shot_places.cpp), names
+// (shot_labels.cpp), pushes, touches, arrows and panes (shot_forces.cpp), and ranges of colours and depths
+// (shot_passes.cpp). After that a shot never changes, and a frame is a function of its number: any worker
+// paints any frame, in any order, and gets the same picture. The hash by which a frame is known is made in
+// shot_hash.cpp; the painting is in painter.cpp. Method: docs/rendering.md.
 #include "limber/detail/film/shot.h"
 
 #include <fmt/ranges.h>
@@ -47,6 +47,7 @@ void require_letters(const scenes::FilmSpec& film) {
           "{}: limber's font has no letters for {} (it has Latin, Greek and Cyrillic)", key, missing));
   };
   require("film.caption", film.caption);
+  for (const scenes::LabelSpec& label : film.labels) require("film.labels", label.text);
   for (const auto& [key, card] :
        {std::pair("film.title", &film.title), std::pair("film.end_card", &film.end_card)})
     if (*card) require(key, fmt::format("{}", fmt::join((*card)->lines, " ")));
@@ -104,6 +105,7 @@ Shot::Shot(const scenes::Scene& scene, const std::string& camera, const plan::Pl
   }
   if (scene.film.inset && scene.film.inset->camera != camera) place_inset();
   place_words();
+  place_names();
   look_hash_ = hash_of_look();
 }
 
@@ -121,7 +123,8 @@ void Shot::check() const {
   if (!film.caption.empty()) in_the_way.emplace_back("--set film.caption=");
   for (const auto& [is_on, key] :
        {std::pair(film.clock, "clock"), std::pair(film.scale_bar, "scale_bar"),
-        std::pair(film.side_by_side, "side_by_side"), std::pair(film.outlines, "outlines")})
+        std::pair(film.side_by_side, "side_by_side"), std::pair(film.outlines, "outlines"),
+        std::pair(!film.labels.empty(), "labels")})
     if (is_on) in_the_way.push_back(fmt::format("--set film.{}=false", key));
   for (const auto& [is_on, key] :
        {std::pair(film.inset.has_value(), "inset"), std::pair(film.title.has_value(), "title"),
@@ -138,6 +141,16 @@ bool Shot::shows_own_colors(std::size_t body) const {
   return !bodies_[body].appearance.empty() && scene_.bodies[body].texture &&
          (scene_.film.color_by == scenes::ColorBy::body ||
           world_.bodies[body].kind != fem::BodyKind::deformable);
+}
+
+std::vector<render::Plane> Shot::cuts_of(int body) const {
+  std::vector<render::Plane> planes;
+  for (const scenes::CutSpec& cut : scene_.film.cuts)
+    if (std::count(cut.bodies.begin(), cut.bodies.end(), body) > 0) {
+      planes.emplace_back();
+      planes.back() << -cut.normal, cut.normal.dot(cut.point_m);
+    }
+  return planes;
 }
 
 // The cages' nodes of bodies that move, at every stored state, and all surfaces at rest: bodies that stand

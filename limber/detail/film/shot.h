@@ -17,6 +17,7 @@
 #include "render/annotate.h"
 #include "render/camera.h"
 #include "render/image.h"
+#include "render/label_places.h"
 #include "render/renderer.h"
 
 namespace limber::detail {
@@ -63,6 +64,16 @@ class Shot {
   // {"depth_m": [near, far], "objects": ["", NAME…], "scalar": {…}, "contacts": […]}: what the levels of the
   // passes mean, and where in the pictures the robot is touched. docs/files.md.
   Json key_of_passes() const;
+  // The names that a frame shows: what is written, where, and where its line ends; `share`, 0 < … ≤ 1, is how
+  // much of it is seen while it comes or goes.
+  struct Name {
+    std::string words;
+    int body;  // of bodies and, after those, of scenery
+    render::LabelPlace place;
+    Eigen::Vector2d end;
+    double share;
+  };
+  std::vector<Name> names_at(int frame) const;
   // Of all that the picture depends on.
   std::string hash_of(int frame) const;
 
@@ -125,6 +136,8 @@ class Shot {
   void lay_out_camera(double aspect);
   void check() const;
   void place_words();
+  void place_names();
+  std::vector<Eigen::Vector4d> places_taken() const;  // by other words than names
   void place_inset();
   Eigen::Vector4d place_of_inset(render::Corner) const;
   // How many of some places in each box, one a corner (pixels: left, top, right, bottom), are on bodies, over
@@ -141,6 +154,8 @@ class Shot {
   // length: the control's push, what each body does to the robot and last the walls, each force of the world.
   Points arrows_at(int frame) const;
   bool shows_own_colors(std::size_t body) const;
+  // The planes that cut a body, or what of the scenery follows the bodies, in the picture.
+  std::vector<render::Plane> cuts_of(int body) const;
   Points arrows_at_stored(int stored) const;
   bool acts(const fem::Force&, int stored) const;  // in some step of those from this frame to the next
   std::uint64_t hash_of_look() const;
@@ -157,10 +172,13 @@ class Shot {
   render::RenderSettings look_;          // of one view
   std::vector<render::CameraKey> path_;  // over the share of the film
   Points followed_m_;                    // (frames × 3) the way of the body that the camera follows, or none
-  render::CaptionLook words_;            // where the words stand, and on what
-  double scale_m_ = 0;                   // what the bar of length is long
-  double low_ = 0, high_ = 1;            // of the bar of colours
-  double near_m_ = 0, far_m_ = 1;        // depths of all that is ever seen
+  struct Labeling;
+  std::vector<std::vector<Name>> names_;  // a frame; empty: the film has no labels
+  double letter_px_ = 0;                  // of names
+  render::CaptionLook words_;             // where the words stand, and on what
+  double scale_m_ = 0;                    // what the bar of length is long
+  double low_ = 0, high_ = 1;             // of the bar of colours
+  double near_m_ = 0, far_m_ = 1;         // depths of all that is ever seen
   double strongest_push_n_ = 0, arrow_m_per_n_ = 0, arrow_radius_m_ = 0;
   std::vector<Moment> moments_;  // a frame
   int before_ = 0, of_motion_ = 1;

@@ -35,6 +35,10 @@ std::uint64_t Shot::hash_of_look() const {
                           film.tree, film.side_by_side, film.scale_bar})
     hasher.value(int(flag));
   if (film.outlines) hasher.text("outlines");
+  for (const scenes::CutSpec& cut : film.cuts) {
+    hasher.text("cut").matrix(cut.point_m).matrix(cut.normal);
+    for (const int body : cut.bodies) hasher.value(body);
+  }
   hasher.text(film.caption).value(int(film.color_by)).value(low_).value(high_).value(film.speed);
   hasher.value(film.frames_per_second).value(frames()).value(output_.bits);
   if (!output_.occlusion) hasher.value(0);
@@ -79,7 +83,8 @@ std::uint64_t Shot::hash_of_look() const {
   return hasher.digest();
 }
 
-// The state that the frame shows, the camera, and what changes from frame to frame: card, inset, panes, pace.
+// The state that the frame shows, the camera, and what changes from frame to frame: card, inset, names,
+// panes, pace.
 std::string Shot::hash_of(int frame) const {
   const render::Camera camera = camera_of(frame);
   Hasher hasher;
@@ -94,6 +99,12 @@ std::string Shot::hash_of(int frame) const {
         .text(fmt::format("{}", fmt::join(card->lines, "\n")))
         .value(int(card->plain));
   if (inset_) hasher.text(inset_->hash_of(frame)).value(int(inset_corner_)).value(scene_.film.inset->size);
+  for (const Name& name : names_at(frame))
+    hasher.text(name.words)
+        .value(name.place.left_px)
+        .value(name.place.baseline_px)
+        .matrix(name.end)
+        .value(name.share);
   for (const PaneOf& pane : panes_)
     if (const double share = shown(pane.shown, frame); share > 0)
       hasher.value(pane.body).value(pane.wall.axis).value(int(pane.wall.upper)).value(share);

@@ -37,6 +37,10 @@ Json Shot::key_of_passes() const {
   const auto list = [](const Vec3& v) { return Json{v.x(), v.y(), v.z()}; };
   for (int f = 0; f < frames(); ++f) {
     key["contacts"].push_back(contacts_in_picture(f));
+    Json names = Json::array();
+    for (const Name& name : names_at(f))
+      names.push_back({name.words, name.body + 1, name.end.x(), name.end.y(), name.share});
+    if (!names_.empty()) key["labels"].push_back(std::move(names));
     const render::Camera camera = camera_of(f);
     key["cameras"].push_back(
         {{"eye_m", list(camera.eye)}, {"target_m", list(camera.target)}, {"fov_deg", camera.fov_deg}});

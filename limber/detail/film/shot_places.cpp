@@ -141,11 +141,12 @@ Eigen::Vector4d Shot::place_of_inset(render::Corner corner) const {
 }
 
 // The inset is a shot of its own: the same motion, bodies and look, seen by another camera in a smaller
-// picture. It has no inset itself, and no passes.
+// picture. It has no inset and no names itself, and no passes.
 void Shot::place_inset() {
   const scenes::FilmSpec& film = scene_.film;
   inset_scene_ = std::make_unique<scenes::Scene>(scene_);
   inset_scene_->film.inset.reset();
+  inset_scene_->film.labels.clear();
   Output output;
   output.occlusion = output_.occlusion;
   const auto side = [&](int whole) { return std::max(16, int(std::lround(film.inset->size * whole))); };
