@@ -16,7 +16,7 @@ namespace limber::detail {
 
 namespace {
 
-constexpr int between_looks_us = 20000;
+constexpr int between_workers_us = 20000;
 constexpr int most_crashes = 50;                // of all workers together; a unit gives up long before
 constexpr double patience_with_stopped_s = 20;  // with those that are told to stop: a search is kept
 constexpr double between_counts_s = 0.5;
@@ -52,7 +52,7 @@ class Workers {
         throw_if_stopped();
         throw Interrupted(SIGTERM);
       }
-      ::usleep(between_looks_us);
+      ::usleep(between_workers_us);
       for (std::size_t w = 0; w < workers_.size(); ++w) look_after(w);
       if (seconds_since(counted) > between_counts_s) tell(progress), counted = Clock::now();
     }
@@ -93,7 +93,7 @@ class Workers {
       if (worker) worker->stop();
     for (const Clock::time_point began = Clock::now();
          any_runs() && seconds_since(began) < patience_with_stopped_s;) {
-      ::usleep(between_looks_us);
+      ::usleep(between_workers_us);
       for (auto& worker : workers_)
         if (worker && worker->ended()) worker.reset();
     }
