@@ -230,13 +230,24 @@ std::string bytes_by_assimp(const fs::path& path) {
   return bytes_of(soup_of(*scene));
 }
 
+bool is_read_by_assimp(const std::string& ending) {
+  return ending.empty() || Assimp::Importer().IsExtensionSupported(ending);
+}
+
 }  // namespace
 
 PolygonSoup read_by_assimp(const fs::path& path) {
   const OwnProcessResult result = run_in_own_process([&] { return bytes_by_assimp(path); }, cpu_seconds);
-  if (!result.finished)
+  if (!result.finished) {
+    const std::string file = path.filename().string(), ending = path.extension().string();
+    if (!is_read_by_assimp(ending))  // what it then complains of is another format
+      throw InputError(fmt::format(
+          "{}: nothing here reads {} files, and by its content it is no other model either; export "
+          "it as OBJ, PLY, STL or glTF",
+          file, ending));
     throw InputError(fmt::format("{}: the model cannot be read (assimp: {}); is it complete, and a 3D model?",
-                                 path.filename().string(), result.bytes));
+                                 file, result.bytes));
+  }
   return soup_from(result.bytes);
 }
 

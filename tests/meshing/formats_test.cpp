@@ -301,7 +301,12 @@ TEST(Formats, ComplaintsNameTheLine) {
   EXPECT_THAT(format_complaint("k.stl", stl.substr(0, stl.size() - 20)),
               HasSubstr("ends inside triangle 11"));
   EXPECT_THAT(format_complaint("empty.obj", ""), HasSubstr("the file is empty"));
-  EXPECT_THAT(format_complaint("noise.xyzzy", std::string(1000, '\7')), HasSubstr("cannot be read"));
+  // What assimp says of a format that it does not know is of another format.
+  EXPECT_THAT(format_complaint("noise.xyzzy", std::string(1000, '\7')),
+              AllOf(HasSubstr("nothing here reads .xyzzy files"), Not(HasSubstr("assimp"))));
+  EXPECT_THAT(format_complaint("noise.3ds", std::string(1000, '\7')), HasSubstr("cannot be read (assimp: "));
+  EXPECT_THAT(format_complaint("noise", std::string(1000, '\7')), HasSubstr("cannot be read (assimp: "));
+  EXPECT_THAT(format_complaint("names.obj", "o nothing\n"), HasSubstr("holds neither faces nor points"));
   EXPECT_THROW(import_model("no/such/file.obj"), InputError);
   EXPECT_THROW(import_model(testing::TempDir()), InputError);
 }
