@@ -472,6 +472,8 @@ std::string value_for(const scenes::Key& key, const std::vector<std::string>& bo
       return box_for(key, script);
     case Type::boxes:
       return fmt::format("[{}, {}]", box_for(key, script), box_for(key, script));
+    case Type::points:
+      return fmt::format("[{}, {}, {}]", numbers(3), numbers(3), numbers(3));
     case Type::boolean:
       return script.below(2) == 0 ? "true" : "false";
     case Type::color:

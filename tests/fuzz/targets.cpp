@@ -17,6 +17,7 @@
 #include "meshing/import.h"
 #include "plan/plan_file.h"
 #include "scenes/models.h"
+#include "scenes/shapes.h"
 #include "scenes/problems.h"
 #include "scenes/scene.h"
 #include "tests/core/deflated_zip.h"
@@ -416,6 +417,8 @@ bool is_small(const scenes::BodySpec& body) {
     return few(plate->box.size_m, plate->box.triangle_m);
   if (const auto* sphere = std::get_if<scenes::SphereModel>(&body.model))
     return few(Vec3::Constant(sphere->diameter_m), sphere->triangle_m);
+  if (const auto* tube = std::get_if<scenes::TubeModel>(&body.model))
+    return few(Vec3(scenes::length_m(*tube), tube->diameter_m, tube->diameter_m), tube->triangle_m);
   return false;
 }
 
