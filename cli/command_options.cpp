@@ -27,6 +27,23 @@ void add_global(CLI::App& command, GlobalOptions& options) {
   command.add_flag("-v,--verbose", options.verbose, "more on stderr");
 }
 
+void add_label_surfaces(CLI::App& command, double& gap, int& rounds, double& least_island) {
+  command
+      .add_option(
+          "--label-gap", gap,
+          "between surfaces of labels that share a boundary, share of the shortest voxel edge, 0 … 0.6")
+      ->check(within(0.0, 0.6))
+      ->capture_default_str();
+  command.add_option("--label-smoothing", rounds, "rounds in which a label's surface is smoothed, 0 … 1000")
+      ->check(CLI::Range(0, 1000))
+      ->capture_default_str();
+  command
+      .add_option("--least-island", least_island,
+                  "voxels; pieces of a label that have fewer are left out, 0 … 1e9")
+      ->check(within(0.0, 1e9))
+      ->capture_default_str();
+}
+
 void add_threads(CLI::App& command, GlobalOptions& options) {
   command
       .add_option("--threads", options.threads,

@@ -16,6 +16,7 @@
 #include "limber/detail/farm/work.h"
 #include "limber/detail/film/render.h"
 #include "limber/detail/film/start.h"
+#include "limber/detail/film/storyboard.h"
 #include "limber/detail/plan/plan.h"
 #include "limber/detail/plan/refine.h"
 #include "limber/detail/plan/simulate.h"
@@ -62,6 +63,7 @@ Outcome new_scene(const detail::NewSceneOptions&);
 // Exit code 2, with all that is wrong, where it cannot even be simulated.
 Outcome check_scene(const detail::SceneCheckOptions&);
 Outcome render_still(const detail::StillOptions&);
+Outcome write_storyboard(const detail::StoryboardOptions&);
 // Makes it anew whenever the scene, a model, or an image of one is edited, and prints its name; what is wrong
 // with an edit is told, and waited for. Ends by Interrupted alone, or when the picture cannot be written.
 Outcome watch_still(detail::StillOptions);

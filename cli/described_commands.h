@@ -48,7 +48,7 @@ struct DescribedCommands {
   detail::PlanOptions plan_options;   // plan and run
   detail::SimulateOptions simulate_options;
   detail::RenderOptions render_options;  // render and run
-  bool still = false, watch = false;
+  bool still = false, storyboard = false, watch = false;
   detail::StillOptions still_options;
   detail::ExportOptions export_options;
   double export_density_kg_m3 = detail::BodyExportOptions{}.density_kg_m3;

@@ -172,7 +172,9 @@ void DescribedCommands::add_motion_commands() {
   simulate_command.callback([&] { chosen = [&] { return cli::simulate(simulate_options); }; });
 
   CLI::App& render_command = *program.add_subcommand("render", "path → frames, contact sheet, film");
-  render_command.add_option("DIR", render_options.folder, "work folder with a plan; with --still a scene")
+  render_command
+      .add_option("DIR", render_options.folder,
+                  "work folder with a plan; with --still or --storyboard a scene")
       ->required();
   add_render(render_command, render_options);
   render_command
@@ -183,35 +185,47 @@ void DescribedCommands::add_motion_commands() {
       ->allow_extra_args(false);
   CLI::Option* const still_flag = render_command.add_flag(
       "--still", still, "paint the start of a scene, a file or a name, before any plan: one PNG");
+  CLI::Option* const storyboard_flag = render_command.add_flag(
+      "--storyboard", storyboard,
+      "before any plan: one sheet of what each camera of a scene sees at the start and at the goal");
+  storyboard_flag->excludes(still_flag);
   CLI::Option* const watch_flag =
       render_command
           .add_flag("--watch", watch,
                     "of --still: paint it anew whenever the scene, or a model of it, is edited, until Ctrl-C")
           ->needs(still_flag);
   render_command
-      .add_option("-o,--out", still_options.out, "of --still: the picture; default: the scene's name.png")
-      ->type_name("FILE.png")
-      ->needs(still_flag);
+      .add_option(
+          "-o,--out", still_options.out,
+          "of --still and --storyboard: the picture; default: the scene's name.png, name-storyboard.png")
+      ->type_name("FILE.png");
   render_command
-      .add_option("--data", still_options.scene.data,
-                  "of --still: a folder in which model files of the scene are looked for first")
+      .add_option(
+          "--data", still_options.scene.data,
+          "of --still and --storyboard: a folder in which model files of the scene are looked for first")
       ->type_name("DIR")
       ->check(CLI::ExistingDirectory)
-      ->allow_extra_args(false)
-      ->needs(still_flag);
+      ->allow_extra_args(false);
   render_command.add_flag("--resume", render_options.resume,
                           "keep frames that already show what they should");
   add_global(render_command, global), add_threads(render_command, global),
       add_progress(render_command, global);
   watch_flag->excludes(render_command.get_option("--json"));
   for (const char* of_a_film : {"--frames", "--chunk", "--passes", "--bits", "--as", "--video", "--resume"})
-    still_flag->excludes(of_a_film);
+    still_flag->excludes(of_a_film), storyboard_flag->excludes(of_a_film);
+  storyboard_flag->excludes("--camera");
   render_command.callback([&] {
     chosen = [&] {
-      if (!still) return cli::render(render_options);
+      if (!still && !storyboard) {
+        if (still_options.out || !still_options.scene.data.empty())
+          throw InputError("-o and --data are of --still and --storyboard; a film is in its work folder");
+        return cli::render(render_options);
+      }
       still_options.scene.scene = render_options.folder.string();
       still_options.scene.sets = render_options.sets;
       still_options.camera = render_options.camera, still_options.size = render_options.size;
+      if (storyboard)
+        return cli::write_storyboard({still_options.scene, still_options.size, still_options.out});
       return watch ? cli::watch_still(still_options) : cli::render_still(still_options);
     };
   });

@@ -8,9 +8,12 @@ namespace limber::cli {
 
 Outcome new_scene(const detail::NewSceneOptions& options) {
   const detail::NewScene made = detail::new_scene(options);
-  const std::string next =
-      fmt::format("limber run {}{} -o DIR", made.file.string(),
-                  made.data.empty() ? std::string() : fmt::format(" --data {}", made.data.string()));
+  const std::string data = made.data.empty() ? std::string() : fmt::format(" --data {}", made.data.string()),
+                    next =
+                        made.plannable
+                            ? fmt::format("limber run {}{} -o DIR", made.file.string(), data)
+                            : fmt::format("limber simulate {}{} --duration 1.2s -o DIR && limber render DIR",
+                                          made.file.string(), data);
   Json moved_m = Json::object();
   std::string text = fmt::format("{}: {} bodies at {:g} of their size, {} only seen\n", made.file.string(),
                                  made.bodies, made.scale, made.scenery);

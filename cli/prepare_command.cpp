@@ -114,22 +114,8 @@ void DescribedCommands::add_prepare_command() {
       .add_option("--label", prepare_options.label,
                   "of a label map (NIfTI or NRRD): which label, by its number or the name that the file has")
       ->type_name("LABEL");
-  prepare_command
-      .add_option(
-          "--label-gap", prepare_options.label_gap,
-          "between surfaces of labels that share a boundary, share of the shortest voxel edge, 0 … 0.6")
-      ->check(within(0.0, 0.6))
-      ->capture_default_str();
-  prepare_command
-      .add_option("--label-smoothing", prepare_options.label_rounds,
-                  "rounds in which a label's surface is smoothed, 0 … 1000")
-      ->check(CLI::Range(0, 1000))
-      ->capture_default_str();
-  prepare_command
-      .add_option("--least-island", prepare_options.min_island,
-                  "voxels; pieces of a label that have fewer are left out, 0 … 1e9")
-      ->check(within(0.0, 1e9))
-      ->capture_default_str();
+  add_label_surfaces(prepare_command, prepare_options.label_gap, prepare_options.label_rounds,
+                     prepare_options.min_island);
   add_store(prepare_command, prepare_options.store, "none, or of many models store in -o");
   of_many = {
       prepare_command

@@ -168,4 +168,14 @@ Outcome render_still(const detail::StillOptions& options) {
           still.file.string() + "\n"};
 }
 
+Outcome write_storyboard(const detail::StoryboardOptions& options) {
+  const detail::WrittenStoryboard made = detail::write_storyboard(options);
+  return {exit_done,
+          {{"storyboard", made.file.string()},
+           {"size", {made.size_px.first, made.size_px.second}},
+           {"cameras", made.cameras},
+           {"moments", made.moments}},
+          made.file.string() + "\n"};
+}
+
 }  // namespace limber::cli

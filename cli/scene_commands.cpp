@@ -26,10 +26,26 @@ void DescribedCommands::add_scene_commands() {
                   "names of the label map's labels: a JSON file, {\"5\": \"liver\"} or {\"liver\": 5}")
       ->type_name("FILE")
       ->check(CLI::ExistingFile);
+  add_label_surfaces(new_command, new_options.label_gap, new_options.label_rounds, new_options.min_island);
   new_command.add_option("-o,--out", new_options.out, "scene file to write")->required()->type_name("FILE");
-  new_command.add_option("--robot", new_options.robot, "the model that is to move")
+  new_command.add_option("--robot", new_options.robot, "the model that the scene is about")
       ->required()
       ->type_name("NAME");
+  new_command
+      .add_option_function<std::string>(
+          "--story",
+          [&](const std::string& word) {
+            using detail::Story;
+            new_options.story = word == "instrument" ? Story::instrument
+                                : word == "aside"    ? Story::aside
+                                : word == "tour"     ? Story::tour
+                                                     : Story::away;
+          },
+          "away: it moves away, past all that lies that way; aside: it is moved aside; instrument: one comes "
+          "to "
+          "it; tour: nothing moves but the cameras; default: away")
+      ->check(CLI::IsMember({"away", "instrument", "aside", "tour"}))
+      ->type_name("STORY");
   const auto names = [&](const char* flag, std::vector<std::string>& list, const char* meaning) {
     new_command.add_option(flag, list, meaning)
         ->type_name("NAME[,NAME…]")
@@ -52,10 +68,9 @@ void DescribedCommands::add_scene_commands() {
       ->capture_default_str();
   new_command
       .add_option("--goal", new_options.goal,
-                  "where the robot goes, past all that lies that way: front, back, left, right (the body's), "
-                  "up, down")
-      ->check(CLI::IsMember({"front", "back", "left", "right", "up", "down"}))
-      ->capture_default_str();
+                  "where the robot goes: front, back, left, right (the body's), up, down; default: front, or "
+                  "aside to where least is in its way")
+      ->check(CLI::IsMember({"front", "back", "left", "right", "up", "down"}));
   new_command
       .add_option("--tets", new_options.tets, "of each soft cage, about; 60 … 20000; more fit more closely")
       ->check(CLI::Range(60, 20000))

@@ -5,6 +5,8 @@
 #include <map>
 
 #include "core/mesh_files.h"
+#include "render/image_file.h"
+#include "render/png_file.h"
 #include "scenes/scene.h"
 #include "tests/cli/program.h"
 #include "tests/imaging/made_maps.h"
@@ -93,6 +95,62 @@ TEST_F(NewScene_slow, AFlatRobotsGoalIsOutOfItsReachAtTheStart) {
   const scenes::Scene scene = scenes::read_scene_file(folder / "chest.toml");
   EXPECT_NEAR(scene.goal.center_of_mass_m.x(), 0.1, 0.005);
   EXPECT_NEAR(scene.goal.radius_m, 0.04, 1e-9);
+}
+
+// Four cameras, names of all but the skin, which is opened; what moves is what the story says.
+TEST_F(NewScene_slow, EachStoryIsAFilmOfFourCameras) {
+  for (const char* story : {"away", "instrument", "aside", "tour"}) {
+    SCOPED_TRACE(story);
+    const Result made = limber_program(words({"--robot", "heart", "--story", story}));
+    ASSERT_EQ(made.code, exit_done) << made.err;
+    const scenes::Scene scene = scenes::read_scene_file(folder / "chest.toml");
+    const bool tour = story == std::string("tour"), instrument = story == std::string("instrument");
+    EXPECT_EQ(scene.cameras.size(), 4u);
+    EXPECT_EQ(scene.film.look, scenes::FilmLook::clinical);
+    EXPECT_EQ(scene.film.labels.size(), instrument ? 4u : 3u);
+    ASSERT_EQ(scene.film.cuts.size(), 1u);
+    EXPECT_EQ(scene.film.cuts[0].bodies, std::vector<int>{int(scene.bodies.size())});  // the skin
+    EXPECT_EQ(scene.lacks.empty(), !tour);
+    EXPECT_THAT(made.out, HasSubstr(tour ? "limber simulate" : "limber run"));
+    EXPECT_EQ(scene.cameras[0].keyframes.size(), tour ? 5u : 0u);
+    const scenes::BodySpec& robot = scene.bodies[std::size_t(scene.robot)];
+    if (instrument) {
+      EXPECT_EQ(robot.name, "instrument");
+      // From before the heart, past the lung, to 2 mm before its front, 40 mm from its middle.
+      const double left_m = (scene.goal.center_of_mass_m - Vec3(0, 0, 1)).norm();
+      EXPECT_NEAR(left_m, 0.04 + 0.002 + 0.075, 0.02);
+      EXPECT_GT((robot.pose.position_m - scene.goal.center_of_mass_m).norm(), 0.07);
+    }
+    if (story == std::string("aside")) {
+      EXPECT_LT((scene.goal.center_of_mass_m - Vec3(0, 0, 1)).norm(), 0.09);
+      EXPECT_GT((scene.goal.center_of_mass_m - Vec3(0, 0, 1)).norm(), scene.goal.radius_m + 0.03);
+    }
+    fs::remove(folder / "chest.toml");
+  }
+  EXPECT_THAT(limber_program(words({"--robot", "heart", "--story", "tour", "--goal", "left"})).err,
+              HasSubstr("does not move"));
+  EXPECT_THAT(limber_program(words({"--robot", "spine", "--story", "aside"})).err,
+              HasSubstr("there are: heart, lung"));
+}
+
+TEST_F(NewScene_slow, AnInstrumentAndATourGoAsTheyAre) {
+  ASSERT_EQ(limber_program(words({"--robot", "heart", "--story", "instrument"})).code, exit_done);
+  const std::string file = (folder / "chest.toml").string();
+  const Result sheet = limber_program({"render", file, "--storyboard", "--data", models().string(), "-o",
+                                       (folder / "sheet.png").string(), "--size", "160x90", "--json"});
+  ASSERT_EQ(sheet.code, exit_done) << sheet.err;
+  EXPECT_EQ(sheet.json().at("cameras").size(), 4u);
+  EXPECT_EQ(sheet.json().at("moments"), Json({"start", "goal"}));
+  const render::Image8 picture = render::read_png(folder / "sheet.png");
+  EXPECT_GT(picture.width, 2 * 160);
+  EXPECT_GT(picture.height, 4 * 90);
+  const Result planned = limber_program({"plan", file, "--data", models().string(), "-o", out(), "--json"});
+  ASSERT_EQ(planned.code, exit_done) << planned.err;
+  fs::remove(file);
+  ASSERT_EQ(limber_program(words({"--robot", "heart", "--story", "tour"})).code, exit_done);
+  const Result simulated = limber_program(
+      {"simulate", file, "--data", models().string(), "--duration", "0.1s", "-o", out("tour"), "-q"});
+  EXPECT_EQ(simulated.code, exit_done) << simulated.err;
 }
 
 TEST_F(NewScene_slow, IsPlannedAsItIs) {
@@ -263,6 +321,19 @@ TEST_F(SceneOfAScan, ChosenPartsAreMadeAlone) {
   EXPECT_THAT(all, testing::UnorderedElementsAre("heart", "vertebrae_L1", "vertebrae_L2"));
 }
 
+// A wider gap is seen between what touches; more of a crumb is left where crumbs may be small.
+TEST_F(SceneOfAScan_slow, SurfacesAreMadeAsAskedFor) {
+  ASSERT_EQ(limber_program(words({"--robot", "heart", "--least-island", "1"})).code, exit_done);
+  EXPECT_TRUE(fs::exists(made() / "cyst.ply"));
+  const double smooth = volume(read_ply(made() / "heart.ply"));
+  fs::remove_all(made()), fs::remove(folder / "chest.toml");
+  ASSERT_EQ(limber_program(words({"--robot", "heart", "--label-smoothing", "0"})).code, exit_done);
+  EXPECT_FALSE(fs::exists(made() / "cyst.ply"));
+  EXPECT_NEAR(volume(read_ply(made() / "heart.ply")), 80 * 80 * 80, 1);  // its voxels
+  EXPECT_GT(std::abs(smooth - 80 * 80 * 80), 100);
+  EXPECT_EQ(limber_program(words({"--robot", "heart", "--label-gap", "0.7"})).code, exit_bad_input);
+}
+
 TEST_F(SceneOfAScan_slow, ItIsPlannedWithoutAnEdit) {
   ASSERT_EQ(limber_program(words()).code, exit_done);
   const Result planned = limber_program({"plan", (folder / "chest.toml").string(), "-o", out(), "--json"});
@@ -336,6 +407,20 @@ TEST_F(SceneOfAnAtlas, PartsAreFoundByNameAndId) {
   EXPECT_LT((at.at("left_kidney") - Vec3(0.1, 0.15, 1)).norm(), 1e-9);
   EXPECT_LT((at.at("lumbar_vertebra") - Vec3(-0.2, 0, 1)).norm(), 1e-9);
   EXPECT_EQ(scene.bodies[2].kind, scenes::Kind::rigid);
+}
+
+TEST_F(SceneOfAnAtlas, BonesAreOneBody) {
+  cube("FJ5", {0, 200, 1100}, 60);
+  fs::rename(models() / "FJ5.obj", atlas() / "FJ5.obj");
+  table("partof_element_parts.txt", "FMA3\tthoracic vertebra\tFJ5\n");
+  const Result result = made({"--robot", "heart", "--only", "heart,left_kidney,FMA13322,FMA3"});
+  ASSERT_EQ(result.code, exit_done) << result.err;
+  EXPECT_THAT(result.out, HasSubstr("skeleton is 2 parts in one: lumbar vertebra, thoracic vertebra"));
+  const scenes::Scene scene = scenes::read_scene_file(folder / "chest.toml");
+  ASSERT_EQ(scene.bodies.size(), 3u);
+  EXPECT_EQ(scene.bodies[2].name, "skeleton");
+  EXPECT_EQ(scene.bodies[2].kind, scenes::Kind::rigid);
+  EXPECT_LT((scene.bodies[2].pose.position_m - Vec3(-0.2, 0, 1.05)).norm(), 1e-9);
 }
 
 TEST_F(SceneOfAnAtlas, WhatDoesNotFitIsRefusedAndNothingStays) {

@@ -15,11 +15,15 @@ double share_in_sight(const Points& points, const Vec3& toward_eye, std::span<co
   axes << x.transpose(), z.cross(x).transpose(), z.transpose();
   const Points seen = points * axes.transpose();
   std::vector<bool> hidden(std::size_t(seen.rows()), false);
+  const Vec3 lower = seen.colwise().minCoeff().transpose(), upper = seen.colwise().maxCoeff().transpose();
   for (const SurfaceMesh& mesh : hiding) {
     const Points corners = mesh.positions * axes.transpose();
     for (Eigen::Index t = 0; t < mesh.triangles.rows(); ++t) {
       const Vec3 a = corners.row(mesh.triangles(t, 0)), ab = Vec3(corners.row(mesh.triangles(t, 1))) - a,
                  ac = Vec3(corners.row(mesh.triangles(t, 2))) - a;
+      const Vec3 low = Vec3::Zero().cwiseMin(ab).cwiseMin(ac) + a,
+                 high = Vec3::Zero().cwiseMax(ab).cwiseMax(ac) + a;
+      if ((low.array() > upper.array()).head<2>().any() || (high.array() < lower.array()).any()) continue;
       const double area = ab.x() * ac.y() - ab.y() * ac.x();
       if (area == 0) continue;  // seen edge on
       for (Eigen::Index p = 0; p < seen.rows(); ++p) {

@@ -54,7 +54,7 @@ void append(SurfaceMesh& mesh, const SurfaceMesh& more) {
 
 // Bones that stand at their places are one body.
 void join(std::vector<Part>& parts, const char* name, const std::function<bool(const std::string&)>& is_one,
-          std::vector<std::string>& notes) {
+          const char* what, std::vector<std::string>& notes) {
   const auto first =
       std::stable_partition(parts.begin(), parts.end(), [&](const Part& part) { return !is_one(part.name); });
   if (parts.end() - first < 2) return;
@@ -64,7 +64,15 @@ void join(std::vector<Part>& parts, const char* name, const std::function<bool(c
     append(joined.surface, part->surface), names.push_back(part->name);
   parts.erase(first, parts.end());
   parts.push_back(std::move(joined));
-  notes.push_back(fmt::format("{} is {} labels in one: {}", name, names.size(), fmt::join(names, ", ")));
+  notes.push_back(fmt::format("{} is {} {} in one: {}", name, names.size(), what, fmt::join(names, ", ")));
+}
+
+void join_bones(std::vector<Part>& parts, const char* what, std::vector<std::string>& notes) {
+  join(parts, "ribcage", scenes::is_of_ribcage, what, notes);
+  join(
+      parts, "skeleton",
+      [](const std::string& name) { return scenes::anatomy_of(name).kind == scenes::PartKind::bone; }, what,
+      notes);
 }
 
 // ---- scans ----
@@ -131,7 +139,7 @@ std::vector<Part> parts_of_scan(const PartSource& source, std::vector<std::strin
   if (rows.empty())
     for (int row = 1; row < int(map.labels.size()); ++row) rows.push_back(row);
   log::info("{}: making surfaces of {} labels", source.from.string(), rows.size());
-  std::vector<imaging::LabelSurface> labels = imaging::surfaces_of(map, rows);
+  std::vector<imaging::LabelSurface> labels = imaging::surfaces_of(map, rows, source.surfaces);
   std::vector<Part> parts;
   for (std::size_t i = 0; i < rows.size(); ++i) {
     const std::string name = name_of(map, rows[i]);
@@ -141,13 +149,7 @@ std::vector<Part> parts_of_scan(const PartSource& source, std::vector<std::strin
     if (labels[i].voxels > 0) parts.push_back({name, std::move(labels[i].surface)});
   }
   if (parts.empty()) throw InputError(fmt::format("{}: no label is more than crumbs", source.from.string()));
-  if (source.only.empty()) {
-    join(parts, "ribcage", scenes::is_of_ribcage, notes);
-    join(
-        parts, "skeleton",
-        [](const std::string& name) { return scenes::anatomy_of(name).kind == scenes::PartKind::bone; },
-        notes);
-  }
+  if (source.only.empty()) join_bones(parts, "labels", notes);
   return parts;
 }
 
@@ -264,6 +266,7 @@ std::vector<Part> parts_of_atlas(const PartSource& source, std::vector<std::stri
     part.surface.positions /= units_a_metre;  // the atlas' are millimetres
     parts.push_back(std::move(part));
   }
+  join_bones(parts, "parts", notes);
   return parts;
 }
 

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "core/file.h"
+#include "imaging/surface_nets.h"
 
 namespace limber::detail {
 
@@ -14,6 +15,7 @@ struct PartSource {
   fs::path names;  // of labels, a JSON file; empty: those that the label map has
   std::vector<std::string>
       only;  // these parts alone: names, label numbers, the atlas' ids; empty: all labels
+  imaging::SurfaceNetOptions surfaces = {};  // of labels
 };
 
 struct PartModels {
