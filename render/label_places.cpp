@@ -17,8 +17,9 @@ namespace {
 using Vec2 = Eigen::Vector2d;
 
 constexpr double pitch = 2.3, between = 1.2,
-                 gap = 0.7;  // letters: of slots; subject and words; words and line
-constexpr double fine = 2;   // heights of the picture
+                 gap = 0.7;      // letters: of slots; subject and words; words and line
+constexpr double fine = 2;       // heights of the picture
+constexpr double outside = 0.7;  // the same, of a line that runs out of the picture's middle
 constexpr int max_changes = 400;
 
 double side_of(const Vec2& a, const Vec2& b, const Vec2& p) {
@@ -117,6 +118,8 @@ std::vector<std::optional<LabelPlace>> place_labels(const std::vector<WantedLabe
     for (const auto& end : ends_of(l)) {
       if (!end) continue;
       sum += (*end - place.foot).norm();
+      if (slots[std::size_t(slot)].right ? end->x() > place.foot.x() : end->x() < place.foot.x())
+        sum += outside * room.height;
       const auto passed = std::count_if(room.taken.begin(), room.taken.end(),
                                         [&](const auto& box) { return passes(place.foot, *end, box); });
       sum += fine * room.height * double(passed + int(passes(place.foot, *end, place.box)));

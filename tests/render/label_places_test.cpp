@@ -63,18 +63,17 @@ TEST(LabelPlaces, OtherWordsKeepTheirPlaces) {
   expect_well_placed(at_rest(ends), full);
 }
 
-// Two ends that move past one another, up and down: their lines cross in at most half of the moments, and the
-// place is one for all.
+// One end is just below the other for seven moments and far above it for four: the shortest lines would cross
+// seven times. The place is one for all moments.
 TEST(LabelPlaces, OfEndsThatMoveLinesCrossSeldom) {
   std::vector<WantedLabel> labels{{50, {}}, {50, {}}};
   for (int m = 0; m < 11; ++m)
-    labels[0].ends.emplace_back(Vec2(450, 150 + 40 * m)),
-        labels[1].ends.emplace_back(Vec2(470, 500 - 10 * m));
+    labels[0].ends.emplace_back(Vec2(450, m < 7 ? 610 : 100)), labels[1].ends.emplace_back(Vec2(450, 600));
   const auto places = place_labels(labels, room);
   int crossed = 0;
   for (std::size_t m = 0; m < 11; ++m)
     crossed += int(collide(*places[0], *labels[0].ends[m], *places[1], *labels[1].ends[m]));
-  EXPECT_LE(crossed, 3);
+  EXPECT_LE(crossed, 4);
 }
 
 TEST(LabelPlaces, AreOnTheSideOfTheirEnds) {
