@@ -265,6 +265,25 @@ void read_label_map(std::string_view bytes) {
     validate(one.surface, "what surfaces_of gives");
 }
 
+// A head, an empty line, and the file beside it that has the voxels.
+std::vector<std::string> label_map_head_seeds() {
+  const std::string head =
+      "NRRD0004\ntype: ushort\nendian: little\ndimension: 3\nsizes: 3 2 1\nspacings: 1 1 2\nencoding: raw\n"
+      "data file: a.raw\n\n";
+  const std::string voxels("\0\0\1\0\2\0\2\0\1\0\0\0", 12);
+  std::string skipping = head;
+  skipping.insert(skipping.find("data file"), "byte skip: 0\nline skip: 0\n");
+  return {head + voxels, skipping + voxels};
+}
+
+void read_label_map_head(std::string_view bytes) {
+  const std::size_t end = std::min(bytes.find("\n\n"), bytes.size());
+  file_of(bytes.substr(std::min(end + 2, bytes.size())), "a.raw");
+  const imaging::LabelMap map =
+      imaging::read_label_map(file_of(std::string(bytes.substr(0, end)) + "\n", "a.nhdr"));
+  LIMBER_CHECK(std::int64_t(map.material.size()) == map.voxels(), map.material.size());
+}
+
 const char* scene_seed() {
   return R"(name = "a"
 [world]
@@ -506,6 +525,7 @@ std::vector<Target> made_targets() {
       {"stl_binary", [](auto bytes) { meshing::detail::read_stl_binary(bytes, "a.stl"); }, {binary_stl()}},
       {"model", read_model, model_seeds()},
       {"label_map", read_label_map, label_map_seeds()},
+      {"label_map_head", read_label_map_head, label_map_head_seeds()},
       {"surface",
        [](auto bytes) { limber::read_ply(file_of(bytes, "surface.ply")); },
        {written("surface.ply", [](const fs::path& p) { write_ply(p, surface()); })}},
