@@ -306,7 +306,7 @@ TEST(Formats, ComplaintsNameTheLine) {
               AllOf(HasSubstr("nothing here reads .xyzzy files"), Not(HasSubstr("assimp"))));
   EXPECT_THAT(format_complaint("noise.3ds", std::string(1000, '\7')), HasSubstr("cannot be read (assimp: "));
   EXPECT_THAT(format_complaint("noise", std::string(1000, '\7')), HasSubstr("cannot be read (assimp: "));
-  EXPECT_THAT(format_complaint("names.obj", "o nothing\n"), HasSubstr("holds neither faces nor points"));
+  EXPECT_THAT(format_complaint("names.obj", "o nothing\n"), HasSubstr("holds no faces and no points"));
   EXPECT_THROW(import_model("no/such/file.obj"), InputError);
   EXPECT_THROW(import_model(testing::TempDir()), InputError);
 }
