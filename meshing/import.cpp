@@ -228,8 +228,8 @@ std::string counted(std::int64_t n, const char* one, const char* many) {
 void require_some_triangle(const PolygonSoup& soup, const Triangulated& faces, std::int64_t unusable,
                            const std::string& file) {
   if (soup.polygon_count() == 0 && soup.positions.empty())
-    throw InputError(fmt::format(
-        "{}: holds no faces and no points; is it an animation without a mesh, or empty?", file));
+    throw InputError(
+        fmt::format("{}: holds no faces and no points; is it an animation without a mesh, or empty?", file));
   if (soup.polygon_count() == 0)
     throw InputError(fmt::format("{}: holds no faces, only {}; points and lines alone are no surface", file,
                                  counted(std::int64_t(soup.positions.size()), "vertex", "vertices")));

@@ -258,14 +258,20 @@ struct Shot::Painter::View {
   }
 
   // The cage knows no crevices: of the sky that it leaves open at rest, the share that the fine surface does.
+  // Of what is cut the rest hides nothing, as far as the body stays where it is at rest.
   Eigen::ArrayXd open_in_crevices(std::size_t b) const {
     const PreparedBody& prepared = shot.bodies_[b];
     if (cages || !shot.output_.occlusion || shot.scene_.bodies[b].opacity < 1) return {};
+    const std::vector<render::Plane> cuts = shot.cuts_of(int(b));
     const SurfaceMesh& fine = prepared.surface;
-    const Eigen::VectorXd coarse = hidden_by({{prepared.cage.positions, shot.world_.bodies[b].surface}}, b),
+    SurfaceMesh cage_left{prepared.cage.positions, shot.world_.bodies[b].surface}, fine_left;
+    if (!cuts.empty())
+      cage_left = render::cut_coarsely(cage_left, cuts), fine_left = render::cut_coarsely(fine, cuts);
+    const SurfaceMesh& hides = cuts.empty() ? fine : fine_left;
+    const Eigen::VectorXd coarse = hidden_by({{cage_left.positions, cage_left.triangles}}, b),
                           hidden =
                               render::sky_occlusion(fine.positions, rest_normals[b],
-                                                    {{{fine.positions, fine.triangles}}}, {}, fine_cells);
+                                                    {{{hides.positions, hides.triangles}}}, {}, fine_cells);
     return ((1 - hidden.array()) / (1 - coarse.array()).max(0.05)).min(1.0);
   }
 
