@@ -117,7 +117,7 @@ class Worker {
   Step next() {
     for (const Stage stage : farm_.stages()) {
       if (stage > options_.until) break;
-      std::vector<Unit> todo;
+      std::vector<Unit> remaining;
       result_.failed.clear();
       for (Unit& unit : farm_.units(stage)) {
         if (known_done_.contains(unit.name)) continue;
@@ -127,12 +127,12 @@ class Worker {
                                                failure->at("reason").get<std::string>(),
                                                failure->at("message").get<std::string>()));
         } else {
-          todo.push_back(std::move(unit));
+          remaining.push_back(std::move(unit));
         }
       }
-      if (todo.empty() && result_.failed.empty()) continue;
-      if (todo.empty()) return Step::failed;
-      const Step step = do_one_of(stage, todo);
+      if (remaining.empty() && result_.failed.empty()) continue;
+      if (remaining.empty()) return Step::failed;
+      const Step step = do_one_of(stage, remaining);
       if (step != Step::done) return step;
       if (!result_.failed.empty()) return Step::failed;
     }
@@ -140,10 +140,10 @@ class Worker {
   }
 
   // Done: all are.
-  Step do_one_of(Stage stage, const std::vector<Unit>& todo) {
+  Step do_one_of(Stage stage, const std::vector<Unit>& remaining) {
     const auto held = leases_.look();
     bool others = false, left = false;
-    for (const Unit& unit : todo) {
+    for (const Unit& unit : remaining) {
       const auto found = held.find(unit.name);
       const Leases::Seen* const owner = found == held.end() ? nullptr : &found->second;
       if (owner && !owner->lost) {
@@ -170,7 +170,7 @@ class Worker {
         others = true;
         continue;
       }
-      if (!farm_.is_done(unit)) do_unit(unit, todo.size());
+      if (!farm_.is_done(unit)) do_unit(unit, remaining.size());
       return Step::did_one;
     }
     if (others) return Step::waits;
