@@ -40,5 +40,7 @@ void add_scene(CLI::App& command, detail::SceneOptions&);
 // Of one search: PlanOptions, BenchOptions or RefineOptions.
 template <class Options>
 void add_limits(CLI::App& command, Options&);
+// Runs of a benchmark.
+void add_runs(CLI::App& command, detail::BenchOptions&);
 
 }  // namespace limber::cli

@@ -55,8 +55,9 @@ struct DescribedCommands {
   detail::BenchOptions bench_options;
   detail::FarmOptions farm_options;
   detail::WorkOptions work_options;
-  std::string farm_until = "report";  // submit and work
-  fs::path folder;                    // report, info, farm status and cancel
+  std::string farm_until = "report";  // submit
+  std::string work_until;
+  fs::path folder;  // report, info, farm status and cancel
   detail::VerifyOptions verify_options;
   std::optional<fs::path> page;
   detail::RobustOptions robust_options;

@@ -69,7 +69,7 @@ Outcome farm_submit(const detail::FarmOptions& options) {
     return {exit_done,
             {{"engine", submitted.engine}, {"would", submitted.would}},
             fmt::format("{}\n", fmt::join(submitted.would, "\n"))};
-  const std::string folder = options.plan.out.string();
+  const std::string folder = (options.bench ? options.bench->out : options.plan.out).string();
   Json json{{"engine", submitted.engine},
             {"jobs", submitted.jobs},
             {"was_done", submitted.was_done},

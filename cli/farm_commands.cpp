@@ -58,6 +58,36 @@ std::vector<CLI::Option*> add_result(CLI::App& command, detail::FarmOptions& opt
   return of_result;
 }
 
+// Who does it, and how.
+void add_engine(CLI::App& command, detail::FarmOptions& options) {
+  command
+      .add_option(
+          "--engine", options.engine,
+          "who runs the workers: slurm (sbatch); local (this machine, waits for the end); openjd (writes "
+          "farm/template.yaml); none (you do: limber farm work DIR); default: slurm where sbatch is in "
+          "PATH, else local")
+      ->check(CLI::IsMember({"slurm", "local", "openjd", "none"}));
+  command
+      .add_option("--workers", options.workers,
+                  "at once, 1 … 1000; default: local as many as --threads leave room for, else 8")
+      ->check(CLI::Range(1, 1000))
+      ->type_name("N");
+  command
+      .add_option("--threads", options.threads,
+                  "of each worker, 1 … 256; Slurm's --cpus-per-task. Results do not depend on it")
+      ->check(CLI::Range(1, 256))
+      ->capture_default_str();
+  command
+      .add_option("--sbatch", options.sbatch,
+                  "a word for sbatch, as --sbatch=--partition=long; may be given several times")
+      ->type_name("WORD")
+      ->allow_extra_args(false);
+  command.add_flag("--dry-run", options.dry_run, "say what would be written and sent, and do nothing");
+}
+
+const std::vector<std::string> stages_of_a_scene(detail::stage_names.begin(),
+                                                 detail::stage_names.begin() + 6);
+
 }  // namespace
 
 void DescribedCommands::add_farm_commands() {
@@ -78,33 +108,10 @@ void DescribedCommands::add_farm_commands() {
       ->type_name("DIR");
   const std::vector<CLI::Option*> of_result = add_result(submit_command, farm_options);
   add_store(submit_command, farm_options.plan.scene.store, "none");
-  submit_command
-      .add_option(
-          "--engine", farm_options.engine,
-          "who runs the workers: slurm (sbatch); local (this machine, waits for the end); openjd (writes "
-          "farm/template.yaml); none (you do: limber farm work DIR); default: slurm where sbatch is in "
-          "PATH, else local")
-      ->check(CLI::IsMember({"slurm", "local", "openjd", "none"}));
-  submit_command
-      .add_option("--workers", farm_options.workers,
-                  "at once, 1 … 1000; default: local as many as --threads leave room for, else 8")
-      ->check(CLI::Range(1, 1000))
-      ->type_name("N");
-  submit_command
-      .add_option("--threads", farm_options.threads,
-                  "of each worker, 1 … 256; Slurm's --cpus-per-task. Results do not depend on it")
-      ->check(CLI::Range(1, 256))
-      ->capture_default_str();
-  submit_command
-      .add_option("--sbatch", farm_options.sbatch,
-                  "a word for sbatch, as --sbatch=--partition=long; may be given several times")
-      ->type_name("WORD")
-      ->allow_extra_args(false);
+  add_engine(submit_command, farm_options);
   submit_command.add_option("--until", farm_until, "the last stage that is wanted")
-      ->check(CLI::IsMember(detail::stage_names))
+      ->check(CLI::IsMember(stages_of_a_scene))
       ->capture_default_str();
-  submit_command.add_flag("--dry-run", farm_options.dry_run,
-                          "say what would be written and sent, and do nothing");
   add_global(submit_command, global);
   submit_command.callback([this, scene, of_result] {
     chosen = [this, scene, of_result] {
@@ -116,6 +123,24 @@ void DescribedCommands::add_farm_commands() {
                 "scene, or leave {} out",
                 option->get_name(), option->get_name()));
       farm_options.until = detail::stage_named(farm_until);
+      return farm_submit(farm_options);
+    };
+  });
+
+  CLI::App& runs_command = *farm.add_subcommand(
+      "bench", "sends the runs of a benchmark, and its table and page; what is done is skipped");
+  add_runs(runs_command, bench_options);
+  runs_command.add_option("--runs-per-task", farm_options.runs_per_task, "runs of a unit, 1 … 1000000")
+      ->check(CLI::Range(1, 1000000))
+      ->type_name("N")
+      ->capture_default_str();
+  add_engine(runs_command, farm_options);
+  add_global(runs_command, global);
+  runs_command.callback([this] {
+    chosen = [this] {
+      if (bench_options.scenes.empty() || bench_options.out.empty())
+        throw InputError("name the scenes, and with -o the folder, which all machines see");
+      farm_options.bench = bench_options;
       return farm_submit(farm_options);
     };
   });
@@ -136,9 +161,9 @@ void DescribedCommands::add_farm_commands() {
       "work",
       "a worker: does units of what was submitted until none is left for it; on any machine that sees DIR");
   work_command.add_option("DIR", work_options.folder, "work folder")->required();
-  work_command.add_option("--until", farm_until, "the last stage that it takes units of")
-      ->check(CLI::IsMember(detail::stage_names))
-      ->capture_default_str();
+  work_command
+      .add_option("--until", work_until, "the last stage that it takes units of; default: the last of all")
+      ->check(CLI::IsMember(detail::stage_names));
   work_command.add_flag("--wait", work_options.wait,
                         "where others are at all that is left, wait for them, and go on after them");
   work_command.add_flag(
@@ -147,7 +172,8 @@ void DescribedCommands::add_farm_commands() {
   add_global(work_command, global), add_threads(work_command, global);
   work_command.callback([&] {
     chosen = [&] {
-      work_options.until = detail::stage_named(farm_until), work_options.threads = global.threads;
+      if (!work_until.empty()) work_options.until = detail::stage_named(work_until);
+      work_options.threads = global.threads;
       return farm_work(work_options);
     };
   });

@@ -128,7 +128,9 @@ void add_render(CLI::App& command, detail::RenderOptions& options) {
       ->type_name("FILE");
 }
 
-void add_bench(CLI::App& command, detail::BenchOptions& options) {
+}  // namespace
+
+void add_runs(CLI::App& command, detail::BenchOptions& options) {
   command.add_option("SCENE", options.scenes,
                      "scene files, or names of scenes that come with limber (see limber scenes)");
   command.add_option("-o,--out", options.out, "folder of the records; what is in it is not run again")
@@ -142,6 +144,12 @@ void add_bench(CLI::App& command, detail::BenchOptions& options) {
   add_edits(command, options.sets, options.data);
   add_store(command, options.store, "none");
   add_limits(command, options);
+}
+
+namespace {
+
+void add_bench(CLI::App& command, detail::BenchOptions& options) {
+  add_runs(command, options);
   command.add_option("--chunk", options.chunk, "do the i-th of n parts of the runs, 1 ≤ i ≤ n")
       ->type_name("I/N");
   command.add_option("--merge", options.merge, "run nothing: make one table of the records in these folders")

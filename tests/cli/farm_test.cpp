@@ -264,6 +264,63 @@ TEST_F(Farm_slow, OneIsAtWorkInAFolderAndCancelEndsIt) {
 }
 
 // Of a unit that fails the others go on; what failed is told, and tried when it is submitted again.
+// What a run found, without what it cost and who did it: by file and key.
+std::map<std::string, std::string> records_of(const fs::path& folder) {
+  std::map<std::string, std::string> records;
+  const std::vector<std::string> costs{"cpu_s", "wall_s", "threads", "host", "rollouts", "rollouts_wrong"};
+  for (const auto& file : fs::directory_iterator(folder / "runs")) {
+    const Json record = read_json(file.path());
+    for (const auto& [key, value] : record.items())
+      if (std::count(costs.begin(), costs.end(), key) == 0)
+        records[file.path().filename().string() + ": " + key] = value.dump();
+  }
+  return records;
+}
+void expect_same_records(const fs::path& one, const fs::path& other) {
+  const auto expected = records_of(one), found = records_of(other);
+  for (const auto& [what, value] : expected) {
+    const auto there = found.find(what);
+    EXPECT_TRUE(there != found.end() && there->second == value) << what;
+  }
+  EXPECT_EQ(found.size(), expected.size());
+}
+
+TEST_F(Farm_slow, ABenchmarkHasTheRecordsOfOneProcess) {
+  const std::vector<std::string> of_runs{quick_scene(), "--seeds", "1-4", "--presets", "paper,fast"};
+  const auto words = [&](std::vector<std::string> command, const std::string& name,
+                         const std::vector<std::string>& more = {}) {
+    command.insert(command.end(), of_runs.begin(), of_runs.end());
+    command.insert(command.end(), {"-o", out(name)});
+    command.insert(command.end(), more.begin(), more.end());
+    return command;
+  };
+  const auto on_a_farm = words({"farm", "bench"}, "farm", {"--engine", "local", "--workers", "2"});
+  ASSERT_EQ(run(words({"bench"}, "one")).code, exit_done);
+  const Process process = start(on_a_farm);
+  ::usleep(700000);
+  ::kill(process.pid, SIGKILL);  // its workers end with it
+  wait_for(process);
+  const Ended ended = run(on_a_farm);
+  ASSERT_EQ(ended.code, exit_done) << ended.json;
+  EXPECT_EQ(ended.json.at("status").at("state"), "done");
+  expect_same_records(out("one"), out("farm"));
+  const std::string lines = read_file(fs::path(out("farm")) / "runs.jsonl");
+  EXPECT_EQ(std::count(lines.begin(), lines.end(), '\n'), 8);
+  EXPECT_EQ(ended.json.at("status").at("report"), out("farm") + "/bench.html");
+  EXPECT_TRUE(
+      run({"farm", "submit", "-o", out("farm"), "--engine", "local"}).json.at("was_done").get<bool>());
+
+  // A record that is taken away is made again, and no other.
+  const fs::path runs = fs::path(out("farm")) / "runs";
+  std::vector<fs::path> files;
+  for (const auto& file : fs::directory_iterator(runs)) files.push_back(file.path());
+  const auto kept = fs::last_write_time(files[0]);
+  fs::remove(files[1]);
+  EXPECT_EQ(run({"farm", "submit", "-o", out("farm"), "--engine", "local"}).code, exit_done);
+  expect_same_records(out("one"), out("farm"));
+  EXPECT_EQ(fs::last_write_time(files[0]), kept);
+}
+
 TEST_F(Farm_slow, WhatFailsIsToldAndTriedAgain) {
   const std::vector<std::string> until_film{"--until", "film"};
   ASSERT_EQ(run(submit("out", {"--until", "plan"})).code, exit_done);
@@ -334,7 +391,15 @@ TEST_F(Farm, WrongWordsAreRefusedBeforeAnythingIsWritten) {
   };
   for (const char* command : {"status", "cancel", "work"})
     refused({"farm", command, out()}, "nothing was submitted");
-  refused({"farm"}, "needs a command, one of submit, status, cancel, work");
+  refused({"farm"}, "needs a command, one of submit, bench, status, cancel, work");
+  refused({"farm", "bench", "-o", out()}, "name the scenes");
+  refused({"farm", "bench", quick_scene()}, "-o");
+  refused({"farm", "bench", "barriers7", "-o", out()}, "barriers7");
+  refused({"farm", "bench", quick_scene(), quick_scene(), "-o", out()}, "named twice");
+  refused({"farm", "bench", quick_scene(), "-o", out(), "--seeds", "3-1"}, "3-1");
+  refused({"farm", "bench", quick_scene(), "-o", out(), "--presets", "quick"}, "quick");
+  refused({"farm", "bench", quick_scene(), "-o", out(), "--set", "planner.sed=1"}, "sed");
+  refused({"farm", "bench", quick_scene(), "-o", out(), "--runs-per-task", "0"}, "--runs-per-task");
   refused({"farm", "submit", "-o", out()}, "nothing was submitted");
   refused({"farm", "submit", "barriers7", "-o", out()}, "barriers7");
   refused(submit("out", {"--camera", "left"}), "there are: main");
@@ -352,19 +417,39 @@ TEST_F(Farm, WrongWordsAreRefusedBeforeAnythingIsWritten) {
   EXPECT_FALSE(fs::exists(out()));
 }
 
-TEST_F(Farm, ADamagedFolderIsASentence) {
-  ASSERT_EQ(limber_program(submit_none()).code, exit_done);
-  const fs::path file = fs::path(out()) / "farm" / "farm.json";
+// Each key of farm.json, of its result too, is asked for.
+void expect_a_sentence_of_each_key(const fs::path& work) {
+  const fs::path file = work / "farm" / "farm.json";
   const std::string good = read_file(file);
   const Json json = Json::parse(good);
-  for (const auto& [key, value] : json.items()) {
-    Json damaged = json;
-    damaged[key] = Json::array({Json::object()});
+  const auto told = [&](const Json& damaged, const std::string& key) {
     std::ofstream(file) << damaged;
-    const Result status = limber_program({"farm", "status", out()});
+    const Result status = limber_program({"farm", "status", work.string()});
     EXPECT_EQ(status.code, exit_bad_input) << key << status.err;
     EXPECT_THAT(status.err, HasSubstr("submit anew")) << key;
+  };
+  const Json wrong = Json::array({Json::object()});
+  for (const auto& [key, value] : json.items()) {
+    Json damaged = json;
+    damaged[key] = wrong, told(damaged, key);
   }
+  for (const auto& [key, value] : json.at("result").items()) {
+    Json damaged = json;
+    damaged["result"][key] = wrong, told(damaged, key);
+  }
+  std::ofstream(file) << good;
+}
+
+TEST_F(Farm, ADamagedFolderIsASentence) {
+  ASSERT_EQ(limber_program({"farm", "bench", quick_scene(), "-o", out("runs"), "--engine", "none",
+                            "--iterations", "9", "--time-limit", "9"})
+                .code,
+            exit_done);
+  expect_a_sentence_of_each_key(out("runs"));
+  ASSERT_EQ(limber_program(submit_none()).code, exit_done);
+  expect_a_sentence_of_each_key(out());
+  const fs::path file = fs::path(out()) / "farm" / "farm.json";
+  const std::string good = read_file(file);
   std::ofstream(file) << good.substr(0, good.size() / 2);
   EXPECT_EQ(limber_program({"farm", "work", out()}).code, exit_bad_input);
   EXPECT_EQ(limber_program(submit_none()).code, exit_done);  // makes it anew
@@ -397,6 +482,27 @@ TEST_F(Farm, SlurmAndOthersGetOneWorkerATask) {
   const std::string jobs = openjd_template(farm);
   for (const char* words : {"jobtemplate-2023-09", "range: \"1-2\"", "dependsOn: Frames", "--until, report"})
     EXPECT_THAT(jobs, HasSubstr(words));
+}
+
+TEST_F(Farm, SlurmGetsABenchmarkAsBodiesRunsAndTable) {
+  FarmOptions options;
+  options.bench.emplace();
+  options.bench->scenes = {quick_scene()}, options.bench->out = out(), options.bench->seeds = "1-5";
+  options.bench->presets = {"paper", "fast"};
+  options.engine = "slurm", options.workers = 3, options.runs_per_task = 4;
+  const FarmFolder farm = FarmFolder::begin(spec_of(options));
+  std::vector<std::string> told;
+  for (const auto& words : slurm_commands(farm))
+    for (const std::string& word : words)
+      if (word.starts_with("--array") || std::count(stage_names.begin(), stage_names.end(), word) > 0)
+        told.push_back(word);
+  EXPECT_EQ(told, (std::vector<std::string>{"--array=1-1", "bodies", "--array=1-3", "runs", "--array=1-1",
+                                            "table"}));
+  std::vector<std::size_t> runs;
+  for (const Unit& unit : farm.units(Stage::runs))
+    runs.insert(runs.end(), unit.runs.begin(), unit.runs.end());
+  EXPECT_EQ(runs, (std::vector<std::size_t>{0, 1, 2, 3, 4, 5, 6, 7, 8, 9}));
+  EXPECT_THAT(openjd_template(farm), HasSubstr("--until, runs"));
 }
 
 TEST_F(Farm, AUnitIsOnes) {

@@ -5,6 +5,7 @@
 #include <chrono>
 #include <cmath>
 #include <map>
+#include <numeric>
 #include <set>
 
 #include "core/content_hash.h"
@@ -14,7 +15,6 @@
 #include "core/json_text.h"
 #include "core/log.h"
 #include "core/progress.h"
-#include "core/temporary_files.h"
 #include "core/threads.h"
 #include "core/version.h"
 #include "limber/detail/film/frame_list.h"
@@ -25,10 +25,8 @@
 
 namespace limber::detail {
 
-namespace {
-
 // A scene under a preset: all that its runs share. Stays where it is, for the system knows its bodies.
-struct Setup {
+struct BenchRuns::Setup {
   Setup(const BenchOptions& bench, const std::string& scene_given, const std::string& preset)
       : options(options_of(bench, scene_given, preset)),
         scene(read_scene(options)),
@@ -55,8 +53,11 @@ struct Setup {
   FemSystem system;
 };
 
+namespace {
+
 // All that a run's result depends on.
-Json identity_of(const Setup& setup, const plan::Settings& settings, const std::string& program) {
+Json identity_of_run(const BenchRuns::Setup& setup, const plan::Settings& settings,
+                     const std::string& program) {
   Hasher scene;
   scene.text(setup.scene.text);
   for (const std::string& set : setup.scene.sets) scene.text(set);
@@ -89,7 +90,7 @@ Json volume_figures(const fem::World& world, const MotionFigures& figures) {
 }
 
 // Every tenth of a second, to the millimetre: enough to see which way the robot went.
-Json robot_path(const Setup& setup, const plan::Trajectory& path) {
+Json robot_path(const BenchRuns::Setup& setup, const plan::Trajectory& path) {
   Json places = Json::array();
   const double millimetre = 1000;
   for (double f = 0; f < double(path.frames.size()); f += std::max(1.0, path.frames_per_second / 10)) {
@@ -100,7 +101,7 @@ Json robot_path(const Setup& setup, const plan::Trajectory& path) {
   return places;
 }
 
-Json record_of(const Setup& setup, const plan::Plan& plan, const Json& identity) {
+Json record_of(const BenchRuns::Setup& setup, const plan::Plan& plan, const Json& identity) {
   const MotionFigures figures =
       measure_motion(setup.world, setup.bodies, plan.trajectory, setup.system.surfaces());
   std::string explanation = plan::explain(plan);
@@ -144,54 +145,6 @@ bool is_done(const fs::path& file, const Json& identity) {
                                file.string(), what, file.parent_path().string()));
 }
 
-// Runs what is missing; what was finished stays, whatever comes after.
-void run_all(const BenchOptions& options, const std::vector<std::string>& presets) {
-  const std::vector<int> seeds = parse_seeds(options.seeds);
-  const std::size_t scenes = options.scenes.size(), a_seed = scenes * presets.size();
-  std::vector<int> runs(seeds.size() * a_seed);
-  for (std::size_t i = 0; i < runs.size(); ++i) runs[i] = int(i);
-  runs = chunk_of(runs, options.chunk);
-
-  make_folder(options.out / "runs");
-  remove_abandoned(options.out / "runs");
-  const std::string& program = program_hash();  // two builds do not make one benchmark
-  std::map<std::size_t, Setup> setups;          // by scene and preset
-  std::map<std::string, std::string> scene_from_name;
-  std::int64_t done = 0;
-  Progress progress("bench", std::int64_t(runs.size()));
-  for (const int run : runs) {
-    // Seed after seed, so that any part of the runs has all scenes and presets in it.
-    const std::size_t which = std::size_t(run) % a_seed;
-    const std::string& given = options.scenes[which / presets.size()];
-    Setup& setup = setups.try_emplace(which, options, given, presets[which % presets.size()]).first->second;
-    if (scene_from_name.try_emplace(setup.scene.name, given).first->second != given)
-      throw InputError(fmt::format("{} and {}: are both scenes with the name \"{}\"; rename one",
-                                   scene_from_name[setup.scene.name], given, setup.scene.name));
-    setup.options.seed = seeds[std::size_t(run) / a_seed];
-    const plan::Settings settings = settings_of(setup.scene, setup.options);
-    const std::string label =
-        fmt::format("{}.{}.{}", setup.scene.name, setup.scene.planner.preset, settings.seed);
-    const fs::path file = options.out / "runs" / (label + ".json");
-    const Json identity = identity_of(setup, settings, program);
-    if (!is_done(file, identity)) {
-      try {
-        const plan::Plan plan = plan::plan(setup.system, settings);
-        if (plan.ending == plan::Ending::stopped) throw_if_stopped();
-        const Json record = record_of(setup, plan, identity);
-        write_file(file, text_of(record) + "\n");
-        log::info("{}: {} after {} iterations, {:.2f} CPU s", label, plan.solved() ? "solved" : "not solved",
-                  plan.statistics.iterations, plan.statistics.cpu_s);
-      } catch (const InternalError&) {
-        log::warn("this run failed; to see it again: limber plan {} --preset {} --seed {} -o DIR{}", given,
-                  setup.scene.planner.preset, settings.seed,
-                  options.sets.empty() ? "" : fmt::format(" --set {}", fmt::join(options.sets, " --set ")));
-        throw;
-      }
-    }
-    progress.update(++done, label);
-  }
-}
-
 std::string date_now() {
   const std::time_t now = std::chrono::system_clock::to_time_t(std::chrono::system_clock::now());
   std::tm utc{};
@@ -218,17 +171,78 @@ std::vector<fs::path> write_ompl_logs(const RunRecords& records, const fs::path&
 
 }  // namespace
 
+BenchRuns::BenchRuns(BenchOptions options) : options_(std::move(options)) {
+  if (options_.scenes.empty()) throw InputError("bench: name one scene at least, or folders with --merge");
+  if (options_.out.empty()) throw InputError("bench: say with -o where the records go");
+  if (options_.presets.empty()) options_.presets = {""};
+  if (std::set(options_.presets.begin(), options_.presets.end()).size() != options_.presets.size() ||
+      std::set(options_.scenes.begin(), options_.scenes.end()).size() != options_.scenes.size())
+    throw InputError("bench: a scene or preset is named twice; name each once");
+  seeds_ = parse_seeds(options_.seeds);
+}
+
+BenchRuns::~BenchRuns() = default;
+
+std::size_t BenchRuns::count() const {
+  return seeds_.size() * options_.scenes.size() * options_.presets.size();
+}
+
+BenchRuns::Setup& BenchRuns::setup_of(std::size_t scene, std::size_t preset) {
+  const std::string& given = options_.scenes[scene];
+  std::unique_ptr<Setup>& setup = setups_[scene * options_.presets.size() + preset];
+  if (!setup) setup = std::make_unique<Setup>(options_, given, options_.presets[preset]);
+  const std::string& name = setup->scene.name;
+  const std::string& first = scene_from_name_.try_emplace(name, given).first->second;
+  if (first != given)
+    throw InputError(
+        fmt::format("{} and {}: are both scenes with the name \"{}\"; rename one", first, given, name));
+  return *setup;
+}
+
+void BenchRuns::prepare(std::size_t scene) { setup_of(scene, 0); }
+
+std::string BenchRuns::run(std::size_t run) {
+  const std::size_t a_seed = options_.scenes.size() * options_.presets.size(), which = run % a_seed;
+  const std::size_t scene_index = which / options_.presets.size();
+  Setup& setup = setup_of(scene_index, which % options_.presets.size());
+  setup.options.seed = seeds_[run / a_seed];
+  const plan::Settings settings = settings_of(setup.scene, setup.options);
+  const std::string& preset = setup.scene.planner.preset;
+  const std::string label = fmt::format("{}.{}.{}", setup.scene.name, preset, settings.seed);
+  const fs::path file = options_.out / "runs" / (label + ".json");
+  const Json identity = identity_of_run(setup, settings, program_hash());  // two builds make no one benchmark
+  if (is_done(file, identity)) return label;
+  try {
+    const plan::Plan plan = plan::plan(setup.system, settings);
+    if (plan.ending == plan::Ending::stopped) throw_if_stopped();
+    const Json record = record_of(setup, plan, identity);
+    make_folder(file.parent_path());
+    write_file(file, text_of(record) + "\n");
+    log::info("{}: {} after {} iterations, {:.2f} CPU s", label, plan.solved() ? "solved" : "not solved",
+              plan.statistics.iterations, plan.statistics.cpu_s);
+  } catch (const InternalError&) {
+    const std::string sets =
+        options_.sets.empty() ? "" : fmt::format(" --set {}", fmt::join(options_.sets, " --set "));
+    log::warn("this run failed; to see it again: limber plan {} --preset {} --seed {} -o DIR{}",
+              options_.scenes[scene_index], preset, settings.seed, sets);
+    throw;
+  }
+  return label;
+}
+
 Benchmark bench(const BenchOptions& options) {
   if (options.merge.empty()) {
-    if (options.scenes.empty()) throw InputError("bench: name one scene at least, or folders with --merge");
-    if (options.out.empty()) throw InputError("bench: say with -o where the records go");
-    const std::vector<std::string> presets =
-        options.presets.empty() ? std::vector<std::string>{""} : options.presets;
-    if (std::set(presets.begin(), presets.end()).size() != presets.size() ||
-        std::set(options.scenes.begin(), options.scenes.end()).size() != options.scenes.size())
-      throw InputError("bench: a scene or preset is named twice; name each once");
+    BenchRuns runs(options);
+    std::vector<int> wanted(runs.count());
+    std::iota(wanted.begin(), wanted.end(), 0);
+    wanted = chunk_of(wanted, options.chunk);
     try {
-      run_all(options, presets);
+      Progress progress("bench", std::int64_t(wanted.size()));
+      std::int64_t done = 0;
+      for (const int run : wanted) {
+        const std::string label = runs.run(std::size_t(run));
+        progress.update(++done, label);
+      }
     } catch (const Interrupted&) {
       log::info("{}: the finished runs are kept; the same command goes on", options.out.string());
       throw;

@@ -4,6 +4,8 @@
 
 #include <cstdint>
 #include <limits>
+#include <map>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -37,6 +39,28 @@ struct Benchmark {
 };
 // Runs what is missing. Throws InputError, DiskError, and Interrupted with the finished runs kept.
 Benchmark bench(const BenchOptions&);
+
+// Its runs one by one, seed after seed, so that any part of them has all scenes and presets in it. What runs
+// of a scene share is made once. Throws InputError for options that name no runs.
+class BenchRuns {
+ public:
+  struct Setup;  // what runs of a scene and preset share
+  explicit BenchRuns(BenchOptions);
+  ~BenchRuns();
+  std::size_t count() const;
+  // The bodies of a scene, 0 ≤ scene < scenes, in a folder of its name in options.out.
+  void prepare(std::size_t scene);
+  // Of the run, 0 ≤ run < count, its record's name in options.out/runs: it is there now. Throws InputError
+  // also where such a record is of other options, scenes or builds; Interrupted.
+  std::string run(std::size_t run);
+
+ private:
+  Setup& setup_of(std::size_t scene, std::size_t preset);
+  BenchOptions options_;
+  std::vector<int> seeds_;
+  std::map<std::size_t, std::unique_ptr<Setup>> setups_;  // by scene and preset
+  std::map<std::string, std::string> scene_from_name_;
+};
 
 // Of the frames of solved runs those within so many per cent of a body's volume are counted, under such a
 // key.

@@ -4,7 +4,6 @@
 
 #include <set>
 
-#include "core/content_hash.h"
 #include "core/error.h"
 #include "core/log.h"
 #include "core/threads.h"
@@ -81,10 +80,12 @@ FarmSpec spec_to_submit(FarmOptions options) {
         "local");
   if (!options.sbatch.empty() && options.engine != "slurm")
     throw InputError(fmt::format("--sbatch is for Slurm, and the engine is {}", options.engine));
-  if (!options.plan.scene.scene.empty()) return spec_of(std::move(options));
+  if (options.bench ? !options.bench->scenes.empty() : !options.plan.scene.scene.empty())
+    return spec_of(std::move(options));
   // As before, but for who does it.
-  FarmSpec spec = FarmFolder(options.plan.out).spec();
-  options.plan = spec.options.plan, options.film = spec.options.film;
+  FarmSpec spec = FarmFolder(options.bench ? options.bench->out : options.plan.out).spec();
+  options.plan = spec.options.plan, options.film = spec.options.film, options.bench = spec.options.bench;
+  options.runs_per_task = spec.options.runs_per_task;
   const bool another_engine = options.engine != spec.options.engine;
   if (options.workers == 0 && !another_engine) options.workers = spec.options.workers;
   if (options.sbatch.empty() && !another_engine) options.sbatch = spec.options.sbatch;
@@ -140,6 +141,8 @@ FarmStatus farm_status(const fs::path& work_folder) {
     if (farm.is_done(unit)) status.film = farm.work() / farm.told_of(unit).at("film").get<std::string>();
   for (const Unit& unit : farm.units(Stage::report))
     if (farm.is_done(unit)) status.report = farm.work() / "report.html";
+  for (const Unit& unit : farm.units(Stage::table))
+    if (farm.is_done(unit)) status.report = farm.work() / "bench.html";
   if (slurm_is_there()) try {
       status.tasks = slurm_tasks(jobs_of(farm));
     } catch (const InputError& error) {
@@ -149,9 +152,10 @@ FarmStatus farm_status(const fs::path& work_folder) {
   if (spec.program != program_hash())
     status.notes.push_back("it was submitted by another build of limber; submit it anew with this one");
   try {
-    if (content_hash(read_file(spec.options.plan.scene.scene)) != spec.scene_hash)
+    if (hash_of_scenes(spec.options) != spec.scene_hash)
       status.notes.push_back(
-          fmt::format("{} was edited since; submit it anew", spec.options.plan.scene.scene));
+          fmt::format("{} was edited since; submit it anew",
+                      spec.options.bench ? "one of its scenes" : spec.options.plan.scene.scene));
   } catch (const InputError& error) {
     status.notes.push_back(error.what());
   }

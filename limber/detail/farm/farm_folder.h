@@ -8,26 +8,33 @@
 #include <vector>
 
 #include "core/json.h"
+#include "limber/detail/bench/bench.h"
 #include "limber/detail/film/render.h"
 #include "limber/detail/plan/plan.h"
 
 namespace limber::detail {
 
-// In the order in which they are done. Units of a stage depend on the stages before, and not on one another.
-enum class Stage { bodies, search, plan, frames, film, report };
+// In the order in which they are done: those of a scene, and bodies, runs and table of a benchmark. Units of
+// a stage depend on the stages before, and not on one another.
+enum class Stage { bodies, search, plan, frames, film, report, runs, table };
 std::string name_of(Stage);
 // Throws InputError where it is none.
 Stage stage_named(const std::string&);
-inline const std::vector<std::string> stage_names{"bodies", "search", "plan", "frames", "film", "report"};
+inline const std::vector<std::string> stage_names{"bodies", "search", "plan", "frames",
+                                                  "film",   "report", "runs", "table"};
 
 struct FarmOptions {
   PlanOptions plan;    // of a scene, with its seeds and presets; not resumed, improved or begun elsewhere
   RenderOptions film;  // of all frames
+  // Instead of a scene's plan and film: all runs of a benchmark, nothing merged or parted; `plan` has its
+  // folder
+  std::optional<BenchOptions> bench;
   std::string engine;  // "slurm", "local", "openjd", "none"; empty: slurm where there is one, else local
   int workers = 0;     // at once; 0: local as many as the machine has threads, else 8
   int threads = 1;     // of a worker
   int frames_per_task = 10;
   int chunks = 0;                   // > 0: the film in so many parts instead
+  int runs_per_task = 1;            // of a benchmark
   std::vector<std::string> sbatch;  // words for sbatch
   Stage until = Stage::report;      // the last that is wanted
   bool dry_run = false;
@@ -37,8 +44,10 @@ struct Unit {
   Stage stage;
   std::string name;        // of its lease and its files
   std::string body;        // of bodies; empty: what the scene has beside them
+  std::size_t scene = 0;   // of a benchmark's bodies
   std::uint64_t seed = 0;  // of search
   std::vector<int> frames;
+  std::vector<std::size_t> runs;
 };
 
 // What was submitted, as farm.json keeps it.
@@ -46,12 +55,14 @@ struct FarmSpec {
   FarmOptions options;
   std::vector<std::string> bodies;
   std::uint64_t first_seed = 1;
-  std::string scene_hash, program;  // of the scene's text, of limber's file
+  std::string scene_hash, program;  // of the scenes' texts, of limber's file
   std::string key;                  // of all that the result depends on
 };
 // Reads the scene and looks for its models. Throws InputError for what could not be done: an unknown scene,
 // no goal, a model or camera that is not there, a size, no ffmpeg.
 FarmSpec spec_of(FarmOptions);
+// Of the files as they are now. Throws InputError.
+std::string hash_of_scenes(const FarmOptions&);
 
 class FarmFolder {
  public:
@@ -81,7 +92,7 @@ class FarmFolder {
   void mark_failed(const Unit&, const std::string& reason, const std::string& message, int exit_code) const;
   void forget(const Unit&) const;
   Unit plan_unit() const {
-    return {.stage = Stage::plan, .name = "plan", .body = {}, .seed = 0, .frames = {}};
+    return {.stage = Stage::plan, .name = "plan", .body = {}, .frames = {}, .runs = {}};
   }
 
   void cancel() const;

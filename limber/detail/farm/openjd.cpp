@@ -45,8 +45,12 @@ std::string steps_of(const FarmFolder& farm) {
     text += step(name, until, workers, before, false);
     before = name;
   };
-  add("Plan", Stage::plan, at_most(farm.units(Stage::search).size()));
-  add("Frames", Stage::frames, std::size_t(options.workers));
+  if (options.bench) {
+    add("Runs", Stage::runs, at_most(farm.units(Stage::runs).size()));
+  } else {
+    add("Plan", Stage::plan, at_most(farm.units(Stage::search).size()));
+    add("Frames", Stage::frames, std::size_t(options.workers));
+  }
   return text + step("Last", options.until, 1, before, true);
 }
 

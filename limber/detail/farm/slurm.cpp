@@ -96,8 +96,13 @@ std::vector<std::vector<std::string>> slurm_commands(const FarmFolder& farm) {
   const auto at_most = [&](std::size_t units) { return std::min(units, std::size_t(options.workers)); };
   const Stage last = options.until;
   const std::size_t bodies = open(Stage::bodies);
-  const bool has_plan = last < Stage::plan || farm.is_done(farm.plan_unit());
   if (bodies > 0) add(Stage::bodies, at_most(bodies), false);
+  if (options.bench) {
+    if (open(Stage::runs) > 0) add(Stage::runs, at_most(open(Stage::runs)), false);
+    add(last, 1, true);
+    return commands;
+  }
+  const bool has_plan = last < Stage::plan || farm.is_done(farm.plan_unit());
   if (!has_plan) add(Stage::plan, at_most(open(Stage::search)), false);
   // How many frames there are is only known when there is a plan.
   if (last >= Stage::frames && (!has_plan || open(Stage::frames) > 0))

@@ -10,7 +10,6 @@
 #include <new>
 #include <set>
 
-#include "core/content_hash.h"
 #include "core/error.h"
 #include "core/events.h"
 #include "core/hash.h"
@@ -82,10 +81,11 @@ class Worker {
           "{}: was submitted by another build of limber, whose results may have other bytes; submit it anew "
           "with this one",
           farm_.work().string()));
-    scene_ = read_scene(spec.options.plan);
-    if (content_hash(scene_.text) != spec.scene_hash)
+    if (hash_of_scenes(spec.options) != spec.scene_hash)
       throw InputError(fmt::format("{}: was edited after it was submitted in {}; submit it anew",
-                                   spec.options.plan.scene.scene, farm_.work().string()));
+                                   spec.options.bench ? "one of its scenes" : spec.options.plan.scene.scene,
+                                   farm_.work().string()));
+    if (!spec.options.bench) scene_ = read_scene(spec.options.plan);
   }
 
   WorkDone run() {
@@ -161,7 +161,7 @@ class Worker {
                           exit_defect);
         return Step::did_one;
       }
-      if (sends_again_ && stage <= Stage::frames) {
+      if (sends_again_ && (stage <= Stage::frames || stage == Stage::runs)) {
         left = true;
         continue;
       }
@@ -244,6 +244,10 @@ class Worker {
         return do_film();
       case Stage::report:
         return {{"all_kept", report(farm_.work()).all_kept}};
+      case Stage::runs:
+        return do_runs(unit);
+      case Stage::table:
+        return do_table();
     }
     return {};
   }
@@ -251,7 +255,28 @@ class Worker {
   const PlanOptions& plan_options() const { return farm_.spec().options.plan; }
   const RenderOptions& film_options() const { return farm_.spec().options.film; }
 
+  BenchRuns& bench_runs() {
+    if (!bench_runs_) bench_runs_ = std::make_unique<BenchRuns>(*farm_.spec().options.bench);
+    return *bench_runs_;
+  }
+
+  Json do_runs(const Unit& unit) {
+    std::vector<std::string> records;
+    for (const std::size_t run : unit.runs) records.push_back(bench_runs().run(run));
+    return {{"records", records}};
+  }
+
+  Json do_table() {
+    BenchOptions options;
+    options.merge = {farm_.work()}, options.out = farm_.work();
+    return {{"runs", bench(options).runs}};
+  }
+
   Json do_body(const Unit& unit) {
+    if (farm_.spec().options.bench) {
+      bench_runs().prepare(unit.scene);
+      return Json::object();
+    }
     const SceneOptions& options = plan_options().scene;
     if (unit.body.empty()) {
       prepare_beside(scene_, options.data, farm_.work());
@@ -460,7 +485,8 @@ class Worker {
   scenes::Scene scene_;
   bool sends_again_ = options_.again;
   std::set<std::string> known_done_;
-  std::unique_ptr<Setup> setup_;      // of searches and the plan
+  std::unique_ptr<Setup> setup_;  // of searches and the plan
+  std::unique_ptr<BenchRuns> bench_runs_;
   std::unique_ptr<Filming> filming_;  // of the frames
   std::unique_ptr<Shot::Painter> painter_;
   WorkDone result_;
