@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "core/error.h"
+#include "core/process.h"
 #include "core/progress.h"
 #include "render/detail/lettering.h"
 #include "render/detail/process.h"
@@ -151,7 +152,7 @@ void require_film_possible(double frames_per_second, const fs::path& film) {
                                  film.string(), frames_per_second));
   if (const fs::path folder = film.parent_path(); !folder.empty() && !fs::is_directory(folder))
     throw DiskError(fmt::format("{}: there is no folder {}; make it first", film.string(), folder.string()));
-  if (!detail::is_in_path("ffmpeg"))
+  if (!is_in_path("ffmpeg"))
     throw InputError(
         fmt::format("{}: films are made by ffmpeg, and there is none in PATH; install it, or add it to PATH",
                     film.string()));

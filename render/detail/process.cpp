@@ -9,26 +9,15 @@
 #include <unistd.h>
 
 #include <cerrno>
-#include <cstdlib>
 #include <cstring>
-#include <sstream>
 
 #include "core/error.h"
+#include "core/process.h"
 
 namespace limber::render::detail {
 
-bool is_in_path(const std::string& program) {
-  const char* path = std::getenv("PATH");
-  std::istringstream folders(path ? path : "/bin:/usr/bin");  // as posix_spawnp
-  for (std::string folder; std::getline(folders, folder, ':');)
-    if (::access(((folder.empty() ? "." : folder) + "/" + program).c_str(), X_OK) == 0) return true;
-  return false;
-}
-
 Process::Process(const std::vector<std::string>& argv) {
-  std::vector<char*> arguments;
-  for (const std::string& a : argv) arguments.push_back(const_cast<char*>(a.c_str()));
-  arguments.push_back(nullptr);
+  const std::vector<char*> arguments = pointers_to(argv);
   // A socket, because send() can be told not to raise SIGPIPE when the other side is gone; a memory file,
   // because a pipe for the errors could fill up and block both.
   int ends[2], start[2];

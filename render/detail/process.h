@@ -7,9 +7,6 @@
 
 namespace limber::render::detail {
 
-// Whether a program of that name is where PATH says.
-bool is_in_path(const std::string& program);
-
 class Process {
  public:
   // argv[0] is looked up in PATH. Throws InputError when there is no such program.

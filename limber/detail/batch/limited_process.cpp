@@ -1,9 +1,7 @@
 #include "limber/detail/batch/limited_process.h"
 
-#include <fcntl.h>
 #include <signal.h>
 #include <sys/mman.h>
-#include <sys/prctl.h>
 #include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -15,6 +13,7 @@
 #include <cstring>
 
 #include "core/error.h"
+#include "core/process.h"
 
 namespace limber::detail {
 
@@ -59,24 +58,10 @@ std::string content_of(int fd, std::size_t most) {
 
 LimitedProcess::LimitedProcess(const std::vector<std::string>& words, const ProcessLimits& limits)
     : limits_(limits) {
-  std::vector<char*> argv{const_cast<char*>("limber")};
-  for (const std::string& word : words) argv.push_back(const_cast<char*>(word.c_str()));
-  argv.push_back(nullptr);
   out_ = ::memfd_create("stdout", MFD_CLOEXEC), err_ = ::memfd_create("stderr", MFD_CLOEXEC);
   LIMBER_CHECK(out_ >= 0 && err_ >= 0, std::strerror(errno));
-  const pid_t parent = ::getpid();
-  pid_ = ::fork();
-  LIMBER_CHECK(pid_ >= 0, std::strerror(errno));
-  if (pid_ == 0) {
-    ::prctl(PR_SET_PDEATHSIG, SIGKILL);
-    if (::getppid() != parent) ::_exit(127);
-    ::setpgid(0, 0);  // Ctrl-C is for the parent, who tells it; and what it starts ends with it
-    limit(limits);
-    ::dup2(::open("/dev/null", O_RDONLY | O_CLOEXEC), 0), ::dup2(out_, 1), ::dup2(err_, 2);
-    ::execv("/proc/self/exe", argv.data());
-    ::_exit(127);
-  }
-  ::setpgid(pid_, pid_);
+  // What it starts is of its group, and ends with it.
+  pid_ = start_this_program(words, out_, err_, [&] { limit(limits); });
 }
 
 LimitedProcess::~LimitedProcess() {

@@ -9,7 +9,6 @@
 #include "core/threads.h"
 #include "limber/detail/exit_codes.h"
 #include "limber/detail/farm/lease.h"
-#include "limber/detail/farm/run_program.h"
 
 namespace limber::detail {
 

@@ -2,8 +2,8 @@
 #include <fmt/format.h>
 
 #include "core/json_text.h"
+#include "core/process.h"
 #include "limber/detail/farm/engines.h"
-#include "limber/detail/farm/run_program.h"
 
 namespace limber::detail {
 

@@ -3,28 +3,19 @@
 #include <fcntl.h>
 #include <signal.h>
 #include <sys/mman.h>
-#include <sys/prctl.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include <cerrno>
 #include <chrono>
-#include <cstdlib>
 #include <cstring>
-#include <sstream>
 
 #include "core/error.h"
+#include "core/process.h"
 
 namespace limber::detail {
 
 namespace {
-
-std::vector<char*> pointers_to(const std::vector<std::string>& words) {
-  std::vector<char*> argv;
-  for (const std::string& word : words) argv.push_back(const_cast<char*>(word.c_str()));
-  argv.push_back(nullptr);
-  return argv;
-}
 
 int code_of(int status) { return WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status); }
 
@@ -38,21 +29,8 @@ std::string text_in(int fd) {
 
 }  // namespace
 
-bool is_program(const std::string& name) {
-  const char* path = std::getenv("PATH");
-  std::istringstream folders(path ? path : "/bin:/usr/bin");
-  for (std::string folder; std::getline(folders, folder, ':');)
-    if (::access(((folder.empty() ? "." : folder) + "/" + name).c_str(), X_OK) == 0) return true;
-  return false;
-}
-
-fs::path program_file() {
-  std::error_code none;
-  return fs::read_symlink("/proc/self/exe", none);
-}
-
 RanProgram run_program(const std::vector<std::string>& words, double patience_s) {
-  if (!is_program(words[0]))
+  if (!is_in_path(words[0]))
     throw InputError(fmt::format("{} is not in PATH; is it installed here?", words[0]));
   RanProgram ran;
   const int out = ::memfd_create("stdout", MFD_CLOEXEC), err = ::memfd_create("stderr", MFD_CLOEXEC);
@@ -81,22 +59,9 @@ RanProgram run_program(const std::vector<std::string>& words, double patience_s)
 }
 
 ChildWorker::ChildWorker(const std::vector<std::string>& words, const fs::path& log) {
-  std::vector<std::string> all{"limber"};
-  all.insert(all.end(), words.begin(), words.end());
-  std::vector<char*> argv = pointers_to(all);
   const int said = ::open(log.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0644);
   if (said < 0) throw DiskError(fmt::format("{}: cannot be made: {}", log.string(), std::strerror(errno)));
-  const pid_t parent = ::getpid();
-  pid_ = ::fork();
-  LIMBER_CHECK(pid_ >= 0, std::strerror(errno));
-  if (pid_ == 0) {
-    ::prctl(PR_SET_PDEATHSIG, SIGKILL);
-    if (::getppid() != parent) ::_exit(127);
-    ::setpgid(0, 0);  // Ctrl-C is for the parent, who tells it
-    ::dup2(::open("/dev/null", O_RDONLY | O_CLOEXEC), 0), ::dup2(said, 1), ::dup2(said, 2);
-    ::execv("/proc/self/exe", argv.data());
-    ::_exit(127);
-  }
+  pid_ = start_this_program(words, said, said);
   ::close(said);
 }
 

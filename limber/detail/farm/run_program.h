@@ -1,4 +1,4 @@
-// Other programs, and limber's own file.
+// Other programs, and limber once more.
 #pragma once
 
 #include <string>
@@ -7,11 +7,6 @@
 #include "core/file.h"
 
 namespace limber::detail {
-
-bool is_program(const std::string& name);  // in PATH
-
-// The file of the program that runs, as other processes find it.
-fs::path program_file();
 
 struct RanProgram {
   int code = 0;  // 128 + the number of the signal that ended it

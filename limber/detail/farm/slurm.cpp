@@ -6,6 +6,7 @@
 
 #include "core/error.h"
 #include "core/log.h"
+#include "core/process.h"
 #include "limber/detail/farm/engines.h"
 #include "limber/detail/farm/run_program.h"
 
@@ -34,7 +35,7 @@ std::string job_name(const FarmFolder& farm) { return "limber-" + farm.work().fi
 
 }  // namespace
 
-bool slurm_is_there() { return is_program("sbatch"); }
+bool slurm_is_there() { return is_in_path("sbatch"); }
 
 std::string slurm_script(const FarmFolder& farm) {
   return fmt::format(R"sh(#!/bin/bash

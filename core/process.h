@@ -1,0 +1,27 @@
+// Programs and processes of this machine.
+#pragma once
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "core/file.h"
+
+namespace limber {
+
+// As posix_spawnp looks for it.
+bool is_in_path(const std::string& program);
+
+// The file of the program that runs, as other processes find it.
+fs::path program_file();
+
+// As execv takes it; they point into the words.
+std::vector<char*> pointers_to(const std::vector<std::string>& words);
+
+// This program once more, with these words: its id. It ends with this process, has a group of its own, for
+// Ctrl-C is for this one, who tells it, reads nothing, and says what it says into two open files.
+// `in_child` is called there, where only async-signal-safe functions may be.
+int start_this_program(const std::vector<std::string>& words, int out, int err,
+                       const std::function<void()>& in_child = {});
+
+}  // namespace limber
