@@ -10,6 +10,7 @@
 
 namespace CLI {
 class App;
+class Option;
 class Validator;
 }  // namespace CLI
 
@@ -40,6 +41,10 @@ void add_scene(CLI::App& command, detail::SceneOptions&);
 // Of one search: PlanOptions, BenchOptions or RefineOptions.
 template <class Options>
 void add_limits(CLI::App& command, Options&);
+// What a body is to be.
+void add_body_options(CLI::App& command, detail::PrepareOptions&);
+// Of each of many models: its time and memory, and whether it is tried again.
+std::vector<CLI::Option*> add_model_limits(CLI::App& command, detail::BatchOptions&);
 // Runs of a benchmark.
 void add_runs(CLI::App& command, detail::BenchOptions&);
 

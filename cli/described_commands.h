@@ -9,10 +9,6 @@
 
 #include "cli/command_options.h"
 
-namespace CLI {
-class Option;
-}  // namespace CLI
-
 namespace limber::cli {
 
 struct DescribedCommands {
@@ -36,7 +32,7 @@ struct DescribedCommands {
  private:
   void add_prepare_command();  // prepare. cli/prepare_command.cpp
   void add_motion_commands();  // plan, simulate, render, export, run, bench. cli/motion_commands.cpp
-  void add_farm_commands();    // farm submit, status, cancel, work. cli/farm_commands.cpp
+  void add_farm_commands();    // farm submit, bench, prepare, status, cancel, work. cli/farm_commands.cpp
   void add_result_commands();  // verify, report, robust, refine, info. cli/result_commands.cpp
   void add_scene_commands();   // scene new, prepare, check; scenes. cli/scene_commands.cpp
   void add_word_commands();    // completion, man. cli/word_commands.cpp

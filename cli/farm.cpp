@@ -30,6 +30,7 @@ Json json_of_farm(const detail::FarmStatus& status) {
   json["notes"] = status.notes;
   if (!status.engine_fails.empty()) json["engine_fails"] = status.engine_fails;
   if (!status.explanation.empty()) json["solved"] = status.solved, json["explanation"] = status.explanation;
+  if (status.models > 0) json["models"] = status.models, json["failed_models"] = status.failed_models;
   if (!status.film.empty()) json["film"] = status.film.string();
   if (!status.report.empty()) json["report"] = status.report.string();
   return json;
@@ -46,6 +47,8 @@ std::string text_of_farm(const detail::FarmStatus& status) {
   for (const std::string& running : status.running) text += "running  " + running + "\n";
   for (const std::string& failed : status.failed) text += "failed   " + failed + "\n";
   if (!status.explanation.empty()) text += "plan     " + status.explanation + "\n";
+  if (status.models > 0)
+    text += fmt::format("models   {}, of which {} failed\n", status.models, status.failed_models);
   if (!status.film.empty()) text += "film     " + status.film.string() + "\n";
   if (!status.report.empty()) text += "report   " + status.report.string() + "\n";
   for (const std::string& note : status.notes) text += "note     " + note + "\n";
@@ -57,7 +60,8 @@ std::string text_of_farm(const detail::FarmStatus& status) {
 }
 
 int exit_code_of_farm(const detail::FarmStatus& status) {
-  if (status.state == detail::FarmStatus::done) return status.solved ? exit_done : exit_no_plan;
+  if (status.state == detail::FarmStatus::done)
+    return !status.solved ? exit_no_plan : status.failed_models > 0 ? exit_models_failed : exit_done;
   return status.exit_code != 0 ? status.exit_code : exit_defect;
 }
 
@@ -69,7 +73,7 @@ Outcome farm_submit(const detail::FarmOptions& options) {
     return {exit_done,
             {{"engine", submitted.engine}, {"would", submitted.would}},
             fmt::format("{}\n", fmt::join(submitted.would, "\n"))};
-  const std::string folder = (options.bench ? options.bench->out : options.plan.out).string();
+  const std::string folder = options.out().string();
   Json json{{"engine", submitted.engine},
             {"jobs", submitted.jobs},
             {"was_done", submitted.was_done},

@@ -1,5 +1,5 @@
-// farm: one scene on many machines (docs/farm.md). What submit is told is kept in the folder: who works, asks
-// or cancels names that alone.
+// farm: a scene, a benchmark or a batch of models on many machines (docs/farm.md). What submit is told is
+// kept in the folder: who works, asks or cancels names that alone.
 #include <CLI/CLI.hpp>
 
 #include "cli/described_commands.h"
@@ -92,7 +92,7 @@ const std::vector<std::string> stages_of_a_scene(detail::stage_names.begin(),
 
 void DescribedCommands::add_farm_commands() {
   CLI::App& farm =
-      *program.add_subcommand("farm", "one scene on many machines: bodies, plan, frames, film, report");
+      *program.add_subcommand("farm", "on many machines: a scene's film, a benchmark, many models");
   farm.require_subcommand(1);
 
   CLI::App& submit_command = *farm.add_subcommand(
@@ -141,6 +141,37 @@ void DescribedCommands::add_farm_commands() {
       if (bench_options.scenes.empty() || bench_options.out.empty())
         throw InputError("name the scenes, and with -o the folder, which all machines see");
       farm_options.bench = bench_options;
+      return farm_submit(farm_options);
+    };
+  });
+
+  CLI::App& models_command = *farm.add_subcommand(
+      "prepare", "sends many models to be prepared, each in a process of its own; what is done is skipped");
+  models_command
+      .add_option(
+          "MODEL", batch_options.models,
+          "files, folders of models, @LIST (a file with a path a line, @- on stdin), which all machines "
+          "see")
+      ->required();
+  models_command
+      .add_option(
+          "-o,--out", prepare_options.out,
+          "folder, which all machines see, for bodies, failed, manifest.jsonl, manifest.csv, index.html")
+      ->required()
+      ->type_name("DIR");
+  add_body_options(models_command, prepare_options);
+  add_store(models_command, prepare_options.store, "store in -o");
+  add_model_limits(models_command, batch_options);
+  models_command
+      .add_option("--models-per-task", farm_options.models_per_task, "models of a unit, 1 … 1000000")
+      ->check(CLI::Range(1, 1000000))
+      ->type_name("N")
+      ->capture_default_str();
+  add_engine(models_command, farm_options);
+  add_global(models_command, global);
+  models_command.callback([this] {
+    chosen = [this] {
+      farm_options.batch = batch_options;
       return farm_submit(farm_options);
     };
   });

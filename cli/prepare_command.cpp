@@ -12,6 +12,103 @@
 
 namespace limber::cli {
 
+void add_body_options(CLI::App& command, detail::PrepareOptions& options) {
+  command
+      .add_option("--shells,--max-convex-hull,--max-hulls", options.shells,
+                  "convex shells, at most; 1 … 1000")
+      ->check(CLI::Range(1, 1000))
+      ->capture_default_str();
+  command
+      .add_option(
+          "--concavity", options.concavity,
+          "cut no further below this overshoot, share of the model's diagonal, 0 … 1; 0: only --shells rules")
+      ->check(within(0.0, 1.0))
+      ->capture_default_str();
+  command
+      .add_option("--threshold", options.threshold,
+                  "--concavity in CoACD's unit, half of the longest edge of the model's box, 0 … 1")
+      ->check(within(0.0, 1.0));
+  command
+      .add_option("--shell-corners,--max-hull-vertices,--max-ch-vertex", options.corners,
+                  "corners of a shell, at most; 8 … 10000")
+      ->check(CLI::Range(8, 10000))
+      ->capture_default_str();
+  command
+      .add_option("--inflate", options.inflate,
+                  "inflate the shells by this share of the model's diagonal, 0 … 1")
+      ->check(within(0.0, 1.0))
+      ->capture_default_str();
+  command.add_flag("--exact", options.exact,
+                   "shells are the exact convex parts of a closed model of at most 2000 triangles, as many "
+                   "as it takes; --shells and --concavity do not count");
+  command.add_option("--tets", options.tets, "tets of the cage, about; 24 … 200000")
+      ->check(CLI::Range(24, 200000))
+      ->capture_default_str();
+  command
+      .add_option(
+          "--mode", options.mode,
+          "how the cage is made: lattice; fast (not shrunk to the surface); paper (Delaunay of each shell); "
+          "conform (CGAL's Mesh_3: follows the surface, does not enclose it)")
+      ->check(CLI::IsMember({"lattice", "fast", "paper", "conform"}))
+      ->capture_default_str();
+  command.add_option("--scale", options.scale, "metres a file unit, 1e-9 … 1e9; 0.001 for millimetres")
+      ->check(within(1e-9, 1e9))
+      ->capture_default_str();
+  command.add_flag("--y-up", options.y_up, "the model has +Y up; turn it to +Z");
+  command.add_flag("--preview", options.preview,
+                   "pictures, also of a body that is up to date: preview-shells.png, preview-cage.png, "
+                   "preview-cut.png, preview-dihedrals.png");
+  command
+      .add_option(
+          "--export", options.exports,
+          "files for other programs, also of a body that is up to date; any of vtu (ParaView: cage.vtu, "
+          "surface.vtu), node (TetGen: cage.node, cage.ele), interp (Vega FEM: cage.veg, surface.interp, "
+          "surface.obj), vtk (Drake, Bullet: cage.vtk), inp (Abaqus: cage.inp), urdf, sdf, mjcf (one OBJ a "
+          "shell in hulls, mass.json, and body.urdf, body.sdf, or MuJoCo's body.xml and flex.xml), usd "
+          "(body.usda: the cage as a soft TetMesh), usd-omni (the same by the names of Omni Physics), sofa "
+          "(body.scn); with -interior behind it of a cage without tets that have all nodes on the boundary")
+      ->type_name("FORMAT[,FORMAT…]")
+      ->delimiter(',')
+      ->check(CLI::IsMember(detail::export_formats))
+      ->allow_extra_args(false);
+  command.add_option("--density", options.density_kg_m3, "kg/m³, of the masses of --export; 1e-6 … 1e6")
+      ->check(within(1e-6, 1e6))
+      ->capture_default_str();
+  command
+      .add_option("--only", options.only,
+                  "make shells alone, or the cage alone with its certificate, and nothing else")
+      ->check(CLI::IsMember({"shells", "cage"}));
+  command
+      .add_option("--label", options.label,
+                  "of a label map (NIfTI or NRRD): which label, by its number or the name that the file has")
+      ->type_name("LABEL");
+  add_label_surfaces(command, options.label_gap, options.label_rounds, options.min_island);
+}
+
+std::vector<CLI::Option*> add_model_limits(CLI::App& command, detail::BatchOptions& options) {
+  return {
+      command
+          .add_option(
+              "--time-limit", options.time_limit_s,
+              "of many models: CPU time that each may take, 1 s … 30 days: 30, 30s, 5min or 1h; by the "
+              "clock five times that")
+          ->transform(CLI::AsNumberWithUnit(std::map<std::string, double>{{"s", 1}, {"min", 60}, {"h", 3600}},
+                                            CLI::AsNumberWithUnit::DEFAULT, "s|min|h"))
+          ->check(within(1, 30 * 86400.0))
+          ->capture_default_str(),
+      command
+          .add_option(
+              "--memory-limit", options.memory_mb,
+              "of many models: memory that each may take, 100 MB … 1 PB: 4000, 4000MB or 4GB; default: "
+              "three quarters of the machine's, shared by the jobs, on a farm by the cores of the one that "
+              "submits")
+          ->transform(CLI::AsNumberWithUnit(std::map<std::string, double>{{"MB", 1}, {"GB", 1000}},
+                                            CLI::AsNumberWithUnit::DEFAULT, "MB|GB"))
+          ->check(within(100, 1e9)),
+      command.add_flag("--retry-failed", options.retry_failed,
+                       "of many models: try those again, too, that failed before and are the same")};
+}
+
 void DescribedCommands::add_prepare_command() {
   CLI::App& prepare_command =
       *program.add_subcommand("prepare", "model → convex shells, enclosing cage, binding, report");
@@ -27,77 +124,9 @@ void DescribedCommands::add_prepare_command() {
           "models for bodies, failed, manifest.jsonl, manifest.csv, index.html")
       ->required()
       ->type_name("DIR");
-  prepare_command
-      .add_option("--shells,--max-convex-hull,--max-hulls", prepare_options.shells,
-                  "convex shells, at most; 1 … 1000")
-      ->check(CLI::Range(1, 1000))
-      ->capture_default_str();
-  prepare_command
-      .add_option(
-          "--concavity", prepare_options.concavity,
-          "cut no further below this overshoot, share of the model's diagonal, 0 … 1; 0: only --shells rules")
-      ->check(within(0.0, 1.0))
-      ->capture_default_str();
-  prepare_command
-      .add_option("--threshold", prepare_options.threshold,
-                  "--concavity in CoACD's unit, half of the longest edge of the model's box, 0 … 1")
-      ->check(within(0.0, 1.0));
-  prepare_command
-      .add_option("--shell-corners,--max-hull-vertices,--max-ch-vertex", prepare_options.corners,
-                  "corners of a shell, at most; 8 … 10000")
-      ->check(CLI::Range(8, 10000))
-      ->capture_default_str();
-  prepare_command
-      .add_option("--inflate", prepare_options.inflate,
-                  "inflate the shells by this share of the model's diagonal, 0 … 1")
-      ->check(within(0.0, 1.0))
-      ->capture_default_str();
-  prepare_command.add_flag(
-      "--exact", prepare_options.exact,
-      "shells are the exact convex parts of a closed model of at most 2000 triangles, as many "
-      "as it takes; --shells and --concavity do not count");
-  prepare_command.add_option("--tets", prepare_options.tets, "tets of the cage, about; 24 … 200000")
-      ->check(CLI::Range(24, 200000))
-      ->capture_default_str();
-  prepare_command
-      .add_option(
-          "--mode", prepare_options.mode,
-          "how the cage is made: lattice; fast (not shrunk to the surface); paper (Delaunay of each shell); "
-          "conform (CGAL's Mesh_3: follows the surface, does not enclose it)")
-      ->check(CLI::IsMember({"lattice", "fast", "paper", "conform"}))
-      ->capture_default_str();
-  prepare_command
-      .add_option("--scale", prepare_options.scale, "metres a file unit, 1e-9 … 1e9; 0.001 for millimetres")
-      ->check(within(1e-9, 1e9))
-      ->capture_default_str();
-  prepare_command.add_flag("--y-up", prepare_options.y_up, "the model has +Y up; turn it to +Z");
-  prepare_command.add_flag(
-      "--preview", prepare_options.preview,
-      "pictures, also of a body that is up to date: preview-shells.png, preview-cage.png, "
-      "preview-cut.png, preview-dihedrals.png");
-  prepare_command
-      .add_option(
-          "--export", prepare_options.exports,
-          "files for other programs, also of a body that is up to date; any of vtu (ParaView: cage.vtu, "
-          "surface.vtu), node (TetGen: cage.node, cage.ele), interp (Vega FEM: cage.veg, surface.interp, "
-          "surface.obj), vtk (Drake, Bullet: cage.vtk), inp (Abaqus: cage.inp), urdf, sdf, mjcf (one OBJ a "
-          "shell in hulls, mass.json, and body.urdf, body.sdf, or MuJoCo's body.xml and flex.xml), usd "
-          "(body.usda: the cage as a soft TetMesh), usd-omni (the same by the names of Omni Physics), sofa "
-          "(body.scn); with -interior behind it of a cage without tets that have all nodes on the boundary")
-      ->type_name("FORMAT[,FORMAT…]")
-      ->delimiter(',')
-      ->check(CLI::IsMember(detail::export_formats))
-      ->allow_extra_args(false);
-  prepare_command
-      .add_option("--density", prepare_options.density_kg_m3, "kg/m³, of the masses of --export; 1e-6 … 1e6")
-      ->check(within(1e-6, 1e6))
-      ->capture_default_str();
+  add_body_options(prepare_command, prepare_options);
   prepare_command.add_flag("--picture", prepare_options.picture,
                            "a small one: picture.png; many models have it always");
-  prepare_command
-      .add_option("--only", prepare_options.only,
-                  "make shells alone, or the cage alone with its certificate, and nothing else")
-      ->check(CLI::IsMember({"shells", "cage"}));
   prepare_command
       .add_option("--format", format,
                   "of a model on stdin: the ending that its file would have, as glb; OBJ, OFF, PLY and STL "
@@ -110,39 +139,15 @@ void DescribedCommands::add_prepare_command() {
             return plain ? "" : "is no ending of a file; write for example stl";
           },
           "ENDING"));
-  prepare_command
-      .add_option("--label", prepare_options.label,
-                  "of a label map (NIfTI or NRRD): which label, by its number or the name that the file has")
-      ->type_name("LABEL");
-  add_label_surfaces(prepare_command, prepare_options.label_gap, prepare_options.label_rounds,
-                     prepare_options.min_island);
   add_store(prepare_command, prepare_options.store, "none, or of many models store in -o");
-  of_many = {
+  of_many = add_model_limits(prepare_command, batch_options);
+  of_many.push_back(
       prepare_command
           .add_option("--jobs", batch_options.jobs,
                       "of many models: so many at once, 0 … 256; 0: as many as --threads. Results do not "
                       "depend on it")
           ->check(CLI::Range(0, 256))
-          ->capture_default_str(),
-      prepare_command
-          .add_option(
-              "--time-limit", batch_options.time_limit_s,
-              "of many models: CPU time that each may take, 1 s … 30 days: 30, 30s, 5min or 1h; by the "
-              "clock five times that")
-          ->transform(CLI::AsNumberWithUnit(std::map<std::string, double>{{"s", 1}, {"min", 60}, {"h", 3600}},
-                                            CLI::AsNumberWithUnit::DEFAULT, "s|min|h"))
-          ->check(within(1, 30 * 86400.0))
-          ->capture_default_str(),
-      prepare_command
-          .add_option(
-              "--memory-limit", batch_options.memory_mb,
-              "of many models: memory that each may take, 100 MB … 1 PB: 4000, 4000MB or 4GB; default: "
-              "three quarters of the machine's, shared by the jobs")
-          ->transform(CLI::AsNumberWithUnit(std::map<std::string, double>{{"MB", 1}, {"GB", 1000}},
-                                            CLI::AsNumberWithUnit::DEFAULT, "MB|GB"))
-          ->check(within(100, 1e9)),
-      prepare_command.add_flag("--retry-failed", batch_options.retry_failed,
-                               "of many models: try those again, too, that failed before and are the same")};
+          ->capture_default_str());
   add_global(prepare_command, global), add_threads(prepare_command, global),
       add_progress(prepare_command, global);
   prepare_command.callback([&] {

@@ -93,6 +93,26 @@ class Farm : public Program {
     return {"farm", "submit", (folder / "aimless.toml").string(), "-o", out()};
   }
 
+  static std::string box_model(double height) {
+    std::string text;
+    for (int c = 0; c < 8; ++c) text += fmt::format("v {} {} {}\n", c & 1, c >> 1 & 1, height * (c >> 2));
+    return text + "f 1 3 4 2\nf 5 6 8 7\nf 1 2 6 5\nf 3 7 8 4\nf 1 5 7 3\nf 2 4 8 6\n";
+  }
+  std::string box_models(int count) const {
+    fs::create_directories(folder / "models");
+    for (int m = 0; m < count; ++m)
+      std::ofstream(folder / "models" / fmt::format("box-{:02}.obj", m)) << box_model(1 + 0.1 * m);
+    return (folder / "models").string();
+  }
+
+  // Less what tells of its making.
+  static std::map<std::string, std::string> result_of_batch(const fs::path& folder) {
+    std::map<std::string, std::string> files;
+    for (const auto& [name, bytes] : contents(folder))
+      if (name != "seconds.csv" && name != "journal.jsonl" && !name.starts_with("farm/")) files[name] = bytes;
+    return files;
+  }
+
   // Pictures and film by name, and the plan's hashes.
   std::map<std::string, std::string> result(const std::string& name) const {
     const fs::path work = out(name);
@@ -321,6 +341,48 @@ TEST_F(Farm_slow, ABenchmarkHasTheRecordsOfOneProcess) {
   EXPECT_EQ(fs::last_write_time(files[0]), kept);
 }
 
+TEST_F(Farm_slow, ManyModelsHaveTheBytesOfOneBatch) {
+  const std::string models = box_models(11);
+  std::ofstream(fs::path(models) / "broken.obj") << "v 0 0 0\nf 1 2 3\n";
+  const std::vector<std::string> of_bodies{models, "--only", "cage", "--tets", "24"};
+  const auto words = [&](std::vector<std::string> command, const std::string& name,
+                         const std::vector<std::string>& more = {}) {
+    command.insert(command.end(), of_bodies.begin(), of_bodies.end());
+    command.insert(command.end(), {"-o", out(name), "--store", out(name + "-store")});
+    command.insert(command.end(), more.begin(), more.end());
+    return command;
+  };
+  const auto on_a_farm =
+      words({"farm", "prepare"}, "farm", {"--engine", "local", "--workers", "2", "--models-per-task", "3"});
+  const auto expect_same_batch = [&] {
+    const auto one = result_of_batch(out("one")), farm = result_of_batch(out("farm"));
+    EXPECT_GT(one.size(), 25u);
+    for (const auto& [name, bytes] : one) EXPECT_TRUE(farm.contains(name) && farm.at(name) == bytes) << name;
+    EXPECT_EQ(one.size(), farm.size());
+  };
+  ASSERT_EQ(run(words({"prepare"}, "one")).code, exit_models_failed);
+  const Process process = start(on_a_farm);
+  EXPECT_TRUE(soon([&] { return owners("farm", "models-2").size() == 1; }));
+  ::kill(process.pid, SIGKILL);  // its workers end with it, and theirs with them
+  wait_for(process);
+  EXPECT_FALSE(fs::exists(fs::path(out("farm")) / "index.html"));
+  const Ended ended = run(on_a_farm);
+  ASSERT_EQ(ended.code, exit_models_failed) << ended.json;
+  EXPECT_EQ(ended.json.at("status").at("models"), 12);
+  EXPECT_EQ(ended.json.at("status").at("failed_models"), 1);
+  expect_same_batch();
+  EXPECT_TRUE(run(on_a_farm).json.at("was_done").get<bool>());
+
+  // A model that is edited is made anew by who submits anew, and its costs are told once.
+  std::ofstream(fs::path(models) / "broken.obj") << box_model(3);
+  EXPECT_EQ(run(words({"prepare"}, "one")).code, exit_done);
+  EXPECT_EQ(run(on_a_farm).code, exit_done);
+  expect_same_batch();
+  const std::string lines = read_file(fs::path(out("farm")) / "journal.jsonl");
+  EXPECT_EQ(std::count(lines.begin(), lines.end(), '\n'), 12);
+  EXPECT_FALSE(fs::exists(fs::path(out("farm")) / "journal"));
+}
+
 TEST_F(Farm_slow, WhatFailsIsToldAndTriedAgain) {
   const std::vector<std::string> until_film{"--until", "film"};
   ASSERT_EQ(run(submit("out", {"--until", "plan"})).code, exit_done);
@@ -391,7 +453,14 @@ TEST_F(Farm, WrongWordsAreRefusedBeforeAnythingIsWritten) {
   };
   for (const char* command : {"status", "cancel", "work"})
     refused({"farm", command, out()}, "nothing was submitted");
-  refused({"farm"}, "needs a command, one of submit, bench, status, cancel, work");
+  refused({"farm"}, "needs a command, one of submit, bench, prepare, status, cancel, work");
+  refused({"farm", "prepare", "-o", out()}, "MODEL");
+  refused({"farm", "prepare", box_models(1)}, "--out");
+  refused({"farm", "prepare", "no.obj", "-o", out()}, "no.obj: there is no such file");
+  refused({"farm", "prepare", box_models(1), "-o", out(), "--models-per-task", "0"}, "--models-per-task");
+  refused({"farm", "prepare", box_models(1), "-o", out(), "--tets", "3"}, "--tets");
+  refused({"farm", "prepare", box_models(1), "-o", out(), "--exact", "--mode", "conform", "--only", "cage"},
+          "--exact");
   refused({"farm", "bench", "-o", out()}, "name the scenes");
   refused({"farm", "bench", quick_scene()}, "-o");
   refused({"farm", "bench", "barriers7", "-o", out()}, "barriers7");
@@ -446,6 +515,10 @@ TEST_F(Farm, ADamagedFolderIsASentence) {
                 .code,
             exit_done);
   expect_a_sentence_of_each_key(out("runs"));
+  ASSERT_EQ(
+      limber_program({"farm", "prepare", box_models(2), "-o", out("models-out"), "--engine", "none"}).code,
+      exit_done);
+  expect_a_sentence_of_each_key(out("models-out"));
   ASSERT_EQ(limber_program(submit_none()).code, exit_done);
   expect_a_sentence_of_each_key(out());
   const fs::path file = fs::path(out()) / "farm" / "farm.json";
@@ -484,6 +557,15 @@ TEST_F(Farm, SlurmAndOthersGetOneWorkerATask) {
     EXPECT_THAT(jobs, HasSubstr(words));
 }
 
+std::vector<std::string> arrays_and_stages(const FarmFolder& farm) {
+  std::vector<std::string> told;
+  for (const auto& words : slurm_commands(farm))
+    for (const std::string& word : words)
+      if (word.starts_with("--array") || std::count(stage_names.begin(), stage_names.end(), word) > 0)
+        told.push_back(word);
+  return told;
+}
+
 TEST_F(Farm, SlurmGetsABenchmarkAsBodiesRunsAndTable) {
   FarmOptions options;
   options.bench.emplace();
@@ -491,18 +573,34 @@ TEST_F(Farm, SlurmGetsABenchmarkAsBodiesRunsAndTable) {
   options.bench->presets = {"paper", "fast"};
   options.engine = "slurm", options.workers = 3, options.runs_per_task = 4;
   const FarmFolder farm = FarmFolder::begin(spec_of(options));
-  std::vector<std::string> told;
-  for (const auto& words : slurm_commands(farm))
-    for (const std::string& word : words)
-      if (word.starts_with("--array") || std::count(stage_names.begin(), stage_names.end(), word) > 0)
-        told.push_back(word);
-  EXPECT_EQ(told, (std::vector<std::string>{"--array=1-1", "bodies", "--array=1-3", "runs", "--array=1-1",
-                                            "table"}));
+  EXPECT_EQ(arrays_and_stages(farm), (std::vector<std::string>{"--array=1-1", "bodies", "--array=1-3", "runs",
+                                                               "--array=1-1", "table"}));
   std::vector<std::size_t> runs;
   for (const Unit& unit : farm.units(Stage::runs))
     runs.insert(runs.end(), unit.runs.begin(), unit.runs.end());
   EXPECT_EQ(runs, (std::vector<std::size_t>{0, 1, 2, 3, 4, 5, 6, 7, 8, 9}));
   EXPECT_THAT(openjd_template(farm), HasSubstr("--until, runs"));
+}
+
+TEST_F(Farm, SlurmGetsManyModelsAsModelsAndPage) {
+  FarmOptions options;
+  options.batch.emplace();
+  options.batch->models = {box_models(11)}, options.batch->each.out = out();
+  options.engine = "slurm", options.workers = 8, options.models_per_task = 3;
+  const FarmFolder farm = FarmFolder::begin(spec_of(options));
+  EXPECT_EQ(arrays_and_stages(farm),
+            (std::vector<std::string>{"--array=1-4", "models", "--array=1-1", "page"}));
+  std::vector<std::size_t> models;
+  for (const Unit& unit : farm.units(Stage::models)) {
+    EXPECT_LE(unit.models.size(), 3u);
+    models.insert(models.end(), unit.models.begin(), unit.models.end());
+  }
+  std::sort(models.begin(), models.end());
+  EXPECT_EQ(models, (std::vector<std::size_t>{0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10}));
+  EXPECT_THAT(openjd_template(farm), HasSubstr("--until, models"));
+
+  // What was kept is what was submitted.
+  EXPECT_EQ(json_of(read_spec(out())), json_of(farm.spec()));
 }
 
 TEST_F(Farm, AUnitIsOnes) {

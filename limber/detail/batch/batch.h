@@ -22,14 +22,17 @@ fs::path folder_of(const fs::path& batch, const BatchModel&);           // bodie
 fs::path quarantine_file_of(const fs::path& batch, const BatchModel&);  // failed/NAME.txt
 
 // journal.jsonl: how each attempt ended and what it cost; lines are added as that happens. The last of each
-// name counts; a line cut short does not.
+// name counts; a line cut short does not. Whoever makes a part of a batch, beside others, adds to a file of
+// his own, journal/PART.jsonl; who has the folder alone puts them together.
 class Journal {
  public:
-  explicit Journal(const fs::path& batch);  // reads it, and drops lines that do not count any more
+  // Reads all there is, and, where it is of no part, drops lines that do not count any more.
+  explicit Journal(const fs::path& batch, const std::string& part = "");
   const Json* find(const std::string& name) const;
   void add(const Json& line);
 
  private:
+  void append(const std::string& text);
   fs::path file_;
   std::map<std::string, Json> lines_;
 };

@@ -1,6 +1,7 @@
 #include <fcntl.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstring>
 #include <sstream>
@@ -83,18 +84,34 @@ fs::path quarantine_file_of(const fs::path& batch, const BatchModel& model) {
   return batch / "failed" / (model.model.name + ".txt");
 }
 
-Journal::Journal(const fs::path& batch) : file_(batch / "journal.jsonl") {
-  if (!fs::exists(file_)) return;
-  std::istringstream lines(read_file(file_));
+Journal::Journal(const fs::path& batch, const std::string& part) : file_(batch / "journal.jsonl") {
+  const fs::path parts = batch / "journal";
+  std::vector<fs::path> files;
+  std::error_code none;
+  for (const auto& entry : fs::directory_iterator(parts, none)) files.push_back(entry.path());
+  std::sort(files.begin(), files.end());
+  if (fs::exists(file_)) files.insert(files.begin(), file_);
   std::size_t count = 0;
-  for (std::string text; std::getline(lines, text); ++count) {
-    const Json line = Json::parse(text, nullptr, false);
-    if (is_record(line)) lines_[line.at("name").get<std::string>()] = line;
+  for (const fs::path& file : files) {
+    std::istringstream lines(read_file(file));
+    for (std::string text; std::getline(lines, text); ++count) {
+      const Json line = Json::parse(text, nullptr, false);
+      if (is_record(line)) lines_[line.at("name").get<std::string>()] = line;
+    }
   }
-  if (count == lines_.size()) return;
-  FileWriter writer(file_);
-  for (const auto& [name, line] : lines_) writer.append(text_of(line) + "\n");
-  writer.commit();
+  if (!part.empty()) {
+    make_folder(parts);
+    file_ = parts / (part + ".jsonl");
+    // What a killed process left half written is a line of its own from now on.
+    if (fs::exists(file_) && !read_file(file_).ends_with('\n')) append("\n");
+    return;
+  }
+  if (count > lines_.size() || fs::is_directory(parts, none)) {
+    FileWriter writer(file_);
+    for (const auto& [name, line] : lines_) writer.append(text_of(line) + "\n");
+    writer.commit();
+  }
+  fs::remove_all(parts, none);
 }
 
 const Json* Journal::find(const std::string& name) const {
@@ -102,14 +119,17 @@ const Json* Journal::find(const std::string& name) const {
   return found == lines_.end() ? nullptr : &found->second;
 }
 
-void Journal::add(const Json& line) {
-  const std::string text = text_of(line) + "\n";
+void Journal::append(const std::string& text) {
   const int fd = ::open(file_.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0644);
   const bool written = fd >= 0 && ::write(fd, text.data(), text.size()) == ssize_t(text.size());
   const int error = errno;
   if (fd >= 0) ::close(fd);
   if (!written)
     throw DiskError(fmt::format("{}: writing it failed: {}", file_.string(), std::strerror(error)));
+}
+
+void Journal::add(const Json& line) {
+  append(text_of(line) + "\n");
   lines_[line.at("name").get<std::string>()] = line;
 }
 

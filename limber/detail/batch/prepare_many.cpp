@@ -49,28 +49,26 @@ std::string text_of_number(double value) { return fmt::format("{}", value); }
 
 class Batch {
  public:
-  explicit Batch(const BatchOptions& options)
-      : options_(options), out_(options.each.out), jobs_(options.jobs > 0 ? options.jobs : thread_count()) {
-    constexpr double mib = 1 << 20;
-    const double machine_mb = double(::sysconf(_SC_PHYS_PAGES)) * double(::sysconf(_SC_PAGESIZE)) / mib;
-    const double memory_mb =
-        options.memory_mb > 0 ? options.memory_mb : std::floor(0.75 * machine_mb / jobs_);
+  // `part`: of a batch; empty: all of it.
+  explicit Batch(const BatchOptions& options, std::string part = "")
+      : options_(options),
+        out_(options.each.out),
+        part_(std::move(part)),
+        jobs_(options.jobs > 0 ? options.jobs : thread_count()) {
+    const double memory_mb = options.memory_mb > 0 ? options.memory_mb : memory_share_mb(jobs_);
     limits_ = {options.time_limit_s, clock_over_cpu * options.time_limit_s, memory_mb};
     store_folder_ = options.each.store.empty() ? out_ / "store" : options.each.store;
   }
 
   PreparedMany run() {
     require_agreeing(options_.each);
-    const std::vector<ListedModel> listed = list_models(options_.models, {out_, store_folder_});
+    const std::vector<ListedModel> listed =
+        options_.listed.empty() ? list_models(options_.models, {out_, store_folder_}) : options_.listed;
     make_folder(out_);
     const FolderLock lock(out_, FolderLock::alone);
-    for (const char* part : {"bodies", "failed"}) make_folder(out_ / part);
-    store_ = std::make_unique<BodyStore>(store_folder_);
-    journal_ = std::make_unique<Journal>(out_);
     for (const ListedModel& model : listed) work_.emplace_back().result.model = model;
     try {
-      look_at_all();
-      make_missing();
+      make_bodies();
     } catch (const Interrupted&) {
       log::info("{}: what is prepared is kept; the same command goes on", out_.string());
       throw;
@@ -78,7 +76,22 @@ class Batch {
     return finish();
   }
 
+  PreparedMany run_part(const std::vector<std::size_t>& which) {
+    const FolderLock lock(out_, FolderLock::shared, FolderLock::waits);
+    for (const std::size_t model : which) work_.emplace_back().result.model = options_.listed.at(model);
+    make_bodies();
+    return counts();
+  }
+
  private:
+  void make_bodies() {
+    for (const char* part : {"bodies", "failed"}) make_folder(out_ / part);
+    store_ = std::make_unique<BodyStore>(store_folder_);
+    journal_ = std::make_unique<Journal>(out_, part_);
+    look_at_all();
+    make_missing();
+  }
+
   // What is there already, here or in the store, and what need not be tried again.
   void look_at_all() {
     parallel_for(int(work_.size()), [&](int i) {
@@ -356,28 +369,34 @@ class Batch {
   PreparedMany finish() {
     write_quarantine();
     std::vector<BatchModel> results;
-    std::map<Outcome, int> count;
-    PreparedMany prepared;
-    for (const Work& work : work_) {
-      results.push_back(work.result);
-      ++count[work.found];
-      if (work.result.reason.empty()) continue;
-      ++prepared.reasons[work.result.reason];
-      prepared.not_prepared.push_back(work.result);
-    }
+    for (const Work& work : work_) results.push_back(work.result);
     write_tables(out_, results, *journal_);
     write_pages(out_, results);
-    prepared.models = int(work_.size());
-    prepared.made = count[Outcome::made], prepared.in_store = count[Outcome::in_store];
-    prepared.up_to_date = count[Outcome::up_to_date];
-    prepared.failed = count[Outcome::failed], prepared.failed_before = count[Outcome::failed_before];
+    PreparedMany prepared = counts();
     prepared.manifest = out_ / "manifest.jsonl", prepared.table = out_ / "manifest.csv";
     prepared.page = out_ / "index.html";
     return prepared;
   }
 
+  PreparedMany counts() const {
+    std::map<Outcome, int> count;
+    PreparedMany prepared;
+    for (const Work& work : work_) {
+      ++count[work.found];
+      if (work.result.reason.empty()) continue;
+      ++prepared.reasons[work.result.reason];
+      prepared.not_prepared.push_back(work.result);
+    }
+    prepared.models = int(work_.size());
+    prepared.made = count[Outcome::made], prepared.in_store = count[Outcome::in_store];
+    prepared.up_to_date = count[Outcome::up_to_date];
+    prepared.failed = count[Outcome::failed], prepared.failed_before = count[Outcome::failed_before];
+    return prepared;
+  }
+
   const BatchOptions& options_;
   const fs::path out_;
+  const std::string part_;
   fs::path store_folder_;
   int jobs_;
   ProcessLimits limits_{};
@@ -388,6 +407,17 @@ class Batch {
 
 }  // namespace
 
+double memory_share_mb(int jobs) {
+  constexpr double mib = 1 << 20;
+  const double machine_mb = double(::sysconf(_SC_PHYS_PAGES)) * double(::sysconf(_SC_PAGESIZE)) / mib;
+  return std::floor(0.75 * machine_mb / jobs);
+}
+
 PreparedMany prepare_many(const BatchOptions& options) { return Batch(options).run(); }
+
+PreparedMany prepare_part(const BatchOptions& options, const std::string& part,
+                          const std::vector<std::size_t>& which) {
+  return Batch(options, part).run_part(which);
+}
 
 }  // namespace limber::detail

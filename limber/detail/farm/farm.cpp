@@ -79,12 +79,12 @@ FarmSpec spec_to_submit(FarmOptions options) {
         "local");
   if (!options.sbatch.empty() && options.engine != "slurm")
     throw InputError(fmt::format("--sbatch is for Slurm, and the engine is {}", options.engine));
-  if (options.bench ? !options.bench->scenes.empty() : !options.plan.scene.scene.empty())
-    return spec_of(std::move(options));
+  if (options.bench || options.batch || !options.plan.scene.scene.empty()) return spec_of(std::move(options));
   // As before, but for who does it.
-  FarmSpec spec = FarmFolder(options.bench ? options.bench->out : options.plan.out).spec();
+  FarmSpec spec = FarmFolder(options.plan.out).spec();
   options.plan = spec.options.plan, options.film = spec.options.film, options.bench = spec.options.bench;
-  options.runs_per_task = spec.options.runs_per_task;
+  options.batch = spec.options.batch;
+  options.runs_per_task = spec.options.runs_per_task, options.models_per_task = spec.options.models_per_task;
   const bool another_engine = options.engine != spec.options.engine;
   if (options.workers == 0 && !another_engine) options.workers = spec.options.workers;
   if (options.sbatch.empty() && !another_engine) options.sbatch = spec.options.sbatch;
@@ -142,6 +142,15 @@ FarmStatus farm_status(const fs::path& work_folder) {
     if (farm.is_done(unit)) status.report = farm.work() / "report.html";
   for (const Unit& unit : farm.units(Stage::table))
     if (farm.is_done(unit)) status.report = farm.work() / "bench.html";
+  for (const Unit& unit : farm.units(Stage::page))
+    if (farm.is_done(unit)) {
+      const Json told = farm.told_of(unit);
+      const auto number = [&](const char* key) {
+        return told.contains(key) && told.at(key).is_number_integer() ? told.at(key).get<int>() : 0;
+      };
+      status.report = farm.work() / "index.html";
+      status.models = number("models"), status.failed_models = number("failed_models");
+    }
   if (slurm_is_there()) try {
       status.tasks = slurm_tasks(jobs_of(farm));
     } catch (const InputError& error) {

@@ -24,10 +24,11 @@ struct FarmStatus {
   bool local_engine_runs = false;
   std::vector<std::string> notes;  // why its workers would refuse to go on
   enum State { done, at_work, failing, cancelled, stopped } state = stopped;
-  bool solved = true;       // as far as is known
-  std::string explanation;  // of the plan
-  fs::path film, report;    // where they are there
-  int exit_code = 0;        // of the first unit that failed
+  bool solved = true;                 // as far as is known
+  int models = 0, failed_models = 0;  // of a batch that is done
+  std::string explanation;            // of the plan
+  fs::path film, report;              // where they are there
+  int exit_code = 0;                  // of the first unit that failed
 };
 // The folder first, and then the engine. Throws InputError where nothing was submitted.
 FarmStatus farm_status(const fs::path& work_folder);

@@ -8,20 +8,22 @@
 #include <vector>
 
 #include "core/json.h"
+#include "limber/detail/batch/prepare_many.h"
 #include "limber/detail/bench/bench.h"
 #include "limber/detail/film/render.h"
 #include "limber/detail/plan/plan.h"
 
 namespace limber::detail {
 
-// In the order in which they are done: those of a scene, and bodies, runs and table of a benchmark. Units of
-// a stage depend on the stages before, and not on one another.
-enum class Stage { bodies, search, plan, frames, film, report, runs, table };
+// In the order in which they are done: those of a scene; bodies, runs and table of a benchmark; models and
+// page of a batch. Units of a stage depend on the stages before, and not on one another.
+enum class Stage { bodies, search, plan, frames, film, report, runs, table, models, page };
 std::string name_of(Stage);
 // Throws InputError where it is none.
 Stage stage_named(const std::string&);
-inline const std::vector<std::string> stage_names{"bodies", "search", "plan", "frames",
-                                                  "film",   "report", "runs", "table"};
+inline const std::vector<std::string> stage_names{"bodies", "search", "plan",  "frames", "film",
+                                                  "report", "runs",   "table", "models", "page"};
+inline constexpr Stage last_stage = Stage::page;
 
 struct FarmOptions {
   PlanOptions plan;    // of a scene, with its seeds and presets; not resumed, improved or begun elsewhere
@@ -29,15 +31,20 @@ struct FarmOptions {
   // Instead of a scene's plan and film: all runs of a benchmark, nothing merged or parted; `plan` has its
   // folder
   std::optional<BenchOptions> bench;
+  // Or instead the bodies of many models; `jobs` is not read, a worker has as many as threads
+  std::optional<BatchOptions> batch;
   std::string engine;  // "slurm", "local", "openjd", "none"; empty: slurm where there is one, else local
   int workers = 0;     // at once; 0: local as many as the machine has threads, else 8
   int threads = 1;     // of a worker
   int frames_per_task = 10;
   int chunks = 0;                   // > 0: the film in so many parts instead
   int runs_per_task = 1;            // of a benchmark
+  int models_per_task = 10;         // of a batch
   std::vector<std::string> sbatch;  // words for sbatch
   Stage until = Stage::report;      // the last that is wanted
   bool dry_run = false;
+
+  const fs::path& out() const { return bench ? bench->out : batch ? batch->each.out : plan.out; }
 };
 
 struct Unit {
@@ -47,7 +54,8 @@ struct Unit {
   std::size_t scene = 0;   // of a benchmark's bodies
   std::uint64_t seed = 0;  // of search
   std::vector<int> frames;
-  std::vector<std::size_t> runs;
+  std::vector<std::size_t> runs;    // of a benchmark
+  std::vector<std::size_t> models;  // of a batch, by their places in its list
 };
 
 // What was submitted, as farm.json keeps it.
@@ -61,8 +69,13 @@ struct FarmSpec {
 // Reads the scene and looks for its models. Throws InputError for what could not be done: an unknown scene,
 // no goal, a model or camera that is not there, a size, no ffmpeg.
 FarmSpec spec_of(FarmOptions);
-// Of the files as they are now. Throws InputError.
+// Of the files as they are now; of a batch, whose models are looked at as their turn comes, of none. Throws
+// InputError.
 std::string hash_of_scenes(const FarmOptions&);
+
+Json json_of(const FarmSpec&);
+// That of a work folder, which may have been moved. Throws InputError where there is none, or it is damaged.
+FarmSpec read_spec(const fs::path& work);
 
 class FarmFolder {
  public:
@@ -92,7 +105,7 @@ class FarmFolder {
   void mark_failed(const Unit&, const std::string& reason, const std::string& message, int exit_code) const;
   void forget(const Unit&) const;
   Unit plan_unit() const {
-    return {.stage = Stage::plan, .name = "plan", .body = {}, .frames = {}, .runs = {}};
+    return {.stage = Stage::plan, .name = "plan", .body = {}, .frames = {}, .runs = {}, .models = {}};
   }
 
   void cancel() const;

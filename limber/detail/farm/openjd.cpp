@@ -38,13 +38,17 @@ std::string step(const std::string& name, Stage until, std::size_t workers, cons
 std::string steps_of(const FarmFolder& farm) {
   const FarmOptions& options = farm.spec().options;
   const auto at_most = [&](std::size_t units) { return std::min(units, std::size_t(options.workers)); };
-  std::string text = step("Bodies", Stage::bodies, at_most(farm.units(Stage::bodies).size()), "", false);
-  std::string before = "Bodies";
+  std::string text, before;
   const auto add = [&](const char* name, Stage until, std::size_t workers) {
     if (until > options.until) return;
     text += step(name, until, workers, before, false);
     before = name;
   };
+  if (options.batch) {
+    add("Models", Stage::models, at_most(farm.units(Stage::models).size()));
+    return text + step("Last", options.until, 1, before, true);
+  }
+  add("Bodies", Stage::bodies, at_most(farm.units(Stage::bodies).size()));
   if (options.bench) {
     add("Runs", Stage::runs, at_most(farm.units(Stage::runs).size()));
   } else {

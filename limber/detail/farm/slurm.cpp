@@ -96,10 +96,12 @@ std::vector<std::vector<std::string>> slurm_commands(const FarmFolder& farm) {
   };
   const auto at_most = [&](std::size_t units) { return std::min(units, std::size_t(options.workers)); };
   const Stage last = options.until;
-  const std::size_t bodies = open(Stage::bodies);
-  if (bodies > 0) add(Stage::bodies, at_most(bodies), false);
-  if (options.bench) {
-    if (open(Stage::runs) > 0) add(Stage::runs, at_most(open(Stage::runs)), false);
+  const auto add_open = [&](Stage stage) {
+    if (const std::size_t units = open(stage)) add(stage, at_most(units), false);
+  };
+  add_open(options.batch ? Stage::models : Stage::bodies);
+  if (options.bench) add_open(Stage::runs);
+  if (options.bench || options.batch) {
     add(last, 1, true);
     return commands;
   }

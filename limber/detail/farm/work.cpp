@@ -42,33 +42,47 @@ double elapsed_s(Clock::time_point then) {
   return std::chrono::duration<double>(Clock::now() - then).count();
 }
 
-// Ends a search that cannot win any more, and, to be kept and gone on with, one that has run for long.
-class SearchWatcher final : public Watcher {
+// Ends what is at work when this process is told to end, or the farm is cancelled.
+class EndWatcher : public Watcher {
  public:
-  SearchWatcher(const FarmFolder& farm, std::uint64_t seed) : farm_(farm), seed_(seed) {}
-  void at(std::int64_t iterations) { iterations_ = iterations; }
+  explicit EndWatcher(const FarmFolder& farm) : farm_(farm) {}
   bool stop() override {
     const std::unique_lock lock(mutex_, std::try_to_lock);
     if (!lock || elapsed_s(asked_) < between_questions_s) return stop_;
     asked_ = Clock::now();
-    const std::optional<Best> best = best_search(farm_);
-    stop_ = stop_ || signal() != 0 || (best && iterations_ >= best->most_of(seed_)) || farm_.is_cancelled() ||
-            elapsed_s(began_) > between_saves_s;
+    stop_ = stop_ || signal() != 0 || farm_.is_cancelled() || is_over();
     return stop_;
   }
+
+ protected:
+  virtual bool is_over() { return false; }
+  const FarmFolder& farm_;
+  const Clock::time_point began_ = Clock::now();
+
+ private:
   // Of the process: within the job that is watched, stop_signal() tells of the watcher.
   static int signal() {
     const WorkingFor nobody(nullptr);
     return stop_signal();
   }
-
- private:
-  const FarmFolder& farm_;
-  const std::uint64_t seed_;
-  std::atomic<std::int64_t> iterations_{0};
   std::atomic<bool> stop_{false};
   std::mutex mutex_;
-  Clock::time_point began_ = Clock::now(), asked_ = began_;
+  Clock::time_point asked_ = began_;
+};
+
+// Ends also a search that cannot win any more, and, to be kept and gone on with, one that has run for long.
+class SearchWatcher final : public EndWatcher {
+ public:
+  SearchWatcher(const FarmFolder& farm, std::uint64_t seed) : EndWatcher(farm), seed_(seed) {}
+  void at(std::int64_t iterations) { iterations_ = iterations; }
+
+ private:
+  bool is_over() override {
+    const std::optional<Best> best = best_search(farm_);
+    return (best && iterations_ >= best->most_of(seed_)) || elapsed_s(began_) > between_saves_s;
+  }
+  const std::uint64_t seed_;
+  std::atomic<std::int64_t> iterations_{0};
 };
 
 class Worker {
@@ -85,7 +99,7 @@ class Worker {
       throw InputError(fmt::format("{}: was edited after it was submitted in {}; submit it anew",
                                    spec.options.bench ? "one of its scenes" : spec.options.plan.scene.scene,
                                    farm_.work().string()));
-    if (!spec.options.bench) scene_ = read_scene(spec.options.plan);
+    if (!spec.options.bench && !spec.options.batch) scene_ = read_scene(spec.options.plan);
   }
 
   WorkDone run() {
@@ -161,7 +175,7 @@ class Worker {
                           exit_defect);
         return Step::did_one;
       }
-      if (sends_again_ && (stage <= Stage::frames || stage == Stage::runs)) {
+      if (sends_again_ && (stage <= Stage::frames || stage == Stage::runs || stage == Stage::models)) {
         left = true;
         continue;
       }
@@ -248,6 +262,10 @@ class Worker {
         return do_runs(unit);
       case Stage::table:
         return do_table();
+      case Stage::models:
+        return do_models(unit);
+      case Stage::page:
+        return do_page();
     }
     return {};
   }
@@ -270,6 +288,33 @@ class Worker {
     BenchOptions options;
     options.merge = {farm_.work()}, options.out = farm_.work();
     return {{"runs", bench(options).runs}};
+  }
+
+  // As many at once as it has threads. What models fail does not fail it.
+  Json do_models(const Unit& unit) {
+    EndWatcher watcher(farm_);
+    Job job({.watcher = &watcher, .threads = thread_count()});
+    const WorkingFor working(&job);
+    try {
+      return told_of(prepare_part(*farm_.spec().options.batch, unit.name, unit.models));
+    } catch (const Interrupted&) {
+      const WorkingFor nobody(nullptr);
+      throw_if_ended();
+      throw;
+    }
+  }
+
+  // Looks at all of them once more, and makes what has gone or was changed meanwhile.
+  Json do_page() {
+    BatchOptions all = *farm_.spec().options.batch;
+    all.retry_failed = false;
+    return told_of(prepare_many(all));
+  }
+
+  static Json told_of(const PreparedMany& prepared) {
+    return {{"models", prepared.models},
+            {"failed_models", prepared.failed + prepared.failed_before},
+            {"reasons", prepared.reasons}};
   }
 
   Json do_body(const Unit& unit) {

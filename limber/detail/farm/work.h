@@ -10,10 +10,10 @@ namespace limber::detail {
 
 struct WorkOptions {
   fs::path folder;
-  Stage until = Stage::table;  // this one and those before it
-  int threads = 0;             // 0: as was submitted
-  bool wait = false;           // for units that others do, too, and for those after them
-  bool again = false;          // frames that others were to paint and did not are sent to them once more
+  Stage until = last_stage;  // this one and those before it
+  int threads = 0;           // 0: as was submitted
+  bool wait = false;         // for units that others do, too, and for those after them
+  bool again = false;        // frames that others were to paint and did not are sent to them once more
 };
 
 struct WorkDone {
