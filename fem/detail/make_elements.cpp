@@ -28,6 +28,7 @@
 #include "fem/detail/spring_weights.h"
 #include "fem/detail/tet_edges.h"
 #include "fem/detail/timestep.h"
+#include "fem/stiffness_share.h"
 
 namespace limber::fem::detail {
 namespace {
@@ -173,6 +174,16 @@ void find_stiffness_shares(std::vector<Body>& bodies) {
         locking_share(body.cage, body.fixed, of_tet, body.node_mass_kg, make_elements(body));
   });
 }
+
+}  // namespace limber::fem::detail
+
+double limber::fem::stiffness_share_of(const BodySpec& spec) {
+  std::vector<Body> one{detail::make_body(spec)};
+  detail::find_stiffness_shares(one);
+  return one[0].stiffness_share;
+}
+
+namespace limber::fem::detail {
 
 // 2 (√(1 + ζ²) − ζ)/ω with ω and ζ of the fastest mode at rest (timestep.h). Fixed nodes do not move: their
 // inverse mass is 0.

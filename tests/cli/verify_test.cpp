@@ -1,7 +1,12 @@
 // What verify asks of a plan is what the scene says, whatever the plan says of itself.
+#include <gmock/gmock.h>
+
+#include "core/content_hash.h"
+#include "core/json_text.h"
 #include "fem/observe.h"
 #include "limber/detail/plan/plan_folder.h"
 #include "limber/detail/world/goal_terms.h"
+#include "limber/detail/world/scene_world.h"
 #include "limber/detail/world/seen.h"
 #include "tests/cli/program.h"
 #include "tests/fem/worlds.h"
@@ -141,6 +146,67 @@ TEST_F(Verify, RestIsPromisedOnlyWhereItIsAskedFor) {
   EXPECT_EQ(verified.dump().find("goal: at rest"), std::string::npos);
   EXPECT_NE(verified.at("measured").dump().find("speed at the end, where no rest is asked for"),
             std::string::npos);
+}
+
+// A stiffness that takes seconds to find is kept beside a body; who judges a plan finds it himself.
+class KeptStiffness : public Program {
+ protected:
+  Result plan(const std::string& seed) const {
+    return limber_program({"plan", scene(), "-o", out(), "--seed", seed, "--iterations", "20", "--json"});
+  }
+  fs::path file() const { return fs::path(out()) / "bodies" / "robot" / "stiffness.json"; }
+};
+
+TEST_F(KeptStiffness, IsWhatIsFoundAndOnlyWhereItFits) {
+  const std::string file_of_scene = scene();
+  const auto expect_as_found = [&](const std::vector<std::string>& sets) {
+    const scenes::Scene scene = scenes::read_scene_file(file_of_scene, sets);
+    const std::vector<PreparedBody> bodies = prepare_bodies(scene, {}, out());
+    const fem::World world = build_world_in(out(), scene, bodies);
+    EXPECT_EQ(stiffness_shares_of(world), stiffness_shares_of(build_world(scene, bodies)));
+    EXPECT_LT(world.bodies[0].stiffness_share, 0.95);
+  };
+  expect_as_found({});
+  const std::string kept = read_file(file());
+  expect_as_found({});
+  EXPECT_EQ(read_file(file()), kept);
+
+  // What is damaged is not there, and is found anew.
+  const Json json = Json::parse(kept);
+  const std::string key = json.begin().key();
+  Json damaged = json;
+  damaged[key]["share"] = 0.5 * json.at(key).at("share").get<double>();
+  for (const std::string& text : {damaged.dump(), std::string("[1"), std::string("[]"), kept.substr(0, 20)}) {
+    std::ofstream(file()) << text;
+    expect_as_found({});
+    EXPECT_EQ(read_file(file()), kept) << text;
+  }
+
+  // Of another material it is another, and both are kept.
+  const std::vector<std::string> other{"bodies.robot.material.poisson_ratio=0.3"};
+  expect_as_found(other);
+  const Json both = Json::parse(read_file(file()));
+  EXPECT_EQ(both.size(), 2u);
+  EXPECT_EQ(both.at(key), json.at(key));
+
+  // One body's alone is the world's.
+  fs::remove(file());
+  keep_stiffness_share(scenes::read_scene_file(file_of_scene, other), 0, out());
+  const Json alone = Json::parse(read_file(file()));
+  EXPECT_EQ(both.at(alone.begin().key()), alone.begin().value());
+}
+
+TEST_F(KeptStiffness, ThatIsFalseIsSeenByVerify) {
+  ASSERT_NE(plan("1").code, exit_bad_input);
+  Json json = Json::parse(read_file(file()));
+  const std::string key = json.begin().key();
+  const double share = 0.5 * json.at(key).at("share").get<double>();
+  json[key] = {{"share", share}, {"hash", content_hash(key + text_of(Json(share)))}};
+  std::ofstream(file()) << json;
+  ASSERT_NE(plan("2").code, exit_bad_input);
+  const Result verified = limber_program({"verify", out()});
+  EXPECT_EQ(verified.code, exit_bad_input) << verified.out;
+  EXPECT_THAT(verified.err, testing::HasSubstr("stiffness"));
 }
 
 }  // namespace

@@ -230,6 +230,7 @@ void clear_body(const fs::path& folder) {
   for (const char* name : preview_files) fs::remove(folder / name, ignored);
   fs::remove(folder / picture_file, ignored);
   for (const char* name : body_files) fs::remove(folder / name, ignored);
+  fs::remove(folder / "stiffness.json", ignored);
   remove_appearance(folder);
 }
 

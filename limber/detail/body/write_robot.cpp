@@ -20,7 +20,7 @@ std::string name_of(const PreparedBody& body) {
   return name.empty() ? "body" : name;
 }
 
-std::string text_of(const Vec3& v) { return fmt::format("{} {} {}", v.x(), v.y(), v.z()); }
+std::string words_of(const Vec3& v) { return fmt::format("{} {} {}", v.x(), v.y(), v.z()); }
 
 Json json_of(const MassProperties& m, double density) {
   Json rows = Json::array();
@@ -79,7 +79,7 @@ void write_urdf(const fs::path& path, const PreparedBody& body, const BodyMass& 
       "<mass value=\"{2}\"/>\n<inertia ixx=\"{3}\" ixy=\"{4}\" ixz=\"{5}\" iyy=\"{6}\" iyz=\"{7}\" "
       "izz=\"{8}\"/>\n</inertial>\n<visual>\n<geometry><mesh "
       "filename=\"surface.obj\"/></geometry>\n</visual>\n",
-      name_of(body), text_of(m.center_m), density * m.volume_m3, i(0, 0), i(0, 1), i(0, 2), i(1, 1), i(1, 2),
+      name_of(body), words_of(m.center_m), density * m.volume_m3, i(0, 0), i(0, 1), i(0, 2), i(1, 1), i(1, 2),
       i(2, 2));
   for (int hull = 0; hull < int(whole.hulls.size()); ++hull)
     xml += fmt::format("<collision>\n<geometry><mesh filename=\"{}\"/></geometry>\n</collision>\n",
@@ -96,7 +96,7 @@ void write_sdf(const fs::path& path, const PreparedBody& body, const BodyMass& w
       "<pose>{1} 0 0 0</pose>\n<mass>{2}</mass>\n<inertia>\n<ixx>{3}</ixx><ixy>{4}</ixy><ixz>{5}</ixz>"
       "<iyy>{6}</iyy><iyz>{7}</iyz><izz>{8}</izz>\n</inertia>\n</inertial>\n<visual name=\"surface\">\n"
       "<geometry><mesh><uri>surface.obj</uri></mesh></geometry>\n</visual>\n",
-      name_of(body), text_of(m.center_m), density * m.volume_m3, i(0, 0), i(0, 1), i(0, 2), i(1, 1), i(1, 2),
+      name_of(body), words_of(m.center_m), density * m.volume_m3, i(0, 0), i(0, 1), i(0, 2), i(1, 1), i(1, 2),
       i(2, 2));
   for (int hull = 0; hull < int(whole.hulls.size()); ++hull)
     xml += fmt::format(
@@ -124,13 +124,13 @@ void write_mjcf(const fs::path& path, const PreparedBody& body, const BodyMass& 
                         "-->\n<asset>\n{1}</asset>\n<worldbody>\n<body name=\"{0}\">\n"
                         "<freejoint/>\n<inertial pos=\"{2}\" mass=\"{3}\" fullinertia=\"{4} {5} {6} {7} "
                         "{8} {9}\"/>\n{10}</body>\n</worldbody>\n</mujoco>\n",
-                        name_of(body), assets, text_of(m.center_m), density * m.volume_m3, i(0, 0), i(1, 1),
+                        name_of(body), assets, words_of(m.center_m), density * m.volume_m3, i(0, 0), i(1, 1),
                         i(2, 2), i(0, 1), i(0, 2), i(1, 2), geoms));
 }
 
 void write_mjcf_flex(const fs::path& path, const PreparedBody& body, const BodyMass& whole, double density) {
   std::string points, tets;
-  for (const auto& p : body.cage.positions.rowwise()) points += text_of(p) + "\n";
+  for (const auto& p : body.cage.positions.rowwise()) points += words_of(p) + "\n";
   for (const auto& t : body.cage.tets.rowwise()) tets += fmt::format("{} {} {} {}\n", t[0], t[1], t[2], t[3]);
   const double size = bounding_box(body.cage.positions).size().maxCoeff();
   write_file(path,

@@ -35,7 +35,7 @@ constexpr int most_taken = 5;   // a unit whose owners were killed that often ki
 constexpr int most_rounds = 3;  // in which missing frames are sent once more
 constexpr int between_turns_us = 100000;
 constexpr double between_saves_s = 300;  // of a search
-constexpr double between_questions_s = 0.5;
+constexpr double between_asks_s = 0.5;
 
 using Clock = std::chrono::steady_clock;
 double elapsed_s(Clock::time_point then) {
@@ -48,7 +48,7 @@ class EndWatcher : public Watcher {
   explicit EndWatcher(const FarmFolder& farm) : farm_(farm) {}
   bool stop() override {
     const std::unique_lock lock(mutex_, std::try_to_lock);
-    if (!lock || elapsed_s(asked_) < between_questions_s) return stop_;
+    if (!lock || elapsed_s(asked_) < between_asks_s) return stop_;
     asked_ = Clock::now();
     stop_ = stop_ || signal() != 0 || farm_.is_cancelled() || is_over();
     return stop_;
@@ -329,9 +329,11 @@ class Worker {
     }
     std::optional<BodyStore> store;
     if (!options.store.empty()) store.emplace(options.store);
-    for (const scenes::BodySpec& body : scene_.bodies)
-      if (body.name == unit.body)
-        prepare_body_of(scene_, body, options.data, farm_.work(), store ? &*store : nullptr);
+    for (std::size_t b = 0; b < scene_.bodies.size(); ++b)
+      if (scene_.bodies[b].name == unit.body) {
+        prepare_body_of(scene_, scene_.bodies[b], options.data, farm_.work(), store ? &*store : nullptr);
+        keep_stiffness_share(scene_, b, farm_.work());  // else each search would find it
+      }
     return Json::object();
   }
 
@@ -341,7 +343,7 @@ class Worker {
     FemSystem system;
     Setup(const scenes::Scene& scene, const PlanOptions& options)
         : bodies(prepare_bodies(scene, options.scene.data, options.out, options.scene.store)),
-          world(build_world(scene, bodies)),
+          world(build_world_in(options.out, scene, bodies)),
           system(world, bodies, goal_rules_of(scene)) {}
   };
   const Setup& setup() {

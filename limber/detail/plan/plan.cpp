@@ -260,7 +260,7 @@ KeptPlan plan(const PlanOptions& options, const scenes::Scene& scene) {
   remove_abandoned(options.out);
   const std::vector<PreparedBody> bodies =
       prepare_bodies(scene, options.scene.data, options.out, options.scene.store);
-  const fem::World world = build_world(scene, bodies);
+  const fem::World world = build_world_in(options.out, scene, bodies);
   const Beginning beginning = beginning_of(options.from, options.frame, options.out, scene, world);
   const FemSystem system(world, bodies, goal_rules_of(scene), beginning.start);
   const fs::path file = options.out / "plan.npz";

@@ -69,7 +69,7 @@ KeptPlan refine(const RefineOptions& options) {
   const FolderLock lock(options.out, FolderLock::alone);
   const std::vector<PreparedBody> bodies = prepare_bodies(scene, options.data, options.out, options.store);
 
-  const fem::World world = build_world(scene, bodies);
+  const fem::World world = build_world_in(options.out, scene, bodies);
   const FemSystem coarse(coarse_world, goal_rules_of(planned.scene)),
       system(world, bodies, goal_rules_of(scene));
   plan::Reference reference = plan::reference_of(coarse, planned.plan.trajectory);

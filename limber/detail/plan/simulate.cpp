@@ -124,7 +124,7 @@ KeptPlan simulate(const SimulateOptions& options) {
   remove_abandoned(options.out);
   const std::vector<PreparedBody> bodies =
       prepare_bodies(scene, options.scene.data, options.out, options.scene.store);
-  const fem::World world = build_world(scene, bodies);
+  const fem::World world = build_world_in(options.out, scene, bodies);
   const Beginning beginning = beginning_of(options.from, options.frame, options.out, scene, world);
   const FemSystem system(world, {}, beginning.start);
   std::optional<FollowedPlan> followed;

@@ -2,6 +2,7 @@
 
 #include "core/error.h"
 #include "core/hash.h"
+#include "core/json_text.h"
 #include "core/progress.h"
 #include "limber/detail/verify/check_films.h"
 #include "limber/detail/verify/verify_body.h"
@@ -23,6 +24,21 @@ void check_bodies(const fs::path& folder, const scenes::Scene& scene, const std:
     const Origin origin = origin_of(scene, body, data, bodies[b]);
     check_origin(body.name, origin, is_trusted, table);
     check_body(body.name, bodies[b], body_folder(folder, body), origin.made_cage, depth.remake, table);
+  }
+}
+
+// A stiffness that is none of its bodies' changes the step, and with it the times of all frames: that is to
+// be said, not that these are odd.
+void require_of_found_world(const PlanFolder& planned, const fem::World& world, const fs::path& folder) {
+  try {
+    require_of_world(planned.plan, world, folder);
+  } catch (const InputError& error) {
+    const Json told = planned.summary.value("stiffness_shares", Json()), found = stiffness_shares_of(world);
+    if (told.is_null() || told == found) throw;
+    throw InputError(
+        fmt::format("{}; it was planned with shares of stiffness {}, and those of its bodies are {}: remove "
+                    "bodies/NAME/stiffness.json",
+                    error.what(), text_of(told), text_of(found)));
   }
 }
 
@@ -73,7 +89,7 @@ Verified verify(const VerifyOptions& options) {
     try {
       const fem::World begun = world_of(planned, bodies, StiffnessShares::found);
       shares = stiffness_shares_of(begun);
-      require_of_world(planned.plan, begun, folder);
+      require_of_found_world(planned, begun, folder);
     } catch (const InputError&) {
       // A body that is not the scene's weighs something else, and then nothing of the plan fits: what is to
       // be named is the body.

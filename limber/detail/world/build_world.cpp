@@ -9,8 +9,10 @@
 
 #include "core/error.h"
 #include "core/progress.h"
+#include "fem/stiffness_share.h"
 #include "limber/detail/body/write_robot.h"
 #include "limber/detail/world/body_source.h"
+#include "limber/detail/world/kept_share.h"
 #include "limber/detail/world/scene_world.h"
 #include "limber/detail/world/seen.h"
 #include "meshing/contact_shape.h"
@@ -234,38 +236,39 @@ std::map<std::string, double> stiffness_shares_of(const fem::World& world) {
   return shares;
 }
 
-// Complaints of fem name a body, not its place in the text.
-fem::World build_world(const scenes::Scene& scene, const std::vector<PreparedBody>& prepared,
-                       const std::vector<float>& start_positions,
-                       const std::map<std::string, double>& stiffness_shares) {
+namespace {
+
+// But for its script and its contact.
+fem::BodySpec spec_of_body(const scenes::Scene& scene, const scenes::BodySpec& body,
+                           const PreparedBody& prepared) {
+  fem::BodySpec fem_body;
+  fem_body.name = body.name;
+  fem_body.cage = prepared.cage;
+  const double share = share_of_the_cage(prepared);
+  fem_body.material = {.model = body.material.model == "springs" ? fem::MaterialModel::springs
+                                                                 : fem::MaterialModel::neo_hookean,
+                       .youngs_modulus_pa = body.material.youngs_modulus_pa,
+                       .poisson_ratio = body.material.poisson_ratio,
+                       .density_kg_m3 = share * body.material.density_kg_m3,
+                       .damping_ratio = body.material.damping_ratio,
+                       .mass_damping_per_s = body.material.mass_damping_per_s,
+                       .friction = body.material.friction,
+                       .mesh_independent = body.material.mesh_independent};
+  fem_body.fixed_nodes = scenes::fixed_nodes(body, scene.bounds_m, prepared.cage.positions);
+  fem_body.kind = kind_of(body);
+  fem_body.velocity_m_s = body.velocity_m_s, fem_body.angular_velocity_rad_s = body.angular_velocity_rad_s;
+  fem_body.gravity_m_s2 = body.gravity_m_s2;
+  fem_body.max_volume_change = body.max_volume_change;
+  if (body.max_contact_load_n) fem_body.max_contact_load_n = *body.max_contact_load_n;
+  if (body.max_stretch && *body.max_stretch < scenes::any_stretch) fem_body.max_stretch = *body.max_stretch;
+  set_parts(body, prepared, share, fem_body);
+  return fem_body;
+}
+
+fem::WorldSpec spec_of_world(const scenes::Scene& scene, const std::vector<PreparedBody>& prepared) {
   fem::WorldSpec spec;
-  for (std::size_t b = 0; b < prepared.size(); ++b) {
-    const scenes::BodySpec& body = scene.bodies[b];
-    fem::BodySpec fem_body;
-    fem_body.name = body.name;
-    fem_body.cage = prepared[b].cage;
-    const double share = share_of_the_cage(prepared[b]);
-    fem_body.material = {.model = body.material.model == "springs" ? fem::MaterialModel::springs
-                                                                   : fem::MaterialModel::neo_hookean,
-                         .youngs_modulus_pa = body.material.youngs_modulus_pa,
-                         .poisson_ratio = body.material.poisson_ratio,
-                         .density_kg_m3 = share * body.material.density_kg_m3,
-                         .damping_ratio = body.material.damping_ratio,
-                         .mass_damping_per_s = body.material.mass_damping_per_s,
-                         .friction = body.material.friction,
-                         .mesh_independent = body.material.mesh_independent};
-    fem_body.fixed_nodes = scenes::fixed_nodes(body, scene.bounds_m, prepared[b].cage.positions);
-    fem_body.kind = kind_of(body);
-    fem_body.velocity_m_s = body.velocity_m_s, fem_body.angular_velocity_rad_s = body.angular_velocity_rad_s;
-    fem_body.gravity_m_s2 = body.gravity_m_s2;
-    fem_body.max_volume_change = body.max_volume_change;
-    if (body.max_contact_load_n) fem_body.max_contact_load_n = *body.max_contact_load_n;
-    if (body.max_stretch && *body.max_stretch < scenes::any_stretch) fem_body.max_stretch = *body.max_stretch;
-    set_parts(body, prepared[b], share, fem_body);
-    if (const auto known = stiffness_shares.find(body.name); known != stiffness_shares.end())
-      fem_body.stiffness_share = known->second;
-    spec.bodies.push_back(std::move(fem_body));
-  }
+  for (std::size_t b = 0; b < prepared.size(); ++b)
+    spec.bodies.push_back(spec_of_body(scene, scene.bodies[b], prepared[b]));
   set_script(scene, prepared, spec);
   require_patches(scene, prepared[std::size_t(scene.robot)]);
   set_contact(scene, prepared, spec);
@@ -277,7 +280,11 @@ fem::World build_world(const scenes::Scene& scene, const std::vector<PreparedBod
   if (scene.goal.shape) spec.goal_shape_m = goal_shape(scene, prepared[std::size_t(scene.robot)]);
   spec.max_dt_s = scene.max_dt_s.value_or(0);
   spec.part_overlaps = scene.part_overlaps;
-  spec.start_positions = start_positions;
+  return spec;
+}
+
+// Complaints of fem name a body, not its place in the text.
+fem::World build_world_of(const scenes::Scene& scene, const fem::WorldSpec& spec) {
   try {
     return fem::build_world(spec);
   } catch (const InputError& error) {
@@ -287,6 +294,42 @@ fem::World build_world(const scenes::Scene& scene, const std::vector<PreparedBod
         throw InputError(fmt::format("{}: {}", body.where, error.what()));
     throw InputError(fmt::format("scene {}: {}", scene.name, error.what()));
   }
+}
+
+}  // namespace
+
+fem::World build_world(const scenes::Scene& scene, const std::vector<PreparedBody>& prepared,
+                       const std::vector<float>& start_positions,
+                       const std::map<std::string, double>& stiffness_shares) {
+  fem::WorldSpec spec = spec_of_world(scene, prepared);
+  for (fem::BodySpec& body : spec.bodies)
+    if (const auto known = stiffness_shares.find(body.name); known != stiffness_shares.end())
+      body.stiffness_share = known->second;
+  spec.start_positions = start_positions;
+  return build_world_of(scene, spec);
+}
+
+fem::World build_world_in(const fs::path& work_folder, const scenes::Scene& scene,
+                          const std::vector<PreparedBody>& prepared) {
+  fem::WorldSpec spec = spec_of_world(scene, prepared);
+  std::vector<KeptShare> kept;
+  for (std::size_t b = 0; b < spec.bodies.size(); ++b) {
+    kept.emplace_back(body_folder(work_folder, scene.bodies[b]), spec.bodies[b]);
+    spec.bodies[b].stiffness_share = kept[b].share();
+  }
+  fem::World world = build_world_of(scene, spec);
+  for (std::size_t b = 0; b < kept.size(); ++b) kept[b].keep(world.bodies[b].stiffness_share);
+  return world;
+}
+
+void keep_stiffness_share(const scenes::Scene& scene, std::size_t body, const fs::path& work_folder) {
+  const scenes::BodySpec& of_scene = scene.bodies[body];
+  const fs::path folder = body_folder(work_folder, of_scene);
+  for (const scenes::MotionSpec& motion : scene.motions)
+    if (std::size_t(motion.body) == body) return;
+  const fem::BodySpec spec = spec_of_body(scene, of_scene, read_body(folder));
+  KeptShare kept(folder, spec);
+  if (kept.is_of_use() && kept.share() == 0) kept.keep(fem::stiffness_share_of(spec));
 }
 
 }  // namespace limber::detail

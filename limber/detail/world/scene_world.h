@@ -89,4 +89,11 @@ fem::World build_world(const scenes::Scene&, const std::vector<PreparedBody>&,
                        const std::vector<float>& start_positions = {},
                        const std::map<std::string, double>& stiffness_shares = {});
 
+// The same, with shares that take seconds to find kept in the folders of the bodies, and taken from there
+// when all that they depend on is the same. Who judges a plan finds them himself.
+fem::World build_world_in(const fs::path& work_folder, const scenes::Scene&,
+                          const std::vector<PreparedBody>&);
+// Of one body, 0 ≤ body < bodies, that is prepared there.
+void keep_stiffness_share(const scenes::Scene&, std::size_t body, const fs::path& work_folder);
+
 }  // namespace limber::detail

@@ -1,0 +1,61 @@
+#include "limber/detail/world/kept_share.h"
+
+#include "core/content_hash.h"
+#include "core/error.h"
+#include "core/hash.h"
+#include "core/json_text.h"
+
+namespace limber::detail {
+
+namespace {
+
+std::string key_of(const fem::BodySpec& body) {
+  const fem::Material& m = body.material;
+  const Json all{{"cage", hex(hash_of(body.cage))},
+                 {"fixed_nodes", body.fixed_nodes},
+                 {"springs", m.model == fem::MaterialModel::springs},
+                 {"youngs_modulus_pa", m.youngs_modulus_pa},
+                 {"poisson_ratio", m.poisson_ratio},
+                 {"density_kg_m3", m.density_kg_m3},
+                 {"youngs_modulus_from_tet_pa", body.youngs_modulus_from_tet_pa},
+                 {"density_from_tet_kg_m3", body.density_from_tet_kg_m3},
+                 {"program", program_hash()}};
+  return content_hash(text_of(all));
+}
+
+Json entry_of(const std::string& key, double share) {
+  return {{"share", share}, {"hash", content_hash(key + text_of(Json(share)))}};
+}
+
+bool is_entry(const std::string& key, const Json& entry) {
+  if (!entry.is_object() || !entry.contains("share") || !entry.at("share").is_number()) return false;
+  const double share = entry.at("share");
+  return share >= fem::min_stiffness_share && share <= fem::max_stiffness_share &&
+         entry == entry_of(key, share);
+}
+
+}  // namespace
+
+KeptShare::KeptShare(const fs::path& body_folder, const fem::BodySpec& body)
+    : file_(body_folder / "stiffness.json"),
+      key_(key_of(body)),
+      is_of_use_(body.kind == fem::BodyKind::deformable && body.material.mesh_independent) {
+  if (!is_of_use_ || !fs::exists(file_)) return;
+  try {
+    const Json json = read_json(file_);
+    if (!json.is_object()) return;
+    for (const auto& [key, entry] : json.items())
+      if (is_entry(key, entry)) kept_[key] = entry;
+  } catch (const InputError&) {
+  }
+  if (kept_.contains(key_)) share_ = kept_.at(key_).at("share");
+}
+
+void KeptShare::keep(double found) {
+  if (!is_of_use_ || share_ > 0) return;
+  share_ = found;
+  kept_[key_] = entry_of(key_, found);
+  write_json(file_, kept_);
+}
+
+}  // namespace limber::detail

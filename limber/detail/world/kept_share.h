@@ -1,0 +1,31 @@
+// A share of stiffness (fem::Body::stiffness_share) takes seconds to find, and depends on one body alone: it
+// is kept beside it.
+#pragma once
+
+#include <string>
+
+#include "core/file.h"
+#include "core/json.h"
+#include "fem/world.h"
+
+namespace limber::detail {
+
+// stiffness.json of a body's folder: the shares that were found, each under a hash of all that it depends on,
+// the program too, and with one of itself. What is damaged is not there.
+class KeptShare {
+ public:
+  KeptShare(const fs::path& body_folder, const fem::BodySpec&);
+  bool is_of_use() const { return is_of_use_; }  // else there is nothing to find
+  double share() const { return share_; }        // 0: not known
+  // Of fem::Body; does nothing where it is known, or of no use. Throws DiskError.
+  void keep(double found);
+
+ private:
+  fs::path file_;
+  std::string key_;
+  Json kept_ = Json::object();
+  double share_ = 0;
+  bool is_of_use_;
+};
+
+}  // namespace limber::detail
