@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <numbers>
 
 #include "core/random.h"
 #include "meshing/detail/sketch.h"
@@ -372,6 +373,14 @@ double quick_gain(const Model& model, const Part& part, InsideTest& inside) {
   return starts.empty() ? 0.0 : starts[0].cut.gain;
 }
 
+// What a cut gains with the next ones on either side.
+double gain_with_next(const Model& model, const Part& part, const Plane& plane, InsideTest& inside) {
+  Model scratch = model;
+  const auto [below, above] = cut(scratch, part, plane, inside);
+  return part.hull_volume - below.hull_volume - above.hull_volume + quick_gain(scratch, below, inside) +
+         quick_gain(scratch, above, inside);
+}
+
 }  // namespace
 
 Cut best_cut(const Model& model, const Part& part, InsideTest& inside) {
@@ -410,14 +419,36 @@ Cut best_cut_ahead(const Model& model, const Part& part, InsideTest& inside) {
     planes.push_back({direction, 0.5 * (low + high)});
   }
   Cut ahead = best;
-  for (const Plane& plane : planes) {
-    Model scratch = model;
-    const auto [below, above] = cut(scratch, part, plane, inside);
-    const double gain = part.hull_volume - below.hull_volume - above.hull_volume +
-                        quick_gain(scratch, below, inside) + quick_gain(scratch, above, inside);
-    if (0.5 * gain > ahead.gain) ahead = {plane, 0.5 * gain, true};
-  }
+  for (const Plane& plane : planes)
+    if (const double gain = gain_with_next(model, part, plane, inside); 0.5 * gain > ahead.gain)
+      ahead = {plane, 0.5 * gain, true};
   return ahead;
+}
+
+Plane cut_through(const Model& model, const Part& part, const Vec3& point, const Vec3& outwards,
+                  InsideTest& inside) {
+  constexpr int turns = 6;
+  constexpr double same_gain = 1e-3;  // of the hull's volume
+  struct Tried {
+    double gain, length;
+    Plane plane;
+  };
+  std::vector<Tried> tried;
+  const Vec3 u = outwards.unitOrthogonal(), v = outwards.cross(u);
+  for (int turn = 0; turn < turns; ++turn) {
+    const double angle = std::numbers::pi * turn / turns;
+    const Vec3 normal = std::cos(angle) * u + std::sin(angle) * v;
+    double low = 1e300, high = -1e300;
+    for (const Vec3& p : part.hull) low = std::min(low, normal.dot(p)), high = std::max(high, normal.dot(p));
+    const Plane plane{normal, normal.dot(point)};
+    tried.push_back({gain_with_next(model, part, plane, inside), high - low, plane});
+  }
+  double most = 0;
+  for (const Tried& one : tried) most = std::max(most, one.gain);
+  std::erase_if(tried, [&](const Tried& one) { return one.gain < most - same_gain * part.hull_volume; });
+  return std::max_element(tried.begin(), tried.end(),
+                          [](const Tried& a, const Tried& b) { return a.length < b.length; })
+      ->plane;
 }
 
 }  // namespace limber::meshing::detail

@@ -17,5 +17,9 @@ Cut best_cut(const Model&, const Part&, InsideTest&);
 // As best_cut; but where no cut gains much and yet the hull is largely empty (a ring, a kettle), the one
 // after which the next cuts gain most. Then is_first_of_two.
 Cut best_cut_ahead(const Model&, const Part&, InsideTest&);
+// Where none of these gains anything: of planes that go through a point of the part's hull, and into it there
+// (across `outwards`), the one after which the next cuts gain most, or, of equals, across which it is
+// longest.
+Plane cut_through(const Model&, const Part&, const Vec3& point, const Vec3& outwards, InsideTest&);
 
 }  // namespace limber::meshing::detail

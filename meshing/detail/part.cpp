@@ -256,6 +256,18 @@ Part whole(const Model& model, const Triangles& triangles) {
   return part;
 }
 
+namespace {
+
+constexpr double nudge = 1e-6;
+
+Vec3 mean(const std::vector<Vec3>& points) {
+  Vec3 sum = Vec3::Zero();
+  for (const Vec3& p : points) sum += p;
+  return sum / double(points.size());
+}
+
+}  // namespace
+
 std::pair<Part, Part> cut(Model& model, const Part& part, const Plane& plane, InsideTest& inside) {
   Part below, above;
   std::unordered_map<EdgeKey, int> crossings;
@@ -300,9 +312,15 @@ std::pair<Part, Part> cut(Model& model, const Part& part, const Plane& plane, In
   for (const Cell& cell : part.cells) {
     std::vector<Vec3> section, same_section;
     Cell low = clip(cell, plane, 1, section), high = clip(cell, plane, -1, same_section);
-    if (!low.corners.empty() && !high.corners.empty())
-      for (const Vec3& p : section)
-        if (inside(p)) below.corners_inside.push_back(p), above.corners_inside.push_back(p);
+    if (!low.corners.empty() && !high.corners.empty()) {
+      // A corner may lie on the surface, with solid on one side of the cut alone: of a part in the middle of
+      // the solid that no surface enters, all do.
+      const Vec3 middle_of_low = mean(low.corners), middle_of_high = mean(high.corners);
+      for (const Vec3& p : section) {
+        if (inside(p + nudge * (middle_of_low - p))) below.corners_inside.push_back(p);
+        if (inside(p + nudge * (middle_of_high - p))) above.corners_inside.push_back(p);
+      }
+    }
     if (!low.corners.empty()) below.cells.push_back(std::move(low));
     if (!high.corners.empty()) above.cells.push_back(std::move(high));
   }

@@ -21,29 +21,48 @@ constexpr double overcut = 1.2;
 constexpr double min_gain = 5e-7;
 // Looking two cuts ahead is dear, so only parts of this share of the whole hull's volume may.
 constexpr double worth_looking_ahead = 0.1;
+// A part that stands off by more than this share of the diagonal is cut even where that gains nothing.
+constexpr double far_off = 0.02;
 // Two parts may touch when their boxes are no farther apart.
 constexpr double touching = 0.01;
 
-// How far the hull of some points stands off the model, at some hundred places outside the solid; `least`
-// when less.
-double hull_overshoot(const std::vector<Vec3>& corners, InsideTest& inside, const SurfaceDistance& distance,
-                      double least) {
+// Where the hull of some points stands off the model farthest, of some hundred places outside the solid.
+struct Farthest {
+  double overshoot = 0;
+  Vec3 point = Vec3::Zero(), outwards = Vec3::Zero();  // on the hull; across its face there
+};
+Farthest farthest_of(const std::vector<Vec3>& corners, InsideTest& inside, const SurfaceDistance& distance,
+                     double least) {
   constexpr double samples = 500;
-  if (rough_hull(corners, 0).flat()) return least;
+  Farthest farthest{.overshoot = least};
+  if (rough_hull(corners, 0).flat()) return farthest;
   Points rows(Eigen::Index(corners.size()), 3);
   for (std::size_t i = 0; i < corners.size(); ++i) rows.row(Eigen::Index(i)) = corners[i].transpose();
   const ConvexShell shell = convex_hull(rows);
   const double area_of_shell = area(SurfaceMesh{shell.vertices, shell.triangles});
-  double farthest = least;
   for (const BoundarySample& sample : boundary_samples({shell}, samples / area_of_shell))
-    if (const double d = distance.at(sample.point); d > farthest && !inside(sample.point)) farthest = d;
+    if (const double d = distance.at(sample.point); d > farthest.overshoot && !inside(sample.point))
+      farthest.overshoot = d, farthest.point = sample.point;
+  if (farthest.overshoot == least) return farthest;
+  double nearest = 1e300;
+  const auto planes = detail::planes_of(shell);
+  for (Eigen::Index f = 0; f < planes.rows(); ++f)
+    if (const double off = std::abs(planes.row(f).head<3>().dot(farthest.point) + planes(f, 3));
+        off < nearest)
+      nearest = off, farthest.outwards = planes.row(f).head<3>();
   return farthest;
+}
+// How far, and `least` when less.
+double hull_overshoot(const std::vector<Vec3>& corners, InsideTest& inside, const SurfaceDistance& distance,
+                      double least) {
+  return farthest_of(corners, inside, distance, least).overshoot;
 }
 
 struct Leaf {
   Part part;
   Cut cut;
   double overshoot = 0;
+  std::optional<Farthest> farthest = {};  // where it was asked for
 };
 
 std::vector<Part> cut_up(Model& model, Part root, InsideTest& inside, const SurfaceDistance& distance,
@@ -59,6 +78,17 @@ std::vector<Part> cut_up(Model& model, Part root, InsideTest& inside, const Surf
     leaf.part = std::move(part);
     return leaf;
   };
+  // Walls round a hollow have the hull of the whole until the cuts are so many that each part has few of
+  // them.
+  const auto farthest_leaf = [&]() -> Leaf* {
+    Leaf* farthest = nullptr;
+    double most = std::max(far_off, limits.max_overshoot);
+    for (Leaf& leaf : leaves) {
+      if (!leaf.farthest) leaf.farthest = farthest_of(leaf.part.hull, inside, distance, 0);
+      if (leaf.farthest->overshoot > most) most = leaf.farthest->overshoot, farthest = &leaf;
+    }
+    return farthest;
+  };
   leaves.push_back(seen(std::move(root)));
   while (leaves.size() < wanted) {
     Leaf* best = nullptr;
@@ -66,7 +96,12 @@ std::vector<Part> cut_up(Model& model, Part root, InsideTest& inside, const Surf
       if (leaf.cut.gain > (best ? best->cut.gain : min_gain) &&
           (limits.max_overshoot == 0 || leaf.overshoot > limits.max_overshoot))
         best = &leaf;
-    if (!best) break;
+    if (!best) {
+      best = farthest_leaf();
+      if (!best) break;
+      const Farthest& at = *best->farthest;
+      best->cut = {cut_through(model, best->part, at.point, at.outwards, inside), 0, true};
+    }
     auto [below, above] = cut(model, best->part, best->cut.plane, inside);
     if (!best->cut.is_first_of_two &&
         best->part.hull_volume - below.hull_volume - above.hull_volume <= min_gain) {

@@ -11,6 +11,8 @@
 #include "core/random.h"
 #include "meshing/convex_hull.h"
 #include "meshing/shell_check.h"
+#include "meshing/winding_number.h"
+#include "tests/meshing/cage_models.h"
 #include "tests/meshing/made_meshes.h"
 #include "tests/meshing/shell_laws.h"
 
@@ -192,6 +194,80 @@ TEST(Decompose, AHoleIsKept) {
       const Long3 p(radius * std::cos(angle), radius * std::sin(angle), 0);
       for (const ConvexShell& shell : result.shells) EXPECT_FALSE(holds(shell, p)) << radius << " " << angle;
     }
+}
+
+// A cube with a pyramid on each face: cuts along the faces leave a part that no triangle is in.
+SurfaceMesh made_star() {
+  SurfaceMesh star{Points(14, 3), Triangles(24, 3)};
+  star.positions.topRows(8) = made_box(Vec3(1, 1, 1)).positions;
+  int row = 0;
+  for (int axis = 0; axis < 3; ++axis)
+    for (int side : {0, 1}) {
+      const int tip = 8 + 2 * axis + side;
+      Vec3 place = Vec3::Constant(0.5);
+      place[axis] = side ? 2.5 : -1.5;
+      star.positions.row(tip) = place.transpose();
+      const int u = 1 << (axis + 1) % 3, v = 1 << (axis + 2) % 3, at = side << axis;
+      const int loop[4] = {at, at + u, at + u + v,
+                           at + v};  // counter-clockwise from the far side of the axis
+      for (int k = 0; k < 4; ++k) {
+        const int from = loop[k], to = loop[(k + 1) % 4];
+        star.triangles.row(row++) << (side ? from : to), (side ? to : from), tip;
+      }
+    }
+  return star;
+}
+
+// A floor of 1 by 1 a cell and walls round each, all 0.05 thick: boxes that overlap.
+SurfaceMesh made_tray(int cells) {
+  constexpr double wall = 0.05;
+  std::vector<Box> slabs{{Vec3(0, 0, 0), Vec3(cells, 1, wall)},
+                         {Vec3(0, 0, 0), Vec3(cells, wall, 0.6)},
+                         {Vec3(0, 1 - wall, 0), Vec3(cells, 1, 0.6)}};
+  for (int c = 0; c <= cells; ++c) {
+    const double x = c * (cells - wall) / cells;
+    slabs.push_back({Vec3(x, 0, 0), Vec3(x + wall, 1, 0.6)});
+  }
+  SurfaceMesh tray;
+  for (const Box& slab : slabs) {
+    SurfaceMesh box = made_box(slab.size());
+    box.positions.rowwise() += slab.lower.transpose();
+    tray = joined(tray, box);
+  }
+  return tray;
+}
+
+// Half of such a hollow has the hull of the whole, and so has a quarter of a row of them: for long no cut
+// gains anything.
+TEST(Decompose, WallsRoundAHollowArePartedThoughNoFirstCutGains) {
+  for (int cells : {1, 2, 3}) {
+    const SurfaceMesh tray = made_tray(cells);
+    const Decomposition result = decompose(tray, {});
+    expect_lawful(tray, {}, result);
+    EXPECT_LT(result.max_overshoot, 0.02) << cells;
+    EXPECT_LT(result.mean_overshoot, 0.001) << cells;
+  }
+}
+
+// Every point of the solid is in a shell: of random ones each that the winding number has inside.
+TEST(Decompose, TheSolidIsCoveredNotItsSurfaceAlone) {
+  for (const SurfaceMesh& model : {made_star(), made_torus(0.3, 24, 12), made_tray(2)}) {
+    const Decomposition result = decompose(model, {});
+    expect_lawful(model, {}, result);
+    const WindingNumber winding(model.positions, model.triangles);
+    const Box box = bounding_box(model.positions);
+    Rng rng(7, 0);
+    int inside = 0;
+    for (int i = 0; i < 20000; ++i) {
+      const Vec3 p = box.lower + box.size().cwiseProduct(Vec3(rng.uniform(), rng.uniform(), rng.uniform()));
+      if (winding.at(p) < 0.6) continue;
+      ++inside;
+      EXPECT_TRUE(std::any_of(result.shells.begin(), result.shells.end(), [&](const ConvexShell& shell) {
+        return holds(shell, p.cast<long double>());
+      })) << p.transpose();
+    }
+    EXPECT_GT(inside, 500);
+  }
 }
 
 TEST(Decompose, AScaleByAPowerOfTwoChangesNothing) {
