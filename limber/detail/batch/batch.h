@@ -26,7 +26,8 @@ fs::path quarantine_file_of(const fs::path& batch, const BatchModel&);  // faile
 // his own, journal/PART.jsonl; who has the folder alone puts them together.
 class Journal {
  public:
-  // Reads all there is, and, where it is of no part, drops lines that do not count any more.
+  // Reads all there is, and drops lines that do not count any more; of a part what was put together before,
+  // and its own.
   explicit Journal(const fs::path& batch, const std::string& part = "");
   const Json* find(const std::string& name) const;
   void add(const Json& line);

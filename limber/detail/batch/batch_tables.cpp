@@ -86,9 +86,11 @@ fs::path quarantine_file_of(const fs::path& batch, const BatchModel& model) {
 
 Journal::Journal(const fs::path& batch, const std::string& part) : file_(batch / "journal.jsonl") {
   const fs::path parts = batch / "journal";
+  const fs::path own = parts / (part + ".jsonl");
   std::vector<fs::path> files;
   std::error_code none;
-  for (const auto& entry : fs::directory_iterator(parts, none)) files.push_back(entry.path());
+  for (const auto& entry : fs::directory_iterator(parts, none))
+    if (part.empty() || entry.path() == own) files.push_back(entry.path());
   std::sort(files.begin(), files.end());
   if (fs::exists(file_)) files.insert(files.begin(), file_);
   std::size_t count = 0;
@@ -101,7 +103,7 @@ Journal::Journal(const fs::path& batch, const std::string& part) : file_(batch /
   }
   if (!part.empty()) {
     make_folder(parts);
-    file_ = parts / (part + ".jsonl");
+    file_ = own;
     // What a killed process left half written is a line of its own from now on.
     if (fs::exists(file_) && !read_file(file_).ends_with('\n')) append("\n");
     return;
