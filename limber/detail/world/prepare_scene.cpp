@@ -27,11 +27,13 @@ PreparedScene prepare_scene(const ScenePrepareOptions& options) {
   std::optional<BodyStore> store;
   if (!options.scene.store.empty()) store.emplace(options.scene.store);
   PreparedScene prepared{.bodies = {}, .bodies_of_scene = known.size()};
-  for (const scenes::BodySpec& body : scene.bodies) {
+  for (std::size_t b = 0; b < scene.bodies.size(); ++b) {
+    const scenes::BodySpec& body = scene.bodies[b];
     if (!options.bodies.empty() && std::count(options.bodies.begin(), options.bodies.end(), body.name) == 0)
       continue;
     const Json report =
         prepare_body_of(scene, body, options.scene.data, options.out, store ? &*store : nullptr);
+    keep_stiffness_share(scene, b, options.out);
     prepared.bodies.push_back({body.name, body_folder(options.out, body),
                                report.at("surface").at("triangles").get<int>(),
                                report.at("cage").at("tets").get<int>()});
