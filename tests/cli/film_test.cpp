@@ -250,7 +250,7 @@ TEST_F(Filmed_slow, EveryFalseWordOfAFilmIsNamed) {
   told("/time/motion_s", 1), told("/time/left_out_s", 1), told("/time/speed", {2, 2}),
       told("/quality", "best");
   told("/camera", "near"), told("/bits", 12), told("/passes", {"beauty"}, "render-deep"), told("/sets", 7);
-  told("/size", "large"), told("/sheet", nullptr);
+  told("/size", "large"), told("/sheet", nullptr), told("/folder", "/etc");
 
   const auto number = [](int frame) { return fmt::format("{:04}.png", frame); };
   const std::string says = "each frame says", pixels = "painted again",
@@ -293,6 +293,13 @@ TEST_F(Filmed_slow, EveryFalseWordOfAFilmIsNamed) {
   });
   named("no film", film, [&] { fs::remove(work / "film.mp4"); });
   named("another film", film, [&] { fs::resize_file(work / "film.mp4", 100); });
+  named("another film here, and the good one elsewhere", film, [&] {
+    Json manifest = read_json(work / "manifest.json");
+    manifest.at("render")["film"] = (keep / "film.mp4").string();
+    manifest.at("render")["sheet"] = (keep / "sheet.png").string();
+    write_json(work / "manifest.json", manifest);
+    fs::resize_file(work / "film.mp4", 100);
+  });
   named("no sheet", sheet, [&] { fs::remove(work / "sheet.png"); });
   named("another sheet", sheet, [&] {
     fs::copy_file(work / "frames" / number(0), work / "sheet.png", fs::copy_options::overwrite_existing);

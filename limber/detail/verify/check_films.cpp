@@ -36,8 +36,11 @@ std::string false_word(const Json& entry, Json is) {
   if (count("failed") < 0 || count("painted") < 0 || count("painted") + count("failed") > count("wanted") ||
       count("wanted") > count("frames"))
     return "it counts more frames than there are";
-  for (const char* key : {"wanted", "painted", "failed", "cpu_s", "folder"})  // what was done, and where
-    is[key] = entry.at(key);
+  for (const char* key : {"wanted", "painted", "failed", "cpu_s"}) is[key] = entry.at(key);  // what was done
+  // A work folder may have been moved; what its frames are called may not.
+  const fs::path folder = entry.at("folder").get<std::string>();
+  if (folder.filename() == fs::path(is.at("folder").get<std::string>()).filename())
+    is["folder"] = entry.at("folder");
   if (entry.contains("film") != entry.contains("sheet")) return "a film has a contact sheet";
   for (const char* key : {"film", "sheet"})
     if (entry.contains(key)) is[key] = entry.at(key).get<std::string>();
@@ -60,11 +63,12 @@ std::string other_picture(const Filming& filming, Shot::Painter& painter, int fr
   return "";
 }
 
-// What was written beside the frames' folder is here, wherever that was then: another folder's film is no
-// word for this one's.
+// What was written beside the frames' folder is here, wherever that was then, and so is what has such a name
+// here: another folder's film is no word for this one's.
 fs::path found(const fs::path& folder, const Json& entry, const char* key) {
   const fs::path told = entry.at(key).get<std::string>(), frames = entry.at("folder").get<std::string>();
-  return told.parent_path() == frames.parent_path() ? folder / told.filename() : told;
+  const fs::path here = folder / told.filename();
+  return told.parent_path() == frames.parent_path() || fs::exists(here) ? here : told;
 }
 
 void check_film(const fs::path& folder, const std::string& suffix, const Json& entry, int repaint,
