@@ -300,6 +300,13 @@ TEST_F(Filmed_slow, EveryFalseWordOfAFilmIsNamed) {
     write_json(work / "manifest.json", manifest);
     fs::resize_file(work / "film.mp4", 100);
   });
+  named("a film that is told to be none", "manifest.json tells of each", [&] {
+    Json manifest = read_json(work / "manifest.json");
+    manifest.at("render").erase("film"), manifest.at("render").erase("sheet");
+    write_json(work / "manifest.json", manifest);
+  });
+  named("a film more", "manifest.json tells of each",
+        [&] { fs::copy_file(work / "film.mp4", work / "film-near.mp4"); });
   named("no sheet", sheet, [&] { fs::remove(work / "sheet.png"); });
   named("another sheet", sheet, [&] {
     fs::copy_file(work / "frames" / number(0), work / "sheet.png", fs::copy_options::overwrite_existing);

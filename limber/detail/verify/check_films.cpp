@@ -1,5 +1,7 @@
 #include "limber/detail/verify/check_films.h"
 
+#include <set>
+
 #include "core/error.h"
 #include "core/progress.h"
 #include "limber/detail/body/work_folder.h"
@@ -124,6 +126,27 @@ void check_film(const fs::path& folder, const std::string& suffix, const Json& e
   table.row(name + "contact sheet made again from its frames: the same pixels", sheet_is, sheet.string());
 }
 
+// A film or contact sheet in the folder, by its name, that no entry tells of; empty: none.
+std::string film_of_nobody(const fs::path& folder, const Json& manifest) {
+  std::set<std::string> told, here;
+  for (const auto& [key, entry] : manifest.items())
+    for (const char* file : {"film", "sheet"})
+      if (entry.is_object() && entry.contains(file) && entry.at(file).is_string())
+        told.insert(fs::path(entry.at(file).get<std::string>()).filename().string());
+  for (const auto& entry : fs::directory_iterator(folder)) {
+    const std::string stem = entry.path().stem().string(), ending = entry.path().extension().string();
+    const auto is_called = [&](const char* name) {
+      return stem == name || stem.starts_with(std::string(name) + "-");
+    };
+    const bool moves = ending == ".mp4" || ending == ".webm" || ending == ".gif";
+    if ((moves && is_called("film")) || (ending == ".png" && is_called("sheet")))
+      here.insert(entry.path().filename().string());
+  }
+  for (const std::string& name : here)
+    if (!told.contains(name)) return name;
+  return "";
+}
+
 }  // namespace
 
 void check_films(const fs::path& folder, int repaint, Promises& table) {
@@ -143,6 +166,9 @@ void check_films(const fs::path& folder, int repaint, Promises& table) {
       table.row("film" + suffix + ": manifest.json tells of this film", false, error.what());
     }
   }
+  if (const std::string odd = film_of_nobody(folder, manifest); films > 0 && !odd.empty())
+    table.row("films: manifest.json tells of each", false,
+              odd + " is of no whole film that limber made here; render it again, or remove it");
   if (films == 0)
     throw InputError(
         fmt::format("{}: manifest.json tells of no film; make one with limber render", folder.string()));
