@@ -33,8 +33,10 @@ void print(const Outcome& outcome, bool json) {
     throw DiskError("stdout: writing the result failed");
 }
 
-// The first word that is no command or option, and what was meant, or that a command is missing; else empty.
-std::string wrong_word(const CLI::App& program, int argc, const char* const* argv) {
+// The first word that is no command or option, and what was meant, or that a command is missing; else what
+// CLI11 complains of.
+std::string what_is_wrong(const CLI::App& program, int argc, const char* const* argv,
+                          const std::string& complaint) {
   const auto told = [](const std::string& word, const std::string& what,
                        const std::vector<std::string>& known, const char* help) {
     const std::string meant = nearest(word, known);
@@ -66,7 +68,7 @@ std::string wrong_word(const CLI::App& program, int argc, const char* const* arg
   }
   std::vector<std::string> commands;
   for (const CLI::App* one : command->get_subcommands({})) commands.push_back(one->get_name());
-  if (commands.empty()) return "";
+  if (commands.empty()) return fmt::format("{}; see {} --help", complaint, name);
   return fmt::format("{} needs a command, one of {}; see {} --help", name, fmt::join(commands, ", "), name);
 }
 
@@ -103,17 +105,14 @@ int run_command_line(int argc, const char* const* argv) {
     program.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
     const bool wrong = error.get_exit_code() != int(CLI::ExitCodes::Success);
-    const std::string why = wrong ? wrong_word(program, argc, argv) : "";
-    if (why.empty())
+    if (!wrong) {
       program.exit(error);
-    else
-      fmt::print(stderr, "limber: {}\n", why);
-    if (!wrong) return exit_done;
+      return exit_done;
+    }
+    const std::string why = what_is_wrong(program, argc, argv, error.what());
+    fmt::print(stderr, "limber: {}\n", why);
     const bool json = std::any_of(argv, argv + argc, [](std::string_view word) { return word == "--json"; });
-    if (json)
-      fmt::print(
-          "{}\n",
-          text_of(Json{{"error", why.empty() ? error.what() : why}, {"exit_code", exit_bad_input}}, 2));
+    if (json) fmt::print("{}\n", text_of(Json{{"error", why}, {"exit_code", exit_bad_input}}, 2));
     return exit_bad_input;
   }
 

@@ -65,6 +65,12 @@ void add_progress(CLI::App& command, GlobalOptions& options) {
           ""));
 }
 
+CLI::Validator no_empty_name() {
+  return {
+      [](const std::string& text) { return text.empty() ? "is empty; write a name, or leave --as out" : ""; },
+      ""};
+}
+
 CLI::Validator no_empty_list() {
   return {
       [](const std::string& text) { return text.empty() ? "names no frame; write for example 0-30" : ""; },

@@ -27,6 +27,7 @@ struct GlobalOptions {
 CLI::Validator within(double low, double high);
 // A variable that a farm's script has not set must not mean all.
 CLI::Validator no_empty_list();
+CLI::Validator no_empty_name();
 
 void add_global(CLI::App& command, GlobalOptions&);
 void add_threads(CLI::App& command, GlobalOptions&);

@@ -120,6 +120,7 @@ void add_render(CLI::App& command, detail::RenderOptions& options) {
       .add_option("--as", options.name,
                   "name of this film: frames-NAME, film-NAME.mp4, sheet-NAME.png; default: the camera's, "
                   "none for main")
+      ->check(no_empty_name())
       ->type_name("NAME");
   command
       .add_option("--video", options.video,

@@ -35,8 +35,9 @@ void DescribedCommands::add_result_commands() {
                               "films, too: every frame says what it shows, some are painted again, film and "
                               "contact sheet are made again from the frames");
   verify_command
-      .add_option("--repaint", verify_options.repaint,
-                  "frames of each film that --film paints again, spread evenly, 1 … 1000000")
+      .add_option(
+          "--repaint", verify_options.repaint,
+          "frames of each film that --film paints again, one of each of so many equal parts, 1 … 1000000")
       ->needs(film)
       ->check(CLI::Range(1, 1'000'000))
       ->capture_default_str();

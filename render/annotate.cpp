@@ -24,6 +24,8 @@ void fill(Image8& image, double left, double top, double right, double bottom, c
 
 using detail::text_width, detail::Weight;
 
+constexpr double readable_px = 9;  // of a capital
+
 void write(Image8& image, const std::string& text, double left, double baseline, double height_px,
            Weight weight = Weight::regular) {
   detail::draw_text(image, text, left, baseline,
@@ -41,8 +43,11 @@ PlacedLines lines_of(int width, int height, const std::string& line, const std::
     return text.empty() ? 0 : wanted * std::min(1.0, room / std::max(1.0, text_width(text, wanted, weight)));
   };
   PlacedLines at;
-  at.large_px = letter(line, height / 42.0, Weight::semibold);
-  at.small_px = letter(small_line, height / 60.0, Weight::regular);
+  // On a small picture larger, as far as that leaves room for the picture.
+  const double large = std::max(height / 42.0, std::min(readable_px, height / 26.0)),
+               small = std::max(height / 60.0, std::min(0.8 * readable_px, height / 32.0));
+  at.large_px = letter(line, large, Weight::semibold);
+  at.small_px = letter(small_line, small, Weight::regular);
   at.width = std::max(text_width(line, std::max(1.0, at.large_px), Weight::semibold),
                       text_width(small_line, std::max(1.0, at.small_px)));
   const bool top = corner == Corner::top_left || corner == Corner::top_right;

@@ -31,7 +31,7 @@ void validate(const Camera& camera) {
   if (!(back.norm() > 0)) throw InputError("camera: eye and target are the same point");
   if (!(back.cross(camera.up).norm() > 1e-9 * back.norm() * camera.up.norm()))
     throw InputError(
-        "camera: up is zero or along the view; choose another up, as (0 1 0) when looking straight down");
+        "camera: it looks along its own up, or that is zero; move its eye or its target a little aside");
   if (!(camera.fov_deg > 0 && camera.fov_deg < 170))
     throw InputError(fmt::format("camera: fov_deg is {}, but must lie between 0 and 170", camera.fov_deg));
 }
@@ -141,8 +141,9 @@ Camera camera_at(const std::vector<CameraKey>& keys, double time_s) {
 
 Camera turned(const Camera& camera, double angle_deg) {
   Camera c = camera;
-  c.eye = camera.target +
-          Eigen::AngleAxisd(radians(angle_deg), camera.up.normalized()) * Vec3(camera.eye - camera.target);
+  const Eigen::AngleAxisd turn(radians(angle_deg), Vec3::UnitZ());
+  c.eye = camera.target + turn * Vec3(camera.eye - camera.target);
+  c.up = turn * camera.up;
   return c;
 }
 

@@ -41,7 +41,7 @@ struct CameraKey {
 // Throws InputError when there is no key or the times do not ascend.
 Camera camera_at(const std::vector<CameraKey>&, double time_s);
 
-// Walked round the target about `up`, counter-clockwise seen from above.
+// Walked round the target about the vertical, z, counter-clockwise seen from above.
 Camera turned(const Camera&, double angle_deg);
 
 }  // namespace limber::render

@@ -57,6 +57,10 @@ struct Slot {
 
 }  // namespace
 
+bool runs_through(const LabelPlace& label, const Vec2& end, const Eigen::Vector4d& box) {
+  return passes(label.foot, end, box);
+}
+
 bool collide(const LabelPlace& one, const Vec2& end, const LabelPlace& other, const Vec2& other_end) {
   return cross(one.foot, end, other.foot, other_end) || passes(one.foot, end, other.box) ||
          passes(other.foot, other_end, one.box);

@@ -3,10 +3,12 @@
 #include <png.h>
 #include <zlib.h>
 
+#include <algorithm>
 #include <bit>
 #include <csetjmp>
 #include <cstring>
 
+#include "core/content_hash.h"
 #include "core/error.h"
 
 namespace limber::render {
@@ -146,7 +148,7 @@ std::uint32_t big_endian(const char* p) {
 std::optional<PngInfo> inspect(std::string_view file) {
   constexpr std::string_view signature = "\x89PNG\r\n\x1a\n";
   if (!file.starts_with(signature)) return std::nullopt;
-  PngInfo info{0, 0, {}};
+  PngInfo info{0, 0, {}, {}};
   bool has_pixels = false;
   for (std::size_t at = signature.size(); file.size() - at >= 12;) {
     const std::size_t length = big_endian(&file[at]);
@@ -154,6 +156,7 @@ std::optional<PngInfo> inspect(std::string_view file) {
     const std::string_view type = file.substr(at + 4, 4), data = file.substr(at + 8, length);
     const auto checksum = crc32(0, reinterpret_cast<const Bytef*>(type.data()), uInt(length + 4));
     if (checksum != big_endian(&file[at + 8 + length])) return std::nullopt;
+    info.chunks.emplace(type);
     if (type == "IHDR") {
       if (length != 13 || at != signature.size()) return std::nullopt;  // one, and it comes first
       info.width = int(big_endian(data.data())), info.height = int(big_endian(data.data() + 4));
@@ -242,6 +245,33 @@ Raster16 read_png_16(const fs::path& path, Texts* texts) {
     throw InputError(fmt::format("{}: {}; make it again", path.string(), wrong));
   if (texts) *texts = info.texts;
   return image;
+}
+
+namespace {
+
+std::string pixel_hash_of(int width, int height, int channels, const auto& levels) {
+  return fmt::format(
+      "{}x{}x{} {}", width, height, channels,
+      content_hash({reinterpret_cast<const char*>(levels.data()), sizeof levels[0] * levels.size()}));
+}
+
+}  // namespace
+
+std::string pixel_hash(const Image8& image) { return pixel_hash_of(image.width, image.height, 3, image.rgb); }
+std::string pixel_hash(const Raster8& image) {
+  return pixel_hash_of(image.width, image.height, image.channels, image.levels);
+}
+std::string pixel_hash(const Raster16& image) {
+  return pixel_hash_of(image.width, image.height, image.channels, image.levels);
+}
+std::string pixel_hash(const fs::path& path) {
+  const Raster16 image = read_png_16(path);
+  constexpr int bits_at = 24;  // in the file: of a channel
+  if (read_file(path)[bits_at] == 16) return pixel_hash(image);
+  Raster8 bytes{image.width, image.height, image.channels, std::vector<std::uint8_t>(image.levels.size())};
+  std::transform(image.levels.begin(), image.levels.end(), bytes.levels.begin(),
+                 [](std::uint16_t level) { return std::uint8_t(level / 257); });
+  return pixel_hash(bytes);
 }
 
 Image8 rgb_of_png(const std::string& file, const std::string& name) {

@@ -3,6 +3,7 @@
 
 #include <map>
 #include <optional>
+#include <set>
 #include <string>
 #include <string_view>
 
@@ -35,10 +36,18 @@ Image8 rgb_of_png(const std::string& file, const std::string& name);
 struct PngInfo {
   int width, height;
   Texts texts;
+  std::set<std::string> chunks;  // their four letters
 };
 // Walks all chunks and their checksums without decoding. nullopt: missing, not a PNG, cut short, or damaged.
 std::optional<PngInfo> inspect_png(const fs::path&);
 std::optional<PngInfo> inspect_png_bytes(std::string_view);  // the same of what a file holds
+
+// Of all levels, and of width, height and channels: the same of a picture and of the file that it was written
+// to. Throws as read_png.
+std::string pixel_hash(const Image8&);
+std::string pixel_hash(const Raster8&);
+std::string pixel_hash(const Raster16&);
+std::string pixel_hash(const fs::path&);
 
 // What the frame shows, as text "limber-hash" says: how a resumed run knows a good frame. nullopt also when
 // it does not say.

@@ -185,10 +185,12 @@ const Program& Renderer::Impl::use_mesh(const Mesh& mesh, const std::string& def
 
 // The surface stands back by as much as its depth changes over half the width of a line (the first number is
 // a multiple of the slope of its depth a sample), and a little more for rounding.
+double detail::stand_back(const Mesh& mesh, int samples_per_pixel_side) {
+  return mesh.look.edges ? 0.5 * mesh.look.edges->width_px * samples_per_pixel_side + 1.5 : 0;
+}
 void detail::stand_back_for_edges(const Mesh& mesh, int samples_per_pixel_side) {
   (mesh.look.edges ? glEnable : glDisable)(GL_POLYGON_OFFSET_FILL);
-  if (mesh.look.edges)
-    glPolygonOffset(float(0.5 * mesh.look.edges->width_px * samples_per_pixel_side + 1.5), 4.0f);
+  if (mesh.look.edges) glPolygonOffset(float(stand_back(mesh, samples_per_pixel_side)), 4.0f);
 }
 
 // ---- the stage ----

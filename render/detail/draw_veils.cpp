@@ -62,11 +62,12 @@ void Renderer::Impl::put_veils(int first_row, int rows) {
   glColorMask(GL_FALSE, GL_FALSE, GL_FALSE, GL_FALSE);
   for (const Mesh& mesh : meshes) {
     if (!mesh.drawn() || !mesh.transparent()) continue;
-    stand_back_for_edges(mesh, a_pixel || settings.multisampling ? 1 : settings.supersampling);
+    if (!a_pixel) stand_back_for_edges(mesh, settings.multisampling ? 1 : settings.supersampling);
     draw_mesh(mesh, "#define VEILED\n" + with_lists, [&](const Program& program) {
       lists.set_uniforms(program);
       if (!a_pixel) return;
       program.set("opaque_depth", 7);
+      program.set("stand_back", stand_back(mesh, 1));
       targets.samples_depth.bind(7);
     });
   }

@@ -85,6 +85,7 @@ std::string plane_defines(const std::vector<render::Plane>&);
 
 // Of a mesh that is drawn with its edges over it: pushes the surface back, so that no edge hides in its own
 // surface.
+double stand_back(const Mesh&, int samples_per_pixel_side);
 void stand_back_for_edges(const Mesh&, int samples_per_pixel_side);
 
 }  // namespace detail

@@ -60,6 +60,9 @@ out float gl_ClipDistance[PLANES];
 centroid
 #endif
 out vec3 position, normal, shadow_place;
+#ifdef VEILED
+noperspective centroid out float depth;
+#endif
 void main() {
   position = position_in;
   normal = normal_in;
@@ -67,6 +70,9 @@ void main() {
   vec3 offset = shadow_offset_m * (dot(normal_in, toward_key) < 0.0 ? -normal_in : normal_in);
   shadow_place = (shadow_from_world * vec4(position_in + offset, 1.0)).xyz;
   gl_Position = clip_from_world * vec4(position_in, 1.0);
+#ifdef VEILED
+  depth = 0.5 + 0.5 * gl_Position.z / gl_Position.w;
+#endif
 #ifdef TINTED
   tint = tint_in;
 #endif
@@ -95,6 +101,10 @@ const char* const mesh_fragment_shader = R"(
 centroid                         // a pixel is shaded once, where the triangle covers it
 #endif
 in vec3 position, normal, shadow_place;
+#ifdef VEILED
+noperspective centroid in float depth;  // beyond the triangle, a far side would come before its near one along an outline
+uniform float stand_back;               // as glPolygonOffset's factor
+#endif
 #ifdef TINTED
 #ifdef VEILED
 centroid
@@ -164,8 +174,8 @@ uint seen() {
   vec2 slope = vec2(dFdx(gl_FragCoord.z), dFdy(gl_FragCoord.z));
   uint covered = uint(gl_SampleMaskIn[0]), result = 0u;
   for (int i = 0; i < 4; ++i) {
-    float depth = gl_FragCoord.z + dot(slope, DEPTH_PLACE(i)), opaque = FETCH(opaque_depth, ivec2(gl_FragCoord.xy), DEPTH_SAMPLE(i)).r;
-    if ((covered >> i & 1u) != 0u && depth < opaque) result |= 1u << DEPTH_SAMPLE(i);
+    float place = gl_FragCoord.z + dot(slope, DEPTH_PLACE(i)), opaque = FETCH(opaque_depth, ivec2(gl_FragCoord.xy), DEPTH_SAMPLE(i)).r;
+    if ((covered >> i & 1u) != 0u && place < opaque) result |= 1u << DEPTH_SAMPLE(i);
   }
   return result;
 }
@@ -340,7 +350,7 @@ void main() {
   put(ivec2(gl_FragCoord.xy), 1u, vec4(light * covered, covered), gl_FragCoord.z);
 #else
   uint samples = seen();
-  if (samples != 0u) put(ivec2(gl_FragCoord.xy), samples, vec4(light * covered, covered), gl_FragCoord.z);
+  if (samples != 0u) put(ivec2(gl_FragCoord.xy), samples, vec4(light * covered, covered), depth + stand_back * fwidth(gl_FragCoord.z));
 #endif
 #else
   color = vec4(light, 1.0);

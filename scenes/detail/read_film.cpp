@@ -179,6 +179,9 @@ std::vector<std::string> lines_of(const Node& node, const char* key) {
       lines.back() += c;
   }
   while (lines.size() > 1 && lines.back().empty()) lines.pop_back();
+  if (std::all_of(lines.begin(), lines.end(),
+                  [](const std::string& l) { return l.find_first_not_of(' ') == l.npos; }))
+    complain(node, fmt::format("{} has no words; write some, or leave the card out", key));
   constexpr std::size_t most = 8;
   if (lines.size() > most)
     complain(node, fmt::format("{} has {} lines; at most {} fit on the picture", key, lines.size(), most));

@@ -311,6 +311,16 @@ TEST_F(Program, UsageErrorsAreBadInput) {
   EXPECT_EQ(limber_program({"render", out("nothing")}).code, exit_bad_input);
   EXPECT_EQ(limber_program({"verify", folder.path().string()}).code, exit_bad_input);
   EXPECT_EQ(limber_program({"info", out("nothing")}).code, exit_bad_input);
+  // A picture that cannot be written is refused before it is painted.
+  for (const char* picture : {"--still", "--storyboard"})
+    for (const auto& [file, told] : {std::pair(out("nowhere/x.png"), "make it first"),
+                                     {folder.path().string(), "write for example"},
+                                     {out("a.png"), "is a folder"}}) {
+      fs::create_directories(out("a.png"));
+      const Result result = limber_program({"render", scene(), picture, "-o", file});
+      EXPECT_EQ(result.code, exit_bad_input);
+      EXPECT_NE(result.err.find(told), std::string::npos) << result.err;
+    }
   for (const char* command :
        {"prepare", "plan", "render", "export", "run", "verify", "report", "info", "scenes"})
     EXPECT_EQ(limber_program({command, "--help"}).code, exit_done) << command;

@@ -271,26 +271,74 @@ TEST_F(Filmed_slow, EveryFalseWordOfAFilmIsNamed) {
                   fs::copy_options::overwrite_existing);
   });
   named("no pass", says, [&] { fs::remove(work / "frames-deep" / "0001.depth.png"); });
-  // Another's pixels under the hash of what should be seen.
-  named("the first frame's pixels", pixels, [&] {
+  // Another's pixels under the hash of what should be seen, and of what is.
+  const auto texts = [](const fs::path& file, const auto& picture) {
+    return render::Texts{{"limber-hash", *render::frame_hash(file)},
+                         {"limber-pixels", render::pixel_hash(picture)}};
+  };
+  named("the last frame's pixels", pixels, [&] {
     const fs::path last = work / "frames" / number(frames - 1);
     render::Image8 picture = render::read_png(last);
     picture.rgb[3 * 64 * 24 + 3 * 32] ^= 8;
-    render::write_png(last, picture, {{"limber-hash", *render::frame_hash(last)}});
+    render::write_png(last, picture, texts(last, picture));
   });
   named("the second frame's pixels", pixels, [&] {
     const fs::path second = work / "frames" / number(1);
     render::Image8 picture = render::read_png(second);
     picture.rgb[0] ^= 1;
-    render::write_png(second, picture, {{"limber-hash", *render::frame_hash(second)}});
+    render::write_png(second, picture, texts(second, picture));
   });
   named("a pass' depths", pixels, [&] {
     const fs::path pass = work / "frames-deep" / "0003.depth.png";
-    const std::string hash = *render::frame_hash(pass);
     render::Raster16 depths = render::read_png_16(pass);
     depths.levels[64 * 24 + 32] ^= 256;
-    render::write_png(pass, depths, {{"limber-hash", hash}});
+    render::write_png(pass, depths, texts(pass, depths));
   });
+  // Painted over by a program that keeps texts; and what a viewer would show otherwise.
+  const std::string files = "files are as limber wrote them";
+  named("pixels that the file does not know of", files, [&] {
+    const fs::path second = work / "frames" / number(1);
+    render::Image8 picture = render::read_png(second);
+    render::Texts kept = texts(second, picture);
+    picture.rgb[0] ^= 1;
+    render::write_png(second, picture, kept);
+  });
+  named("no hash of pixels", files, [&] {
+    const fs::path second = work / "frames" / number(1);
+    render::write_png(second, render::read_png(second), {{"limber-hash", *render::frame_hash(second)}});
+  });
+  named("a pass' depths that the file does not know of", files, [&] {
+    const fs::path pass = work / "frames-deep" / "0001.depth.png";
+    render::Raster16 depths = render::read_png_16(pass);
+    const render::Texts kept = texts(pass, depths);
+    depths.levels[0] ^= 1;
+    render::write_png(pass, depths, kept);
+  });
+  named("a gamma", files, [&] {
+    const fs::path second = work / "frames" / number(1);
+    // Of 1 / 10, after the header: length, kind, 100000 gamma, checksum.
+    const std::string gamma("\0\0\0\4gAMA\0\0\x27\x10\x4c\x57\xc2\x4c", 16);
+    write_file(second, read_file(second).insert(33, gamma));
+    ASSERT_TRUE(render::inspect_png(second)) << "its checksum";
+  });
+  named("another text", files, [&] {
+    const fs::path second = work / "frames" / number(1);
+    const render::Image8 picture = render::read_png(second);
+    render::Texts more = texts(second, picture);
+    more["Software"] = "another";
+    render::write_png(second, picture, more);
+  });
+  named("a frame beyond the last", "no other pictures",
+        [&] { fs::copy_file(work / "frames" / number(1), work / "frames" / "0500.png"); });
+  named("a pass of nobody", "no other pictures",
+        [&] { fs::copy_file(work / "frames" / number(1), work / "frames" / "0002.depth.png"); });
+  named("another key of passes", "passes.json says", [&] {
+    Json key = read_json(work / "frames-deep" / "passes.json");
+    key.at("depth_m")[1] = key.at("depth_m")[1].get<double>() + 1;
+    write_json(work / "frames-deep" / "passes.json", key);
+  });
+  named("a folder of frames of no film", "manifest.json tells of each",
+        [&] { fs::copy(work / "frames", work / "frames-near", fs::copy_options::recursive); });
   named("no film", film, [&] { fs::remove(work / "film.mp4"); });
   named("another film", film, [&] { fs::resize_file(work / "film.mp4", 100); });
   named("another film here, and the good one elsewhere", film, [&] {

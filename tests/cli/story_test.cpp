@@ -207,6 +207,15 @@ TEST_F(Story_slow, CardsComeBeforeAndAfterTheMotionAndLeaveItAsItIs) {
   for (const int f : {3, 15})
     EXPECT_EQ(render::read_png(fs::path(out()) / "frames-part" / fmt::format("{:04}.png", f)),
               told.frames[std::size_t(f)]);
+  // While the title can be read no other words are there; they come before the motion does.
+  const std::string title = "film.title={ text = \"Cube\", duration_s = 1 }";
+  const Film wordless = film({title}),
+             captioned = film({title, "film.caption=A long caption", "film.clock=true"});
+  for (std::size_t f = 0; f <= 16; ++f) EXPECT_EQ(wordless.frames[f], captioned.frames[f]) << f;
+  for (std::size_t f = 18; f <= 20; ++f)
+    EXPECT_GT(changed_pixels(wordless.frames[f], captioned.frames[f]), 50) << f;
+  EXPECT_THAT(refusal({"render", out(), "--set", "film.title={ text = \" \\n\" }"}),
+              HasSubstr("film.title.text has no words"));
   for (const char* set : {"film.title={ text = \"心\" }", "film.end_card={ text = \"心\" }"})
     EXPECT_THAT(refusal({"render", out(), "--set", set}), HasSubstr("no letters for 心"));
   EXPECT_THAT(refusal({"render", out(), "--set", "film.title={ text = \"a\\tb\" }"}),
@@ -248,6 +257,35 @@ TEST_F(Story_slow, AnInsetIsTheOtherCamerasPictureInACorner) {
   EXPECT_THAT(refusal({"render", out(), "--set", "film.inset={ camera = \"behind\" }", "--set",
                        "film.side_by_side=true"}),
               HasSubstr("take one of them"));
+}
+
+// From straight above, the cube that rests at the wall x = 2 is on the right; to a camera that rose there
+// from that wall's side, looking towards −x, it is below the middle.
+TEST_F(Story_slow, ACameraMayLookStraightDown) {
+  for (const auto& [before, up, place] :
+       {std::tuple("", Vec3(0, 1, 0), Eigen::Vector2d(1, 0)),
+        {"{ at = 0, eye_m = [1, -4, 1], target_m = [1, 1, 1] }, ", Vec3(0, 1, 0), Eigen::Vector2d(1, 0)},
+        {"{ at = 0, eye_m = [6, 1, 1], target_m = [1, 1, 1] }, ", Vec3(-1, 0, 0), Eigen::Vector2d(0, 1)}}) {
+    SCOPED_TRACE(before);
+    film({std::string("cameras=[{ name = \"above\", keyframes = [") + before +
+          "{ at = 1, eye_m = [1, 1, 6], target_m = [1, 1, 0] }] }]"},
+         {"--camera", "above", "--passes", "object"});
+    const Json cameras = read_json(frame("passes.json")).at("cameras");
+    const Json told = cameras.back().at("up");
+    for (int i = 0; i < 3; ++i) EXPECT_NEAR(told[std::size_t(i)].get<double>(), up[i], 1e-12);
+    const render::Raster16 object =
+        render::read_png_16(frame(fmt::format("{:04}.object.png", cameras.size() - 1)));
+    Eigen::Vector2d middle(0, 0);
+    int seen = 0;
+    for (int y = 0; y < object.height; ++y)
+      for (int x = 0; x < object.width; ++x)
+        if (object.levels[std::size_t(y * object.width + x)] > 0)
+          middle += Eigen::Vector2d(x + 0.5, y + 0.5), ++seen;
+    ASSERT_GT(seen, 20);
+    const Eigen::Vector2d aside = middle / seen - 0.5 * Eigen::Vector2d(object.width, object.height);
+    EXPECT_GT(aside.dot(place), 5);
+    EXPECT_LT(std::abs(aside.x() * place.y() - aside.y() * place.x()), 2);
+  }
 }
 
 // passes.json tells where in each picture the robot is touched: on the cube's right, where the wall is.

@@ -280,6 +280,15 @@ TEST_F(Program, AMistypedCommandOrOptionIsNamedWithWhatWasMeant) {
     EXPECT_NE(limber_program(as_json).json().at("error").get<std::string>().find(told), std::string::npos);
   }
   EXPECT_NE(limber_program({"plan", "x"}).err.find("--out is required"), std::string::npos);
+  // A value that cannot be: limber says so, and where to read on.
+  for (const auto& [words, told] : std::vector<std::pair<std::vector<std::string>, std::string>>{
+           {{"render", "x", "--bits", "12"}, "limber: --bits: 12 not in {8,16}; see limber render --help"},
+           {{"render", "x", "--passes", "depth,foo"}, "limber: --passes: foo not in"},
+           {{"render", "x", "--as", ""}, "limber: --as: is empty; write a name"}}) {
+    const Result result = limber_program(words);
+    EXPECT_EQ(result.code, exit_bad_input);
+    EXPECT_TRUE(result.err.starts_with(told)) << result.err;
+  }
   for (const auto& [words, told] : std::vector<std::pair<std::vector<std::string>, std::string>>{
            {{}, "limber needs a command, one of prepare, plan, "},
            {{"scene"}, "limber scene needs a command, one of "}}) {

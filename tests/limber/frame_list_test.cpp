@@ -18,9 +18,23 @@ TEST(FrameList, ReadsFramesRangesAndSteps) {
 }
 
 TEST(FrameList, LeavesOutAndCountsWhatLiesBeyondTheLastFrame) {
-  int left_out = 0;
+  std::int64_t left_out = 0;
   EXPECT_EQ(parse_frames("8-12", 10, &left_out), (std::vector<int>{8, 9}));
   EXPECT_EQ(left_out, 3);
+  parse_frames("0,8-2147483647:2,5-2147483647", 10, &left_out);
+  EXPECT_EQ(left_out, (2147483646 - 10) / 2 + 1 + (2147483647LL - 10 + 1));
+  const auto complaint = [](const std::string& text) {
+    try {
+      parse_frames(text, 10);
+    } catch (const InputError& error) {
+      return std::string(error.what());
+    }
+    return std::string();
+  };
+  EXPECT_NE(complaint("5-3").find("ends before it begins; write 3-5"), std::string::npos);
+  EXPECT_NE(complaint("0-9:0").find("the step of \"0-9:0\" is 0"), std::string::npos);
+  EXPECT_NE(complaint("99999999999").find("above 2147483647"), std::string::npos);
+  EXPECT_THROW(chunk_of({0, 1}, "1/99999999999"), InputError);
   EXPECT_THROW(parse_frames("10-12", 10), InputError);
 }
 

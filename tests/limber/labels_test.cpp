@@ -174,6 +174,42 @@ TEST_F(Labels_slow, AreGoneWhereTheirBodiesAreHidden) {
   EXPECT_EQ(shot.names_at(89).size(), 1u);
 }
 
+// No line ends in the inset, or runs through it.
+TEST_F(Labels_slow, KeepClearOfAnInset) {
+  const std::string inset = "film.inset={ camera = \"turning\", size = 0.5 }";
+  const Start start = start_of({inset}), bare = start_of({"film.labels=false"}),
+              unnamed = start_of({inset, "film.labels=false"});
+  const plan::Plan plan = flight(start.world, 90);
+  const auto shot_of = [&](const Start& of) {
+    Output output;
+    output.occlusion = false;
+    return std::make_unique<Shot>(of.scene, "main", plan, of.world, of.bodies, of.scenery,
+                                  std::pair(480, 270), output);
+  };
+  const auto picture_of = [&](const Start& of) {
+    return std::get<render::Image8>(Shot::Painter(*shot_of(of)).paint(0).frame);
+  };
+  const render::Image8 with = picture_of(unnamed), without = picture_of(bare);
+  Eigen::Vector4d box(480, 270, 0, 0);
+  for (int y = 0; y < 270; ++y)
+    for (int x = 0; x < 480; ++x)
+      if (const std::size_t at = 3 * std::size_t(480 * y + x);
+          !std::equal(&with.rgb[at], &with.rgb[at] + 3, &without.rgb[at])) {
+        box.head<2>() = box.head<2>().cwiseMin(Eigen::Vector2d(x, y));
+        box.tail<2>() = box.tail<2>().cwiseMax(Eigen::Vector2d(x + 1, y + 1));
+      }
+  ASSERT_NEAR(box[2] - box[0], 240, 10);
+  const auto shot = shot_of(start);
+  int shown = 0;
+  for (int f = 0; f < shot->frames(); ++f)
+    for (const Shot::Name& name : shot->names_at(f)) {
+      ++shown;
+      EXPECT_FALSE(overlap(name.place.box, box)) << name.words << ' ' << f;
+      EXPECT_FALSE(runs_through(name.place, name.end, box)) << name.words << ' ' << f;
+    }
+  EXPECT_GT(shown, 2 * shot->frames());
+}
+
 TEST_F(Labels_slow, WhatIsCutAwayIsNotPointedAt) {
   const Start start = start_of({"film.labels=[\"wall\"]",
                                 "film.cuts=[{ point_m = [0.2, 0, 0], normal = [-1, 0, "

@@ -114,6 +114,10 @@ TEST(Camera, TurningKeepsDistanceAndHeight) {
   // From (−1, −7) beside the target, a quarter counter-clockwise seen from above leads to (7, −1).
   EXPECT_LT((quarter.eye - camera.target - Vec3(7, -1, -1)).norm(), 1e-12);
   EXPECT_LT((turned(camera, 360).eye - camera.eye).norm(), 1e-12);
+  // One that looks straight down stays where it is, and its picture turns.
+  const Camera above{.eye = {0, 0, 5}, .target = {0, 0, 0}, .up = {0, 1, 0}};
+  EXPECT_LT((turned(above, 90).eye - above.eye).norm(), 1e-12);
+  EXPECT_LT((turned(above, 90).up - Vec3(-1, 0, 0)).norm(), 1e-12);
 }
 
 TEST(Camera, BadCamerasAreRefused) {

@@ -467,6 +467,34 @@ TEST(Renderer, VeilsAreSortedWithinEachPixel) {
   }
 }
 
+// Of two sheets that meet in an edge and lie on one side of it, the nearer hides the farther up to the edge,
+// in the pixels of which the middle lies beyond it too.
+TEST(Renderer, AlongAVeilsOutlineItsNearSideIsInFront) {
+  const Vec3 left(-1, 0, -0.13), right(1, 0, 0.21), up(0, 0, 1);
+  for (const bool multisampling : {false, true}) {
+    RenderSettings look = small_look();
+    look.multisampling = multisampling;
+    look.transparent_background = true;
+    look.stage.include(Box{Vec3(-1, -1, -1), Vec3(1, 1, 2)});
+    Renderer renderer(look);
+    for (const double toward : {-0.4, 0.4}) {
+      const Vec3 slope = up + toward * Vec3::UnitY();
+      const SurfaceMesh sheet = quad_mesh(left, right, right + slope, left + slope);
+      renderer.add_mesh(sheet.triangles, sheet.positions,
+                        {"sheet", toward < 0 ? Vec3(0.9, 0, 0) : Vec3(0, 0.9, 0), 1, 0, 0.999});
+    }
+    const Image image = renderer.draw(camera_from({0, -5, 0.3}));
+    int along = 0;  // pixels that the outline runs through
+    for (int y = 0; y < image.height; ++y)
+      for (int x = 0; x < image.width; ++x) {
+        const Eigen::Vector4d seen = rgba(image, x, y);
+        along += 0.1 < seen.w() && seen.w() < 0.9;
+        EXPECT_LE(seen.y(), seen.x() + 2e-3) << x << ' ' << y << ' ' << multisampling;
+      }
+    EXPECT_GT(along, 100);
+  }
+}
+
 // A veil that enters something opaque is seen up to there, to a sample: where the line of entry passes
 // between the samples of a pixel, half of them show it.
 TEST(Renderer, AVeilIsSeenUpToWhereItEntersSomethingOpaque) {

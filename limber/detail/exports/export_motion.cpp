@@ -67,7 +67,7 @@ ExportedMotion export_motion(const ExportOptions& options) {
   const auto [bodies, world] = read_world_of(planned, options.folder);
   const plan::Trajectory& path = planned.plan.trajectory;
   const int count = int(path.frames.size());
-  int left_out = 0;
+  std::int64_t left_out = 0;
   const PlannedMotion motion{planned.scene,
                              bodies,
                              world,

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <charconv>
+#include <limits>
 #include <optional>
 #include <set>
 #include <string_view>
@@ -12,15 +13,15 @@ namespace limber::detail {
 
 namespace {
 
-std::optional<int> whole_number(std::string_view text) {
-  int value = 0;
+std::optional<std::int64_t> whole_number(std::string_view text) {
+  std::int64_t value = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
   if (error != std::errc() || end != text.data() + text.size() || value < 0) return std::nullopt;
   return value;
 }
 
 // The two numbers round a separator.
-std::optional<std::pair<int, int>> pair_of(std::string_view text, char separator) {
+std::optional<std::pair<std::int64_t, std::int64_t>> pair_of(std::string_view text, char separator) {
   const auto at = text.find(separator);
   if (at == text.npos) return std::nullopt;
   const auto a = whole_number(text.substr(0, at)), b = whole_number(text.substr(at + 1));
@@ -43,31 +44,41 @@ std::vector<Range> ranges_of(const std::string& text, const char* what, const ch
     rest = comma == rest.npos ? std::string_view() : rest.substr(comma + 1);
     const auto colon = part.find_first_of(":x");
     const std::string_view range = part.substr(0, colon);
-    const auto step = colon == part.npos ? std::optional(1) : whole_number(part.substr(colon + 1));
+    const auto step =
+        colon == part.npos ? std::optional<std::int64_t>(1) : whole_number(part.substr(colon + 1));
     const auto single = whole_number(range);
     const auto ends = single ? std::optional(std::pair(*single, *single)) : pair_of(range, '-');
-    if (!step || *step == 0 || !ends || ends->first > ends->second)
+    if (!step || !ends)
       throw InputError(
           fmt::format("{} {}: \"{}\" is not {}, a range like 3-30, or a range with a step like 3-30:2", what,
                       text, part, one));
-    ranges.push_back({ends->first, ends->second, *step});
+    if (*step == 0)
+      throw InputError(fmt::format("{} {}: the step of \"{}\" is 0; it is 1 or more", what, text, part));
+    if (ends->first > ends->second)
+      throw InputError(fmt::format("{} {}: \"{}\" ends before it begins; write {}-{}", what, text, part,
+                                   ends->second, ends->first));
+    if (std::max(ends->second, *step) > std::numeric_limits<int>::max())
+      throw InputError(fmt::format("{} {}: \"{}\" has a number above {}", what, text, part,
+                                   std::numeric_limits<int>::max()));
+    ranges.push_back({int(ends->first), int(ends->second), int(*step)});
   }
   return ranges;
 }
 
 }  // namespace
 
-std::vector<int> parse_frames(const std::string& text, int count, int* left_out) {
+std::vector<int> parse_frames(const std::string& text, int count, std::int64_t* left_out) {
   std::set<int> frames;
-  int beyond = 0;
+  std::int64_t beyond = 0;
   std::vector<Range> ranges = ranges_of(text, "frames", "a frame");
   if (text.empty()) ranges.push_back({0, count - 1, 1});
   for (const Range& range : ranges)
     for (std::int64_t f = range.first; f <= range.last; f += range.step) {
-      if (f < count)
-        frames.insert(int(f));
-      else
-        ++beyond;
+      if (f >= count) {
+        beyond += (range.last - f) / range.step + 1;
+        break;
+      }
+      frames.insert(int(f));
     }
   if (frames.empty())
     throw InputError(
@@ -92,9 +103,12 @@ std::vector<int> parse_seeds(const std::string& text) {
 std::vector<int> chunk_of(const std::vector<int>& frames, const std::string& chunk) {
   if (chunk.empty()) return frames;
   const auto parts = pair_of(chunk, '/');
-  if (!parts || parts->first < 1 || parts->first > parts->second)
-    throw InputError(fmt::format("--chunk {}: is not i/n with 1 ≤ i ≤ n, like 2/8", chunk));
-  const auto edge = [&](int i) { return std::ptrdiff_t(std::int64_t(frames.size()) * i / parts->second); };
+  constexpr std::int64_t most = std::numeric_limits<int>::max();
+  if (!parts || parts->first < 1 || parts->first > parts->second || parts->second > most)
+    throw InputError(fmt::format("--chunk {}: is not i/n with 1 ≤ i ≤ n ≤ {}, like 2/8", chunk, most));
+  const auto edge = [&](std::int64_t i) {
+    return std::ptrdiff_t(std::int64_t(frames.size()) * i / parts->second);
+  };
   return {frames.begin() + edge(parts->first - 1), frames.begin() + edge(parts->first)};
 }
 

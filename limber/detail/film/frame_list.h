@@ -1,6 +1,7 @@
 // Which frames to render, and which seeds to run, as a farm of machines writes it.
 #pragma once
 
+#include <cstdint>
 #include <string>
 #include <vector>
 
@@ -9,7 +10,7 @@ namespace limber::detail {
 // "1-30,47-327:2": single frames, ranges with both ends, ranges with a step; ascending, each once. "" is all
 // of 0 … count−1. Frames beyond the last are left out and counted in *left_out. Throws InputError naming the
 // part that is wrong, or when no frame is left.
-std::vector<int> parse_frames(const std::string& text, int count, int* left_out = nullptr);
+std::vector<int> parse_frames(const std::string& text, int count, std::int64_t* left_out = nullptr);
 
 // The same form, of the seeds of a benchmark; at most 100,000, none beyond 2³¹ − 1.
 std::vector<int> parse_seeds(const std::string& text);

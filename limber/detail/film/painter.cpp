@@ -32,6 +32,7 @@ constexpr int max_triangles_that_cast = 60'000, triangles_of_caster = 20'000;
 constexpr double outline_step = 0.004, outline_width = 1.6 / 1080;  // of the stage's diagonal, of the height
 const Vec3 outline_color(0.10, 0.11, 0.14);
 constexpr double inset_rim = 3.0 / 1080;  // of the height
+constexpr double words_gone = 4;          // a quarter of a card hides them
 
 constexpr int fine_cells = 300;  // of the maps that find crevices, along a body
 
@@ -419,17 +420,20 @@ render::Image8 Shot::Painter::without_words(int frame, render::Passes* wanted) {
   return image;
 }
 
+// Of two kinds of words at once one reads neither: caption, clock and names come when the card has nearly
+// gone.
 render::Image8 Shot::Painter::with_card(int frame, render::Passes* wanted) {
   const scenes::CardSpec* spec = shot_.card_of(frame);
   if (spec != card_of_ || wanted) {
-    const render::Image8 image = without_words(frame, wanted);
-    still_ = annotated(image, frame);
-    card_ = spec->plain ? render::plain_card(image.width, image.height, spec->lines,
+    bare_ = without_words(frame, wanted);
+    still_ = annotated(bare_, frame);
+    card_ = spec->plain ? render::plain_card(bare_.width, bare_.height, spec->lines,
                                              shot_.look_.background_bottom_srgb)
-                        : render::card(image, spec->lines);
+                        : render::card(bare_, spec->lines);
     card_of_ = spec;
   }
-  return render::mixed(still_, card_, shot_.card_share(frame));
+  const double share = shot_.card_share(frame);
+  return render::mixed(render::mixed(still_, bare_, std::min(1.0, words_gone * share)), card_, share);
 }
 
 Picture Shot::Painter::paint(int frame) {

@@ -30,7 +30,8 @@ void write(const Picture& picture, const FrameFiles& files, int frame, const std
   const auto put = [&](const std::string& pass, const auto& any) {
     std::visit(
         [&](const auto& image) {
-          render::write_png(files.of(frame, pass), image, {{"limber-hash", hash}});
+          render::write_png(files.of(frame, pass), image,
+                            {{hash_of_frame, hash}, {hash_of_pixels, render::pixel_hash(image)}});
         },
         any);
   };
@@ -138,7 +139,8 @@ RenderedFilm Filming::told(const RenderOptions& options) const {
           .trajectory_hash = hex(plan::hash_of(planned.plan.trajectory)),
           .folder = files.folder,
           .film = {},
-          .sheet = {}};
+          .sheet = {},
+          .old_film = {}};
 }
 
 std::vector<FailedFrame> paint_frames(const Filming& filming, const std::vector<int>& frames,
@@ -222,7 +224,7 @@ RenderedFilm render(const RenderOptions& options) {
   const FrameFiles& files = filming.files;
   const int frame_count = shot.frames();
 
-  int left_out = 0;
+  std::int64_t left_out = 0;
   std::vector<int> wanted = chunk_of(parse_frames(options.frames, frame_count, &left_out), options.chunk);
   if (left_out > 0)
     log::warn("frames {}: {} frames beyond the last, {}, are left out", options.frames, left_out,
@@ -264,6 +266,10 @@ RenderedFilm render(const RenderOptions& options) {
     for (int f = frame_count; fs::remove(files.of(f)); ++f) {
     }
     result.film = video, result.sheet = sheet;
+  } else {
+    for (int f = 0; f < frame_count; ++f) result.others += int(fs::exists(files.of(f)) && !is_good(f));
+    if (const fs::path old = options.folder / ("film" + suffix + ".mp4"); fs::exists(old))
+      result.old_film = old;
   }
   update_manifest(options.folder, "render" + suffix, json_of(result));
   return result;

@@ -35,7 +35,11 @@ struct RenderedFilm {
   double cpu_s = 0;
   fs::path folder;                      // of the frames
   std::optional<fs::path> film, sheet;  // where every frame is there
+  // Where some lack: a film of before, and frames that show something else than this one's.
+  std::optional<fs::path> old_film;
+  int others = 0;
 };
+
 // Where the pictures of a frame are: 0007.png, and of its passes 0007.depth.png and so on.
 struct FrameFiles {
   fs::path folder;
@@ -43,6 +47,9 @@ struct FrameFiles {
     return folder / fmt::format("{:04}{}{}.png", frame, pass.empty() ? "" : ".", pass);
   }
 };
+
+// The texts of a frame's PNG, and of its passes': the hash of what it shows, and that of its pixels.
+inline constexpr const char *hash_of_frame = "limber-hash", *hash_of_pixels = "limber-pixels";
 
 // What a film is made of: a folder's plan under the scene that it is filmed as, and the shot of it.
 struct Filming {

@@ -92,9 +92,10 @@ class Shot {
     const Shot& shot_;
     std::vector<std::unique_ptr<View>> views_;  // from left to right
     std::unique_ptr<Painter> inset_;
-    // While a card is shown the motion stands still: its picture, and what the card makes of it.
+    // While a card is shown the motion stands still: its picture without and with words, and what the card
+    // makes of it.
     const scenes::CardSpec* card_of_ = nullptr;
-    render::Image8 still_, card_;
+    render::Image8 bare_, still_, card_;
   };
 
  private:

@@ -19,6 +19,26 @@ Box turned_any_way(const Box& box) {
   return {box.center() - reach, box.center() + reach};
 }
 
+bool looks_along_z(const render::Camera& camera) {
+  return std::abs((camera.target - camera.eye).normalized().z()) > 0.999;
+}
+
+// Where a key looks straight down (or up), up in the picture is where the key before it looks, or else the
+// one after it: a camera that rises over what it looks at does not roll.
+void stand_upright(std::vector<render::CameraKey>& path) {
+  for (std::size_t k = 0; k < path.size(); ++k) {
+    render::Camera& camera = path[k].camera;
+    if (!looks_along_z(camera)) continue;
+    const double down = camera.eye.z() > camera.target.z() ? 1 : -1;
+    camera.up = Vec3::UnitY();
+    for (const std::size_t other : {k + 1, k - 1})  // the last that fits
+      if (other < path.size() && !looks_along_z(path[other].camera)) {
+        const Vec3 view = path[other].camera.target - path[other].camera.eye;
+        camera.up = down * Vec3(view.x(), view.y(), 0).normalized();
+      }
+  }
+}
+
 }  // namespace
 
 // The outermost vertices at every stored state, and the cages' nodes and the bounds where they are drawn. A
@@ -53,6 +73,7 @@ Points Shot::outline_of_motion(int subject) const {
 void Shot::lay_out_camera(double aspect) {
   for (const scenes::Keyframe& key : camera_->keyframes)
     path_.push_back({key.at, {.eye = key.eye_m, .target = key.target_m, .fov_deg = camera_->fov_deg}});
+  stand_upright(path_);
   const auto frame = [&](const auto& shown) {
     if (path_.empty())
       path_.push_back({0, render::frame_automatically(shown, camera_->direction, aspect, camera_->fov_deg,

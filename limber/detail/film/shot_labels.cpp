@@ -4,9 +4,10 @@
 // over the film, in which the processor lays triangle over triangle: so names stand at the same places on
 // every machine, whichever frames it paints. A line ends at the middle of a triangle, which moves with its
 // body: of some hundred of them, evenly over the surface, the one that is seen most, farthest within what is
-// seen of its body. Where names stand, render/label_places.h finds. A name is shown while the end of its line
-// is seen and no line crosses; else it fades. Where that would be so for much of the time, the film is parted
-// in two acts that have places of their own. Method: docs/rendering.md.
+// seen of its body; what lies under words, bars or the inset isn't seen. Where names stand,
+// render/label_places.h finds. A name is shown while the end of its line is seen and no line crosses or runs
+// through those; else it fades. Where that would be so for much of the time, the film is parted in two acts
+// that have places of their own. Method: docs/rendering.md.
 #include <algorithm>
 #include <cmath>
 #include <numeric>
@@ -82,7 +83,8 @@ struct Shot::Labeling {
     double hidden = 0;
   };
 
-  explicit Labeling(const Shot& of) : shot(of), scale(double(of.look_.width) / width()) {
+  explicit Labeling(const Shot& of)
+      : shot(of), scale(double(of.look_.width) / width()), taken(of.places_taken()) {
     const int numbers = int(shot.bodies_.size() + shot.scenery_.size());
     for (int n = 0; n < numbers; ++n)
       solid.push_back(!shot.cuts_of(n).empty() && render::has_inside(mesh_of(n).triangles));
@@ -181,6 +183,9 @@ struct Shot::Labeling {
                                                         std::tan(0.5 * camera.fov_deg * EIGEN_PI / 180) /
                                                         (0.5 * height());
         if (own.object[at] != label.number || std::abs(own.depth_m[at] - pixel.z()) > near_m) continue;
+        if (std::any_of(taken.begin(), taken.end(),
+                        [&](const auto& box) { return lies_in(box, look.pixel); }))
+          continue;
         look.worth = std::min(1.0, clear[at] / (deep_enough * height()));
         if (label.veil && opaque.object[at] >= 0) look.worth *= over_others;
       }
@@ -192,6 +197,9 @@ struct Shot::Labeling {
     return (positions.row(triangles(t, 0)) + positions.row(triangles(t, 1)) + positions.row(triangles(t, 2)))
                .transpose() /
            3;
+  }
+  static bool lies_in(const Eigen::Vector4d& box, const Vec2& pixel) {
+    return box[0] < pixel.x() && pixel.x() < box[2] && box[1] < pixel.y() && pixel.y() < box[3];
   }
   static bool cut_off(const Named& label, const Vec3& place) {
     return std::any_of(label.cuts.begin(), label.cuts.end(),
@@ -205,6 +213,11 @@ struct Shot::Labeling {
   }
   const Vec2& pixel(std::size_t label, int end, int sight) const {
     return sights[std::size_t(sight)].at[label][std::size_t(end)].pixel;
+  }
+
+  bool clear_of_words(const render::LabelPlace& place, const Vec2& end) const {
+    return std::none_of(taken.begin(), taken.end(),
+                        [&](const auto& box) { return render::runs_through(place, end, box); });
   }
 
   // What is seen longest and deepest, and of that what is nearest to the side where most of the body is.
@@ -231,11 +244,8 @@ struct Shot::Labeling {
   Act act_of(int first, int last) const {
     Act act{first, last, {}, {}};
     for (std::size_t l = 0; l < labels.size(); ++l) act.end.push_back(best_end(l, act));
-    render::LabelRoom room{shot.look_.width,
-                           shot.look_.height,
-                           shot.letter_px_,
-                           {double(shot.look_.width), 0, 0, 0},
-                           shot.places_taken()};
+    render::LabelRoom room{
+        shot.look_.width, shot.look_.height, shot.letter_px_, {double(shot.look_.width), 0, 0, 0}, taken};
     std::vector<render::WantedLabel> wanted;
     for (std::size_t l = 0; l < labels.size(); ++l)
       wanted.push_back({render::width_of_words(shot.scene_.film.labels[l].text, shot.letter_px_), {}});
@@ -253,7 +263,8 @@ struct Shot::Labeling {
       for (std::size_t l = 0; l < labels.size(); ++l) {
         if (sights[std::size_t(s)].pixels[l] < least_pixels) continue;
         ++all;
-        bool shown = act.places[l] && seen(l, act.end[l], s);
+        bool shown = act.places[l] && seen(l, act.end[l], s) &&
+                     clear_of_words(*act.places[l], pixel(l, act.end[l], s));
         for (std::size_t o = 0; o < labels.size() && shown; ++o)
           if (o != l && act.places[o] && seen(o, act.end[o], s))
             shown =
@@ -352,6 +363,9 @@ struct Shot::Labeling {
           for (int f = frames[std::size_t(s)]; f < until; ++f) shown[l][std::size_t(f - from)] = true;
       }
     }
+    for (std::size_t l = 0; l < labels.size(); ++l)
+      for (std::size_t f = 0; f < count; ++f)
+        if (shown[l][f] && !clear_of_words(*act.places[l], ends[l][f])) shown[l][f] = false;
     for (std::size_t f = 0; f < count; ++f)
       for (std::size_t l = 0; l < labels.size(); ++l)
         for (std::size_t o = l + 1; o < labels.size(); ++o)
@@ -372,7 +386,8 @@ struct Shot::Labeling {
   }
 
   const Shot& shot;
-  double scale;             // pixels of the picture over those of a small one
+  double scale;  // pixels of the picture over those of a small one
+  std::vector<Eigen::Vector4d> taken;
   std::vector<bool> solid;  // of what is cut, a number
   std::vector<Named> labels;
   std::vector<int> frames;  // of the sights

@@ -42,8 +42,10 @@ Json Shot::key_of_passes() const {
       names.push_back({name.words, name.body + 1, name.end.x(), name.end.y(), name.share});
     if (!names_.empty()) key["labels"].push_back(std::move(names));
     const render::Camera camera = camera_of(f);
-    key["cameras"].push_back(
-        {{"eye_m", list(camera.eye)}, {"target_m", list(camera.target)}, {"fov_deg", camera.fov_deg}});
+    key["cameras"].push_back({{"eye_m", list(camera.eye)},
+                              {"target_m", list(camera.target)},
+                              {"up", list(camera.up.normalized())},
+                              {"fov_deg", camera.fov_deg}});
   }
   key["light"] = {{"toward_key", list(look_.toward_key.normalized())},
                   {"key", list(look_.key_light)},

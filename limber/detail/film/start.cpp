@@ -103,10 +103,18 @@ Start loaded_start(const scenes::Scene& scene, const std::vector<LoadedModel>& m
   return start;
 }
 
+void require_picture_possible(const fs::path& file, const char* what) {
+  if (file.extension() != ".png")
+    throw InputError(fmt::format("{}: {} is a PNG; write for example {}.png", file.string(), what,
+                                 std::string(what).substr(2)));
+  if (fs::is_directory(file))
+    throw InputError(fmt::format("{}: is a folder; name a file for {}", file.string(), what));
+  if (const fs::path folder = file.parent_path(); !folder.empty() && !fs::is_directory(folder))
+    throw InputError(fmt::format("{}: there is no folder {}; make it first", file.string(), folder.string()));
+}
+
 double write_still(const Start& start, const std::string& camera, std::pair<int, int> size_px,
                    const fs::path& file) {
-  if (file.extension() != ".png")
-    throw InputError(fmt::format("{}: a still is a PNG; write for example still.png", file.string()));
   plan::Plan plan;  // that never left the start
   plan.trajectory.frames = {fem::start_state(start.world)};
   scenes::Scene scene = start.scene;
@@ -130,6 +138,7 @@ WrittenStill render_still(const StillOptions& options) {
   const fs::path file = scenes::find_scene(options.scene.scene);
   const scenes::Scene scene = scenes::read_scene_file(file, options.scene.sets);
   const fs::path still = options.out.value_or(scene.name + ".png");
+  require_picture_possible(still, "a still");
   const auto size =
       options.size.empty() ? std::pair(scene.film.width_px, scene.film.height_px) : parse_size(options.size);
   std::vector<LoadedModel> models;

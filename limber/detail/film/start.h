@@ -27,9 +27,13 @@ Start prepared_start(const scenes::Scene&, const fs::path& work_folder);
 // From the models as they are loaded, one for each body of the scene.
 Start loaded_start(const scenes::Scene&, const std::vector<LoadedModel>&, const std::vector<fs::path>& data);
 
+// Throws InputError, before any work, where `what` ("a still") cannot be written there: it does not end in
+// .png, its folder is not there, or it is one itself.
+void require_picture_possible(const fs::path& file, const char* what);
+
 // The start as the film would show it, without what bodies hide of one another's sky where they are not
-// prepared; returns the seconds that painting took, once all was loaded for it. Throws InputError where
-// `file` does not end in .png, or as Shot does.
+// prepared; returns the seconds that painting took, once all was loaded for it. Throws InputError as Shot
+// does.
 double write_still(const Start&, const std::string& camera, std::pair<int, int> size_px,
                    const fs::path& file);
 

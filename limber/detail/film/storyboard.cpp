@@ -94,9 +94,17 @@ std::vector<std::string> words_of(const scenes::Scene& scene, const std::vector<
     double way_m = 0;
     for (std::size_t s = 1; s < stations.size(); ++s)
       way_m += (stations[s].center_m - stations[s - 1].center_m).norm();
-    lines.push_back(fmt::format("{} goes from {} to {}, {} straight on", robot,
-                                place_words(stations.front().center_m), place_words(stations.back().center_m),
-                                length_words(std::round(1000 * way_m) / 1000)));
+    const std::string from = place_words(stations.front().center_m),
+                      to = place_words(stations.back().center_m),
+                      way = length_words(std::round(1000 * way_m) / 1000);
+    std::string by;
+    for (const scenes::Via& via : scene.via)
+      by += (by.empty() ? "" : ", ") + place_words(via.goal.center_of_mass_m);
+    lines.push_back(
+        by.empty() ? fmt::format("{} goes from {} to {}, {} straight on", robot, from, to, way)
+        : from == to
+            ? fmt::format("{} goes from {} to {} and back, {} straight on", robot, from, by, way)
+            : fmt::format("{} goes from {} by way of {} to {}, {} straight on", robot, from, by, to, way));
   }
   for (const scenes::MotionSpec& motion : scene.motions)
     if (lines.size() < 5)
@@ -147,9 +155,7 @@ WrittenStoryboard write_storyboard(const StoryboardOptions& options) {
   const fs::path file = scenes::find_scene(options.scene.scene);
   const scenes::Scene scene = scenes::read_scene_file(file, options.scene.sets);
   const fs::path out = options.out.value_or(scene.name + "-storyboard.png");
-  if (out.extension() != ".png")
-    throw InputError(
-        fmt::format("{}: a storyboard is a PNG; write for example storyboard.png", out.string()));
+  require_picture_possible(out, "a storyboard");
   const scenes::FilmSpec& film = scene.film;
   const int height = std::max(16, int(std::lround(double(usual_width) * film.height_px / film.width_px)));
   const std::pair<int, int> size =

@@ -155,6 +155,8 @@ std::string odd_entry(const fs::path& folder, const PlanFolder& planned,
 
 PlanFolder read_plan_folder(const fs::path& folder) {
   const fs::path file = folder / "plan.npz";
+  if (folder.filename() == "plan.npz" && fs::is_regular_file(folder))
+    throw InputError(fmt::format("{}: is a file; name the folder that it lies in", folder.string()));
   if (!fs::exists(file))
     throw InputError(fmt::format("{}: there is no such file; make it with limber plan SCENE -o {}",
                                  file.string(), folder.string()));

@@ -3,7 +3,10 @@
 #include <set>
 
 #include "core/error.h"
+#include "core/hash.h"
 #include "core/progress.h"
+#include "core/random.h"
+#include "core/threads.h"
 #include "limber/detail/body/work_folder.h"
 #include "limber/detail/film/render.h"
 #include "limber/detail/plan/manifest.h"
@@ -52,6 +55,72 @@ std::string false_word(const Json& entry, Json is) {
   return entry.size() == is.size() ? "" : "it holds more than limber writes there";
 }
 
+// What a frame's file holds that limber did not write there; empty: nothing.
+std::string odd_in(const fs::path& file) {
+  const auto info = render::inspect_png(file);
+  if (!info) return "is damaged";
+  for (const std::string& chunk : info->chunks)
+    if (static const std::set<std::string> written{"IHDR", "sRGB", "tEXt", "IDAT", "IEND"};
+        !written.contains(chunk))
+      return fmt::format("has a chunk {} that limber does not write", chunk);
+  for (const auto& [key, text] : info->texts)
+    if (key != hash_of_frame && key != hash_of_pixels)
+      return fmt::format("has a text \"{}\" that limber does not write", key);
+  if (!info->texts.contains(hash_of_pixels))
+    return "does not say what its pixels are; an older limber's did not: render it again";
+  return info->texts.at(hash_of_pixels) == render::pixel_hash(file) ? "" : "has other pixels than it says";
+}
+
+// The first file of these frames that is not as it was written, and what is odd in it; empty: none.
+std::string first_odd(const Filming& filming, const std::vector<int>& frames) {
+  std::vector<std::string> odd(frames.size());
+  parallel_for(int(frames.size()), [&](int i) {
+    throw_if_stopped();
+    std::vector<std::string> passes = filming.output.passes;
+    passes.insert(passes.begin(), "");
+    for (const std::string& pass : passes) {
+      const fs::path file = filming.files.of(frames[std::size_t(i)], pass);
+      if (const std::string what = odd_in(file); odd[std::size_t(i)].empty() && !what.empty())
+        odd[std::size_t(i)] = file.string() + " " + what;
+    }
+  });
+  const auto first =
+      std::find_if(odd.begin(), odd.end(), [](const std::string& what) { return !what.empty(); });
+  return first == odd.end() ? "" : *first;
+}
+
+// One of each of so many equal parts of them; which, all pixels decide, so nobody knows before.
+std::vector<int> picked(const Filming& filming, const std::vector<int>& frames, int count) {
+  Hasher pixels;
+  for (const int frame : frames) pixels.text(read_file(filming.files.of(frame)));
+  Rng random(pixels.digest(), 0);
+  std::vector<int> picks;
+  const std::int64_t n = std::ssize(frames), parts = std::min<std::int64_t>(n, count);
+  for (std::int64_t i = 0; i < parts; ++i) {
+    const std::int64_t first = i * n / parts, end = (i + 1) * n / parts;
+    picks.push_back(frames[std::size_t(first + random.below(int(end - first)))]);
+  }
+  return picks;
+}
+
+// A picture in the folder of frames that is named like none of this film; empty: none. Passes that an earlier
+// render made of the same frames may lie there.
+std::string stray_frame(const Filming& filming) {
+  std::set<std::string> names, here;
+  for (int f = 0; f < filming.shot->frames(); ++f) {
+    names.insert(filming.files.of(f).filename().string());
+    for (const std::string& pass : pass_names)
+      if (const fs::path file = filming.files.of(f, pass);
+          std::count(filming.output.passes.begin(), filming.output.passes.end(), pass) > 0 ||
+          (fs::exists(file) && render::frame_hash(file) == filming.shot->hash_of(f)))
+        names.insert(file.filename().string());
+  }
+  for (const auto& entry : fs::directory_iterator(filming.files.folder))
+    if (entry.path().extension() == ".png" && !names.contains(entry.path().filename().string()))
+      here.insert(entry.path().string());
+  return here.empty() ? "" : *here.begin();
+}
+
 // Which file of a frame, painted anew, is another; empty: none.
 std::string other_picture(const Filming& filming, Shot::Painter& painter, int frame, const fs::path& again) {
   const Picture picture = painter.paint(frame);
@@ -92,25 +161,36 @@ void check_film(const fs::path& folder, const std::string& suffix, const Json& e
       bad.push_back(f);
   }
   table.row(name + "each frame says that it shows what it should", bad.empty() && !good.empty(),
-            good.empty() ? "there is none"
+            good.empty() ? fmt::format("no frame is there, of {}", count)
             : bad.empty()
                 ? fmt::format("{} of {} frames", good.size(), count)
                 : fmt::format("{} do not; the first is {}", bad.size(), filming.files.of(bad[0]).string()));
   if (!bad.empty() || good.empty()) return;
 
+  const std::string odd = first_odd(filming, good);
+  table.row(name + "its frames' files are as limber wrote them", odd.empty(), odd);
+  const std::string stray = stray_frame(filming);
+  table.row(name + "no other pictures lie among its frames", stray.empty(),
+            stray.empty() ? "" : stray + " is none of this film's; remove it");
+  if (!options.passes.empty()) {
+    const fs::path key = filming.files.folder / "passes.json";
+    const bool same = fs::exists(key) && read_json(key) == Json::parse(filming.shot->key_of_passes().dump());
+    table.row(name + "passes.json says what the passes hold", same,
+              same ? "" : key.string() + " says otherwise, or is not there; render the passes again");
+  }
+
   std::string other;
-  std::vector<int> painted;
   const WorkFolder scratch("");
   Shot::Painter painter(*filming.shot);
-  for (const int i : render::spread_over(int(good.size()), repaint)) {
+  const std::vector<int> painted = picked(filming, good, repaint);
+  for (const int frame : painted) {
     throw_if_stopped();
-    painted.push_back(good[std::size_t(i)]);
-    if (other.empty()) other = other_picture(filming, painter, painted.back(), scratch.path() / "again.png");
+    if (other.empty()) other = other_picture(filming, painter, frame, scratch.path() / "again.png");
   }
   table.row(name + "frames that are painted again have the same pixels", other.empty(),
-            other.empty() ? painted.size() < good.size()
-                                ? fmt::format("{} of them: {}", painted.size(), fmt::join(painted, ", "))
-                                : "all of them"
+            other.empty() ? painted.size() < good.size() ? fmt::format("{} of {}: {}", painted.size(),
+                                                                       good.size(), fmt::join(painted, ", "))
+                                                         : fmt::format("all {}", good.size())
                           : other + " has others (another OSMesa may paint otherwise)");
   if (!is_whole) return;
 
@@ -126,11 +206,11 @@ void check_film(const fs::path& folder, const std::string& suffix, const Json& e
   table.row(name + "contact sheet made again from its frames: the same pixels", sheet_is, sheet.string());
 }
 
-// A film or contact sheet in the folder, by its name, that no entry tells of; empty: none.
+// A film, contact sheet or folder of frames, by its name, that no entry tells of; empty: none.
 std::string film_of_nobody(const fs::path& folder, const Json& manifest) {
   std::set<std::string> told, here;
   for (const auto& [key, entry] : manifest.items())
-    for (const char* file : {"film", "sheet"})
+    for (const char* file : {"film", "sheet", "folder"})
       if (entry.is_object() && entry.contains(file) && entry.at(file).is_string())
         told.insert(fs::path(entry.at(file).get<std::string>()).filename().string());
   for (const auto& entry : fs::directory_iterator(folder)) {
@@ -139,7 +219,8 @@ std::string film_of_nobody(const fs::path& folder, const Json& manifest) {
       return stem == name || stem.starts_with(std::string(name) + "-");
     };
     const bool moves = ending == ".mp4" || ending == ".webm" || ending == ".gif";
-    if ((moves && is_called("film")) || (ending == ".png" && is_called("sheet")))
+    if ((moves && is_called("film")) || (ending == ".png" && is_called("sheet")) ||
+        (entry.is_directory() && is_called("frames")))
       here.insert(entry.path().filename().string());
   }
   for (const std::string& name : here)
@@ -168,7 +249,7 @@ void check_films(const fs::path& folder, int repaint, Promises& table) {
   }
   if (const std::string odd = film_of_nobody(folder, manifest); films > 0 && !odd.empty())
     table.row("films: manifest.json tells of each", false,
-              odd + " is of no whole film that limber made here; render it again, or remove it");
+              odd + " is of no film that limber made here and tells of; render it to its end, or remove it");
   if (films == 0)
     throw InputError(
         fmt::format("{}: manifest.json tells of no film; make one with limber render", folder.string()));
