@@ -21,6 +21,11 @@ void DescribedCommands::add_result_commands() {
           "the strongest contact and the deepest penetration")
       ->type_name("FILE.csv");
   verify_command
+      .add_option("--model", verify_options.model,
+                  "of a body: the model that it must be of, read again as it was (scale, axes, label)")
+      ->type_name("MODEL")
+      ->check(CLI::ExistingFile);
+  verify_command
       .add_option(
           "--scene", verify_options.scene.scene,
           "the scene that the plan must be of, to the letter, with these --set; its models are looked "

@@ -67,6 +67,13 @@ void DescribedCommands::add_scene_commands() {
       ->check(within(0.3, 1.0))
       ->capture_default_str();
   new_command
+      .add_option(
+          "--fascia", new_options.fascia_hz,
+          "gravity, and soft organs hung in their places by what surrounds them, 1 … 30 Hz (11: they sag by "
+          "2 mm); default: no gravity, and organs held at their backs")
+      ->check(within(1.0, 30.0))
+      ->type_name("HZ");
+  new_command
       .add_option("--goal", new_options.goal,
                   "where the robot goes: front, back, left, right (the body's), up, down; default: front, or "
                   "aside to where least is in its way")

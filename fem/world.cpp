@@ -16,6 +16,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <numeric>
 
 #include "core/error.h"
@@ -33,7 +34,7 @@ namespace {
 
 // Share of the largest stable elastic step that is taken: contact needs the rest (docs/contact.md).
 // Neo-Hookean tets stiffen when stretched, and so need more.
-constexpr double step_safety = 1.0 / 3, neo_hookean_step_safety = 0.25;
+constexpr double step_safety = 1.0 / 3, neo_hookean_step_safety = 0.25, fascia_step_safety = 0.25;
 // Of a world in which only rigid bodies move, and so no elastic step exists.
 constexpr double rigid_step_s = 1e-3;
 
@@ -62,7 +63,13 @@ void choose_step(double max_dt_s, World& world) {
   const auto stiffest =
       std::min_element(world.bodies.begin(), world.bodies.end(),
                        [&](const Body& a, const Body& b) { return step_of(a) < step_of(b); });
-  world.contact_dt_s = float(std::isfinite(step_of(*stiffest)) ? step_of(*stiffest) : rigid_step_s);
+  double step_s = std::isfinite(step_of(*stiffest)) ? step_of(*stiffest) : rigid_step_s;
+  // x'' + 2 ζ ω x' + ω² x = 0, velocity first, is stable to h ω = 2 (√(1 + ζ²) − ζ).
+  for (const Body& body : world.bodies)
+    if (const double ratio = body.material.fascia_damping_ratio; body.material.fascia_hz > 0)
+      step_s = std::min(step_s, fascia_step_safety * 2 * (std::hypot(1, ratio) - ratio) /
+                                    (2 * std::numbers::pi * body.material.fascia_hz));
+  world.contact_dt_s = float(step_s);
   world.dt_s = max_dt_s > 0 ? std::min(world.contact_dt_s, double(float(max_dt_s))) : world.contact_dt_s;
   if (!(world.dt_s >= 1e-7))
     throw InputError(fmt::format(

@@ -31,6 +31,9 @@ struct Material {
   double density_kg_m3 = 100;     // > 0
   double damping_ratio = 0.05;    // 0 … 1, share of critical damping of the body's lowest longitudinal mode
   double mass_damping_per_s = 0;  // ≥ 0; Rayleigh's α: what moves is slowed by α v, as in a medium at rest
+  // 0 … 30, and 0 … 2: node i of mass m is drawn to its place at rest X by m (ω² (X − x) − 2 ζ ω v), with
+  // ω = 2 π fascia_hz. A uniform body's centre of mass is then a damped oscillator of its own.
+  double fascia_hz = 0, fascia_damping_ratio = 1;
   double friction = 0.2;          // 0 … 2, Coulomb; a pair has the geometric mean, a wall the body's own
   bool mesh_independent = false;  // softens the elements by what coarse tets are too stiff (docs/dynamics.md)
 };

@@ -22,6 +22,15 @@ std::vector<Promise> verify(const std::filesystem::path& folder, const std::stri
   });
 }
 
+std::vector<Promise> verify_body(const std::filesystem::path& folder, const std::filesystem::path& model,
+                                 const Context& context) {
+  return working_for(context, [&] {
+    detail::VerifyOptions options;
+    options.folder = folder, options.model = model;
+    return detail::verify(options).promises.rows();
+  });
+}
+
 Film render_film(const std::filesystem::path& folder, const FilmOptions& options, const Context& context) {
   return working_for(context, [&] {
     detail::RenderOptions command;

@@ -20,6 +20,10 @@ struct Promise {
 // is taken. Throws InputError where it is no such folder.
 LIMBER_API std::vector<Promise> verify(const std::filesystem::path& folder, const std::string& scene = {},
                                        const Context& = {});
+// Of a body's folder: also that it is of this model, read again with the scale, axes and label that the body
+// tells.
+LIMBER_API std::vector<Promise> verify_body(const std::filesystem::path& folder,
+                                            const std::filesystem::path& model, const Context& = {});
 
 struct FilmOptions {
   int width = 0, height = 0;  // pixels; 0: the scene's

@@ -567,16 +567,17 @@ PYBIND11_MODULE(_limber, m) {
   // ---- Work folders
   m.def(
       "verify",
-      [](const std::filesystem::path& folder, const std::string& scene, const py::object& progress,
-         int threads) {
+      [](const std::filesystem::path& folder, const std::string& scene, const std::filesystem::path& model,
+         const py::object& progress, int threads) {
         py::list rows;
         for (const limber::Promise& p : call(progress, threads, [&](const limber::Context& context) {
-               return limber::verify(folder, scene, context);
+               return model.empty() ? limber::verify(folder, scene, context)
+                                    : limber::verify_body(folder, model, context);
              }))
           rows.append(py::make_tuple(p.name, p.kept, p.value));
         return rows;
       },
-      "folder"_a, py::kw_only(), "scene"_a, "progress"_a, "threads"_a);
+      "folder"_a, py::kw_only(), "scene"_a, "model"_a, "progress"_a, "threads"_a);
   m.def(
       "render",
       [](const std::filesystem::path& folder, int width, int height, const std::string& frames,

@@ -46,11 +46,11 @@ Vec3 srgb_from_oklab(const Oklab& lab) {
 }
 
 Vec3 sequential_srgb(double share) {
-  // Lightness rises evenly while the hue turns from blue over red to yellow; the chroma is what screens show
-  // of all these.
+  // Lightness falls evenly while the hue turns from yellow over red to purple; the chroma is what screens
+  // show of all these, and next to none at nothing.
   const double t = std::clamp(share, 0.0, 1.0);
-  const double lightness = 0.25 + 0.68 * t, hue = (275 + 190 * t) * std::numbers::pi / 180;
-  const double chroma = 0.04 + 0.115 * std::sin(std::numbers::pi * std::pow(t, 0.8));
+  const double lightness = 0.87 - 0.54 * t, hue = (100 - 135 * t) * std::numbers::pi / 180;
+  const double chroma = 0.012 + 0.15 * std::sin(0.78 * std::numbers::pi * std::pow(t, 0.85));
   const Vec3 srgb = srgb_from_oklab({lightness, chroma * std::cos(hue), chroma * std::sin(hue)});
   return srgb.cwiseMax(0).cwiseMin(1);
 }

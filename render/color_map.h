@@ -12,8 +12,8 @@ struct Oklab {
 Oklab oklab_from_srgb(const Vec3& srgb);
 Vec3 srgb_from_oklab(const Oklab&);  // may lie outside 0 … 1 where no screen shows the colour
 
-// 0 … 1 from dark blue over red to pale yellow, its lightness in proportion; clamped outside. For quantities
-// that begin at nothing.
+// 0 … 1 from pale grey over yellow and red to dark purple, darker in proportion; clamped outside. For
+// quantities that begin at nothing: what has none is pale, so light, outlines and cages are seen on it.
 Vec3 sequential_srgb(double share);
 
 // 0 … 1 from blue over pale grey (0.5) to red, as light on both sides. For what grows and shrinks.

@@ -78,7 +78,8 @@ struct MaterialSpec {
   std::string model;  // "springs" or "neo_hookean"
   double youngs_modulus_pa = 0, poisson_ratio = 0, density_kg_m3 = 0, damping_ratio = 0, friction = 0;
   double mass_damping_per_s = 0;
-  bool mesh_independent = true;  // what the cage's tets are too stiff is taken off
+  double fascia_hz = 0, fascia_damping_ratio = 1;  // what draws each node to its place; 0: nothing
+  bool mesh_independent = true;                    // what the cage's tets are too stiff is taken off
 };
 
 // What differs from the material in part of a body.

@@ -62,6 +62,8 @@ void check(const BodySpec& spec) {
   require_density("density_kg_m3", m.density_kg_m3);
   require_range(spec, "damping_ratio", m.damping_ratio, 0, 1, "from 0 to 1");
   require_range(spec, "mass_damping_per_s", m.mass_damping_per_s, 0, 1000, "from 0 to 1000");
+  require_range(spec, "fascia_hz", m.fascia_hz, 0, 30, "from 0 to 30");
+  require_range(spec, "fascia_damping_ratio", m.fascia_damping_ratio, 0, 2, "from 0 to 2");
   require_range(spec, "friction", m.friction, 0, 2, "from 0 to 2");
   if (spec.gravity_m_s2 && !spec.gravity_m_s2->allFinite())
     throw InputError(fmt::format("body {}: its gravity_m_s2 is not finite", spec.name));

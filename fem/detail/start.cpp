@@ -102,7 +102,7 @@ class Parter {
       : world_(world), offset_m_(offset_m), bodies_(world.bodies.size()), before_(before), now_(before) {
     world_.forces.clear();
     for (Body& body : world_.bodies) {
-      body.gravity_m_s2.setZero(), body.material.mass_damping_per_s = 0;
+      body.gravity_m_s2.setZero(), body.material.mass_damping_per_s = body.material.fascia_hz = 0;
       body.track = {};  // time stands still
     }
     world_.rest_speed_m_s = 0, world_.dt_s = world_.contact_dt_s;

@@ -20,6 +20,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
 #include <numeric>
 #include <utility>
 #include <vector>
@@ -259,15 +260,15 @@ void Stepper<Real>::step() {
   for (int lane = 0; lane < lanes_; ++lane)
     if (contact_[lane] && step_[lane] >= next_change_[lane]) follow_forces(lane);
   if (cost_.steps++ % Cost::sampled != Cost::sampled / 2) {
-    find_sleepers(), add_contact_forces(), find_pushes(), add_stretch_limits(), add_elastic_forces(),
-        add_friction(), integrate();
+    find_sleepers(), add_contact_forces(), find_pushes(), add_stretch_limits(), add_fascia(),
+        add_elastic_forces(), add_friction(), integrate();
     return;
   }
   Stopwatch watch;
   const auto spent = [&] { return Cost::sampled * watch.lap_s(); };
   find_sleepers(), add_contact_forces(), cost_.contact_s += spent();
   find_pushes(), cost_.controls_s += spent();
-  add_stretch_limits(), add_elastic_forces(), cost_.elastic_s += spent();
+  add_stretch_limits(), add_fascia(), add_elastic_forces(), cost_.elastic_s += spent();
   add_friction(), cost_.contact_s += spent();
   integrate(), cost_.integration_s += spent();
 }
@@ -405,6 +406,31 @@ void Stepper<Real>::add_stretch_limits() {
     if (contact_[lane]) stretch_limits_.add_forces(lane, view(lane));
 }
 
+// Draws nodes to their places at rest; those of bodies that sleep are there, or where other forces hold them.
+template <class Real>
+void Stepper<Real>::add_fascia() {
+  for (std::size_t b = 0; b < world_.bodies.size(); ++b) {
+    const Body& body = world_.bodies[b];
+    if (!(body.material.fascia_hz > 0) || !body.pushed() || all_asleep_[b]) continue;
+    const double omega = 2 * std::numbers::pi * body.material.fascia_hz;
+    const Real stiff = Real(omega * omega), slow = Real(2 * body.material.fascia_damping_ratio * omega);
+    for (int lane = 0; lane < lanes_; ++lane) {
+      if (!contact_[lane] || asleep_[b * std::size_t(lanes_) + std::size_t(lane)] > 0) continue;
+      const LaneView<Real> all = view(lane);
+      for (int n = 0; n < body.node_count(); ++n) {
+        const int node = body.first_node + n;
+        if (body.fixed[std::size_t(n)]) continue;
+        const Real mass = tables_.node_mass[std::size_t(node)];
+        for (int c = 0; c < 3; ++c) {
+          const int at = all.state.at(node, c);
+          const Real away = Real(body.cage.positions(n, c)) - all.x[at];
+          all.f[all.force.at(node, c)] += mass * (stiff * away - slow * all.v[at]);
+        }
+      }
+    }
+  }
+}
+
 // Pushes that depend on the state; constant ones were set when the lane was loaded.
 template <class Real>
 void Stepper<Real>::find_pushes() {
@@ -458,7 +484,7 @@ std::vector<ContactRecord<Real>> Stepper<Real>::contact_records(int lane) {
   };
   follow_forces(lane), find_sleepers();
   record_to(&records), add_contact_forces(), record_to(nullptr);
-  find_pushes(), add_stretch_limits(), add_elastic_forces(), add_friction(&records);
+  find_pushes(), add_stretch_limits(), add_fascia(), add_elastic_forces(), add_friction(&records);
   std::fill(f_.begin(), f_.end(), Real(0));  // as integration leaves it
   return records;
 }

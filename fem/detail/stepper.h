@@ -61,6 +61,7 @@ class Stepper {
   void add_contact_forces();
   void find_pushes();
   void add_stretch_limits();
+  void add_fascia();
   void add_elastic_forces();
   void add_friction(std::vector<ContactRecord<Real>>* records = nullptr);
   void integrate();

@@ -605,9 +605,14 @@ class Promise(NamedTuple):
 
 
 @_checked
-def verify(folder: Path, *, scene: str = "", progress: Optional[Progress] = None, threads: int = 0) -> List[Promise]:
-    """Every promise that limber makes of a work folder, or of a body's, checked anew from its files."""
-    return [Promise(*row) for row in _limber.verify(folder, scene=scene, progress=progress, threads=threads)]
+def verify(folder: Path, *, scene: str = "", model: Path = "", progress: Optional[Progress] = None,
+           threads: int = 0) -> List[Promise]:
+    """Every promise that limber makes of a work folder, or of a body's, checked anew from its files. `scene`: the one
+    that the plan must be of; `model`: the file that the body must be of."""
+    if scene and model:
+        raise InputError("verify: scene is of a plan's folder, model of a body's: give one of them")
+    return [Promise(*row) for row in
+            _limber.verify(folder, scene=scene, model=model, progress=progress, threads=threads)]
 
 
 class Film(NamedTuple):

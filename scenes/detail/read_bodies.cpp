@@ -99,6 +99,8 @@ MaterialSpec read_material(const Node& body_table, Kind kind, Role role, const s
           number(*table, "damping_ratio"),
           number(*table, "friction"),
           number(*table, "mass_damping_per_s"),
+          number(*table, "fascia_hz"),
+          number(*table, "fascia_damping_ratio"),
           flag(*table, "mesh_independent")};
 }
 

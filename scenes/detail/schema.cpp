@@ -352,6 +352,13 @@ constexpr Key all_keys[] = {
      "share of the critical damping of the body's slowest stretching", "", ""},
     {"bodies[].material.mass_damping_per_s", Type::number, from_to(0, 1000), 0, "0.0",
      "1/s; what moves is slowed by so much of its velocity, as in a medium at rest: swings die away", "", ""},
+    {"bodies[].material.fascia_hz", Type::number, from_to(0, 30), 0, "0.0",
+     "Hz; what holds the body in its place: each node is drawn to its place in the scene, as if by a spring "
+     "of its own "
+     "that would swing so often; 0: nothing does (docs/dynamics.md, \"Fascia\")",
+     "", ""},
+    {"bodies[].material.fascia_damping_ratio", Type::number, from_to(0, 2), 0, "1.0",
+     "share of the critical damping of these springs", "", ""},
     {"bodies[].material.friction", Type::number, from_to(0, 2), 0, "0.2",
      "Coulomb's; a pair of bodies has the geometric mean", "", ""},
     {"bodies[].material.mesh_independent",

@@ -3,6 +3,8 @@
 
 #include <fstream>
 #include <map>
+#include <numbers>
+#include <sstream>
 
 #include "core/mesh_files.h"
 #include "render/image_file.h"
@@ -151,6 +153,43 @@ TEST_F(NewScene_slow, AnInstrumentAndATourGoAsTheyAre) {
   const Result simulated = limber_program(
       {"simulate", file, "--data", models().string(), "--duration", "0.1s", "-o", out("tour"), "-q"});
   EXPECT_EQ(simulated.code, exit_done) << simulated.err;
+}
+
+// Under gravity organs in fascia of 11 Hz sag by g/ω² = 2.05 mm and no farther, and the scene is planned; the
+// lung that rests on nothing, and the liver that rests on the spine.
+TEST_F(NewScene_slow, FasciaHoldsOrgansInTheirPlaces) {
+  cube("liver", {0, 200, 1075}, 80);
+  ASSERT_EQ(limber_program(words({"--robot", "heart", "--fascia", "11"})).code, exit_done);
+  const std::string file = (folder / "chest.toml").string();
+  const scenes::Scene scene = scenes::read_scene_file(file);
+  EXPECT_EQ(scene.gravity_m_s2, Vec3(0, 0, -9.81));
+  for (const scenes::BodySpec& body : scene.bodies)
+    EXPECT_EQ(body.material.fascia_hz, body.name == "lung" || body.name == "liver" ? 11 : 0) << body.name;
+  const Result simulated = limber_program(
+      {"simulate", file, "--data", models().string(), "--duration", "2s", "-o", out("rest"), "-q"});
+  ASSERT_EQ(simulated.code, exit_done) << simulated.err;
+  const std::string csv = (folder / "rest.csv").string();
+  ASSERT_EQ(limber_program({"verify", out("rest"), "--observables", csv, "-q"}).code, exit_done);
+  std::istringstream lines(read_file(csv));
+  const auto cells = [](const std::string& line) {
+    std::vector<std::string> list;
+    std::istringstream stream(line);
+    for (std::string cell; std::getline(stream, cell, ',');) list.push_back(cell);
+    return list;
+  };
+  std::string head, line, last;
+  std::getline(lines, head);
+  while (std::getline(lines, line)) last = line;
+  std::map<std::string, double> at_the_end;
+  const std::vector<std::string> names = cells(head), values = cells(last);
+  for (std::size_t i = 0; i < names.size(); ++i)
+    if (names[i].ends_with(".away_m")) at_the_end[names[i]] = std::stod(values.at(i));
+  const double omega = 2 * std::numbers::pi * 11, sag_m = 9.81 / (omega * omega);
+  EXPECT_NEAR(at_the_end.at("lung.away_m"), sag_m, 0.02 * sag_m);
+  EXPECT_LT(at_the_end.at("liver.away_m"), 1.05 * sag_m);
+  EXPECT_LT(at_the_end.at("heart.away_m"), 1e-6) << "nobody pushes it";
+  const Result planned = limber_program({"plan", file, "--data", models().string(), "-o", out(), "--json"});
+  EXPECT_EQ(planned.code, exit_done) << planned.err;
 }
 
 TEST_F(NewScene_slow, IsPlannedAsItIs) {

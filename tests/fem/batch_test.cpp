@@ -68,6 +68,7 @@ TEST(Batch, ResultsDoNotDependOnLanesNeighboursOrderOrInstructionSet) {
   WorldSpec spec = testing::barriers();
   spec.bodies[2].material.model = MaterialModel::neo_hookean;
   spec.bodies[0].material.model = MaterialModel::neo_hookean;
+  spec.bodies[2].material.fascia_hz = 3;
   spec.bodies[1].material.mass_damping_per_s = 1, spec.bodies[1].gravity_m_s2 = Vec3(0, 0.3, -0.5);
   const World world = build_world(spec);
   const std::vector<Case> cases = pressed_cases(world, 24);

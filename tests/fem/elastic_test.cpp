@@ -142,6 +142,41 @@ TEST(Elastic, DampingByMassIsExponential) {
   }
 }
 
+// Fascia draws all of a body alike, so its centre of mass is a damped oscillator of its own, whatever it does
+// within: after n steps it is where v += h (−ω² x − 2 ζ ω v − g), x += h v leads. It comes to hang g/ω² below
+// its place, and a held node is not drawn. Soft and rigid.
+TEST(Elastic, FasciaMakesACentreOfMassADampedOscillator) {
+  for (const BodyKind kind : {BodyKind::deformable, BodyKind::rigid})
+    for (const double ratio : {0.05, 1.0}) {
+      BodySpec body = soft(cube({0.4, 0.2, 0.3}, 1, 2));
+      body.kind = kind;
+      body.material.fascia_hz = 2, body.material.fascia_damping_ratio = ratio;
+      body.velocity_m_s = {0.3, -0.1, 0.2}, body.angular_velocity_rad_s = {0, 0, 0.02};
+      WorldSpec spec = alone(body);
+      spec.gravity_m_s2 = {0, 0, -9.81};
+      const World world = build_world(spec);
+      const std::string where = fmt::format("{} cube, damped by {:g} of critical",
+                                            kind == BodyKind::rigid ? "rigid" : "soft", ratio);
+      const Vec3 place = center_of_mass_m(world, rest_state(world), 0);
+      const double omega = 2 * std::numbers::pi * 2, h = world.dt_s;
+      Control coast;
+      coast.steps = int(0.7 / h);
+      Vec3 x = Vec3::Zero(), v = body.velocity_m_s;
+      for (int n = 0; n < coast.steps; ++n) {
+        v += h * (-omega * omega * x - 2 * ratio * omega * v + spec.gravity_m_s2);
+        x += h * v;
+      }
+      const State end = propagate(world, start_state(world), coast).end;
+      prove_at_most(4, "place in fascia, from the oscillator's, m", where,
+                    (center_of_mass_m(world, end, 0) - place - x).norm(), 2e-5);
+      if (ratio < 1) continue;
+      coast.steps = int(4 / h);
+      const double hangs = (place - center_of_mass_m(world, propagate(world, end, coast).end, 0)).z();
+      prove_at_most(4, "how low a body hangs over g/ω², − 1", where,
+                    std::abs(hangs / (9.81 / (omega * omega)) - 1), 1e-3);
+    }
+}
+
 // Half the step, a quarter of the error; and damping ends all motion.
 TEST(Elastic, EnergyErrorsFallWithTheSquareOfTheStep) {
   for (const MaterialModel model : both_models) {

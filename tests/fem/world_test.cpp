@@ -62,6 +62,9 @@ TEST(World, EveryComplaintNamesBodyAndElement) {
               HasSubstr("density_kg_m3"));
   EXPECT_THAT(spoiled([](WorldSpec& s) { s.bodies[0].material.mass_damping_per_s = -1; }),
               HasSubstr("mass_damping_per_s"));
+  EXPECT_THAT(spoiled([](WorldSpec& s) { s.bodies[0].material.fascia_hz = 31; }), HasSubstr("fascia_hz"));
+  EXPECT_THAT(spoiled([&](WorldSpec& s) { s.bodies[0].material.fascia_damping_ratio = nan; }),
+              HasSubstr("fascia_damping_ratio"));
   EXPECT_THAT(spoiled([&](WorldSpec& s) { s.bodies[0].gravity_m_s2 = Vec3(0, nan, 0); }),
               HasSubstr("gravity_m_s2"));
   EXPECT_THAT(spoiled([](WorldSpec& s) { s.bodies[0].material.damping_ratio = 2; }),

@@ -99,6 +99,11 @@ class Meshes(unittest.TestCase):
             self.assertEqual(sorted(event[1] for event in heard), [1, 2, 3])
             body = limber.load_body(many[0].folder)
             self.assertEqual(json.loads(body.report_json())["files"]["cage.msh"], told["files"]["cage.msh"])
+            for model, kept in (("a", True), ("b", False)):
+                rows = {row.name: row.kept for row in limber.verify(many[0].folder, model=path(f"models/{model}.obj"))}
+                self.assertEqual(rows["body: surface is the model's"], kept)
+            with self.assertRaisesRegex(limber.InputError, "one of them"):
+                limber.verify(many[0].folder, scene="barriers1", model=path("models/a.obj"))
             with warnings.catch_warnings():
                 warnings.simplefilter("error")
                 again = limber.prepare_many([path("models/a.obj"), path("models/b.obj")], path("out"), tets=100,

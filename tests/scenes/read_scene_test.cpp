@@ -920,6 +920,7 @@ std::string all_of(const Scene& s) {
     t += fmt::format(" {} {} {}", body.fixed.walls, body.max_stretch.value_or(-1),
                      body.max_contact_load_n.value_or(-1));
     t += v(body.velocity_m_s) + v(body.angular_velocity_rad_s);
+    t += fmt::format(" {} {}", m.fascia_hz, m.fascia_damping_ratio);
     t += fmt::format(" {} {}", m.mass_damping_per_s, v(body.gravity_m_s2.value_or(Vec3::Zero())));
     for (const Box& box : body.fixed.boxes_m) t += b(box);
     for (const PartSpec& part : body.parts)

@@ -222,13 +222,16 @@ bool organ_moves(const NewSceneOptions& options) {
   return options.story == Story::away || options.story == Story::aside;
 }
 
+constexpr const char* no_gravity = "gravity_m_s2 = [0, 0, 0]   # whoever leads it bears its weight\n";
+
 std::string body_text(const Organ& organ, const NewSceneOptions& options, double scale) {
   const bool robot = organ.name == options.robot && organ_moves(options);
   const Vec3 center = organ.box.center() + organ.way_m;
   std::string text = fmt::format("\n[[bodies]]\nname = \"{}\"\nrole = \"{}\"\n", organ.name,
-                                 organ.see_through ? "scenery"
-                                 : robot           ? "robot"
-                                                   : "obstacle");
+                                 organ.see_through                      ? "scenery"
+                                 : robot                                ? "robot"
+                                 : options.fascia_hz > 0 && !organ.bone ? "free"
+                                                                        : "obstacle");
   if (organ.bone && !organ.see_through) text += "kind = \"rigid\"\n";
   text += fmt::format("model = {{ file = \"{}\", scale = {:g}, up = \"{}\", front = \"{}\" }}\n", organ.file,
                       options.scale * (organ.see_through ? 1 : scale), options.up, options.front);
@@ -252,12 +255,15 @@ std::string body_text(const Organ& organ, const NewSceneOptions& options, double
   }
   text += fmt::format("cage = {{ tets = {} }}\n", organ.bone ? bone_tets : options.tets);
   if (organ.bone) return text + "color = \"#e8dfc8\"\nlook = \"bone\"\n";
+  const bool hung = options.fascia_hz > 0 && !robot;
   text += fmt::format(
-      "material = {{ youngs_modulus_pa = {:g}, poisson_ratio = 0.45, density_kg_m3 = {:g}, friction = 0.05 "
+      "material = {{ youngs_modulus_pa = {:g}, poisson_ratio = 0.45, density_kg_m3 = {:g}, friction = 0.05{} "
       "}}\n",
-      usual.youngs_modulus_pa, usual.density_kg_m3);
+      usual.youngs_modulus_pa, usual.density_kg_m3,
+      hung ? fmt::format(", fascia_hz = {:g}", options.fascia_hz) : "");
   text += fmt::format("color = \"{}\"\nlook = \"tissue\"\n", usual.color);
-  if (robot) return text;
+  if (robot && options.fascia_hz > 0) text += no_gravity;
+  if (robot || hung) return text;
   const Vec3 half = 0.5 * scale * organ.box.size();
   const Vec3 lower(center.x() - 2 * half.x(), center.y() - 2 * half.y(), center.z() - 2 * half.z()),
       upper(center.x() - 0.5 * half.x(), center.y() + 2 * half.y(), center.z() + 2 * half.z());
@@ -394,18 +400,19 @@ Instrument instrument_to(const NewSceneOptions& options, const std::vector<Organ
   return best;
 }
 
-std::string body_text(const Instrument& rod) {
+std::string body_text(const Instrument& rod, const NewSceneOptions& options) {
   const Vec3 axis = Vec3::UnitX().cross(rod.outward);
   const double angle_deg = std::atan2(axis.norm(), rod.outward.x()) * 180 / EIGEN_PI;
   return fmt::format(
-      "\n[[bodies]]\nname = \"{}\"\nrole = \"robot\"\nkind = \"rigid\"\n"
-      "model = {{ box = {{ size_m = [{:g}, {:g}, {:g}], bevel_m = {:g} }} }}\n"
-      "pose = {{ position_m = {}, axis = {}, angle_deg = {:.5g} }}\n"
-      "cage = {{ tets = 60 }}\nmaterial = {{ density_kg_m3 = 4000, friction = 0.05 }}\n"
-      "color = \"#aab4bd\"\nroughness = 0.3\nmetallic = 0.6\n",
-      instrument_name, rod.length_m, rod.width_m, rod.width_m, 0.49 * rod.width_m,
-      vector_text(rod.at_start_m), axis.norm() > 1e-9 ? vector_text(axis.normalized()) : "[0, 0, 1]",
-      angle_deg);
+             "\n[[bodies]]\nname = \"{}\"\nrole = \"robot\"\nkind = \"rigid\"\n"
+             "model = {{ box = {{ size_m = [{:g}, {:g}, {:g}], bevel_m = {:g} }} }}\n"
+             "pose = {{ position_m = {}, axis = {}, angle_deg = {:.5g} }}\n"
+             "cage = {{ tets = 60 }}\nmaterial = {{ density_kg_m3 = 4000, friction = 0.05 }}\n"
+             "color = \"#aab4bd\"\nroughness = 0.3\nmetallic = 0.6\n",
+             instrument_name, rod.length_m, rod.width_m, rod.width_m, 0.49 * rod.width_m,
+             vector_text(rod.at_start_m), axis.norm() > 1e-9 ? vector_text(axis.normalized()) : "[0, 0, 1]",
+             angle_deg) +
+         (options.fascia_hz > 0 ? no_gravity : "");
 }
 
 struct Views {
@@ -569,11 +576,11 @@ std::string scene_text(const std::vector<Organ>& organs, const NewSceneOptions& 
       "the\n"
       "# start. Materials are usual ones. Edit what is to be otherwise: docs/scene.md has all keys.\n"
       "name = \"{}\"\ndescription = \"{}\"\n\n[world]\nbounds_m = [{}, "
-      "{}]\ngravity_m_s2 = [0, 0, 0]\n",
+      "{}]\ngravity_m_s2 = [0, 0, {}]\n",
       of_true_size, options.out.stem().string(), description, vector_text(bounds.lower),
-      vector_text(bounds.upper));
+      vector_text(bounds.upper), options.fascia_hz > 0 ? "-9.81" : "0");
   for (const Organ& organ : organs) text += body_text(organ, options, scale);
-  if (rod) text += body_text(*rod);
+  if (rod) text += body_text(*rod, options);
   if (options.story == Story::tour)
     return text + tour_text(organs, robot, scale) + film_text(organs, options, scale, description, 0.1);
 

@@ -23,6 +23,8 @@ struct NewSceneOptions {
   double scale = 0.001;                         // metres a file unit
   double shrink = 1;                            // at most so much of every organ's true size
   int tets = 160;                               // of a soft cage
+  double fascia_hz =
+      0;  // of soft organs but the robot: hung in their places, under gravity; 0: held at their backs
   std::string up = "+z", front = "-y";
   // front, back, left, right, up, down; empty: front, or aside to where least is in the way.
   std::string goal;

@@ -170,6 +170,10 @@ void plots(const Findings& f, Page& page) {
   if (!limits_n.empty())
     plot("What presses a body", "sum of magnitudes (N)",
          curves_of([](const BodyFigures& b) { return b.contact_load_n; }, false), limits_n);
+  auto away = curves_of([](const BodyFigures& b) { return 1000 * b.away_m; }, false);
+  for (std::size_t b = away.size(); b-- > 0;)
+    if (!(f.world.bodies[b].material.fascia_hz > 0)) away.erase(away.begin() + std::ptrdiff_t(b));
+  if (!away.empty()) plot("How far organs in fascia are from their places", "centre of mass (mm)", away);
   if (const auto pairs = curves_of_pairs(f); !pairs.empty())
     plot("Contact, pair by pair", "sum of forces of a pair (N)", pairs);
   plot("Largest strain of a tet", "Green's strain",

@@ -77,6 +77,10 @@ Verified verify(const VerifyOptions& options) {
   if (!scene_is_named && !(options.scene.sets.empty() && options.scene.data.empty()))
     throw InputError("--set and --data are of the scene that --scene names, and none is named");
   if (fs::exists(folder / "plan.npz")) {
+    if (options.model)
+      throw InputError(
+          "--model is of a body's folder; the models of a plan's bodies are its scene's: name that "
+          "with --scene");
     std::optional<TrustedScene> trusted;
     if (scene_is_named)
       trusted = {options.scene.scene,
@@ -114,7 +118,9 @@ Verified verify(const VerifyOptions& options) {
                       "--observables, --film and --scene out",
                       folder.string()));
     Promises table;
-    check_body("body", read_body(folder), folder, std::nullopt, options.remake, table);
+    const PreparedBody body = read_body(folder);
+    if (options.model) check_model("body", body, *options.model, table);
+    check_body("body", body, folder, std::nullopt, options.remake, table);
     return {std::move(table), {}, {}};
   }
   throw InputError(

@@ -41,6 +41,7 @@ Verified verify_plan(const fs::path& folder, const PlanFolder&, const std::vecto
 
 struct VerifyOptions {
   fs::path folder;
+  std::optional<fs::path> model;        // of a body's folder: the one that it must be of
   std::optional<fs::path> observables;  // of a work folder: also a CSV with the figures of every frame
   SceneOptions scene;                   // the one that the plan must be of; none where its `scene` is empty
   bool remake = false;                  // of large bodies shells are made again, too

@@ -377,6 +377,24 @@ void check_origin(const std::string& name, const Origin& origin, bool must_be_he
     table.measured(name + ": colors and images", "their files are not here to be compared with");
 }
 
+void check_model(const std::string& name, const PreparedBody& body, const fs::path& model, Promises& table) {
+  Origin origin;
+  std::string why;
+  try {
+    origin = origin_of_model(body, model);
+  } catch (const InputError& error) {
+    if (!fs::is_regular_file(model)) throw;
+    why = error.what();
+  }
+  const bool same = origin.placed_so && origin.same_surface.value_or(false);
+  if (why.empty())
+    why = origin.same_surface ? "read again from " + model.string()
+                              : model.string() + " holds something else than the body was made from";
+  table.row(name + ": surface is the model's", same, why);
+  if (origin.appearance != Appearing::plain)
+    table.row(name + ": colors and images are the model's", origin.appearance == Appearing::same, "");
+}
+
 void check_goal_cage(GoalCage found, bool must_be_here, Promises& table) {
   if (found == GoalCage::none_asked) return;
   if (found == GoalCage::not_here && !must_be_here)

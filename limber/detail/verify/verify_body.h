@@ -12,6 +12,9 @@ namespace limber::detail {
 void check_body(const std::string& name, const PreparedBody&, const fs::path& folder,
                 const std::optional<TetMesh>& made_cage, bool remake, Promises&);
 
+// By the model that the body must be of, read by the words of its report.
+void check_model(const std::string& name, const PreparedBody&, const fs::path& model, Promises&);
+
 // By the scene: its model, placed as the scene says, and the shape of its goal. Of a file that is not here
 // nothing is promised; where it `must_be_here`, a promise is broken.
 void check_origin(const std::string& name, const Origin&, bool must_be_here, Promises&);

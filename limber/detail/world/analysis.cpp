@@ -21,6 +21,12 @@ std::string between(const fem::World& world, int body, int other, const char* ot
                      other < 0 ? std::string("a wall") : world.bodies[std::size_t(other)].name);
 }
 
+// Of the centre of mass.
+Vec3 place_in_scene(const fem::Body& body) {
+  const Eigen::Map<const Eigen::VectorXd> masses(body.node_mass_kg.data(), body.node_count());
+  return body.cage.positions.transpose() * masses / masses.sum();
+}
+
 FrameFigures measure_frame(const fem::World& world, const State& state) {
   FrameFigures frame;
   frame.time_s = fem::time_s(world, state);
@@ -48,6 +54,8 @@ FrameFigures measure_frame(const fem::World& world, const State& state) {
     body.largest_stretch = *std::max_element(strains.longest.begin(), strains.longest.end());
     body.elastic_energy_j = fem::elastic_energy_j(world, state, b);
     body.kinetic_energy_j = fem::kinetic_energy_j(world, state, b);
+    body.away_m =
+        (fem::center_of_mass_m(world, state, b) - place_in_scene(world.bodies[std::size_t(b)])).norm();
   }
   frame.penetration = fem::deepest_penetration(world, state);
   frame.penetration_between = between(world, frame.penetration.body, frame.penetration.other);
@@ -210,8 +218,9 @@ std::vector<TouchingPair> touching_pairs(const fem::World& world, const MotionFi
 void write_observables(const fs::path& csv, const fem::World& world, const MotionFigures& figures) {
   std::string text = "time_s";
   for (const fem::Body& body : world.bodies)
-    for (const char* what : {"volume_change", "largest_strain", "least_stretch", "largest_stretch",
-                             "elastic_energy_j", "kinetic_energy_j", "contact_force_n", "contact_load_n"})
+    for (const char* what :
+         {"volume_change", "largest_strain", "least_stretch", "largest_stretch", "elastic_energy_j",
+          "kinetic_energy_j", "contact_force_n", "contact_load_n", "away_m"})
       text += fmt::format(",{}.{}", body.name, what);
   text +=
       ",contact_force_n,contact_between,penetration_m,penetration_between,inverted_tets,overlap_m,overlap_"
@@ -224,9 +233,9 @@ void write_observables(const fs::path& csv, const fem::World& world, const Motio
   for (const FrameFigures& frame : figures.frames) {
     text += fmt::format("{}", frame.time_s);
     for (const BodyFigures& b : frame.bodies)
-      text += fmt::format(",{},{},{},{},{},{},{},{}", b.volume_change, b.largest_strain, b.min_stretch,
+      text += fmt::format(",{},{},{},{},{},{},{},{},{}", b.volume_change, b.largest_strain, b.min_stretch,
                           b.largest_stretch, b.elastic_energy_j, b.kinetic_energy_j, b.contact_force_n,
-                          b.contact_load_n);
+                          b.contact_load_n, b.away_m);
     text += fmt::format(",{},{},{},{},{}", frame.contact_force_n, frame.contact_between,
                         frame.penetration.depth_m, frame.penetration_between, frame.inverted_tets);
     const SeenFrame& seen = frame.seen;

@@ -23,6 +23,7 @@ struct BodyFigures {          // of one frame; all 0 for a body that does not mo
   double elastic_energy_j = 0, kinetic_energy_j = 0;
   double contact_force_n = 0;  // of the sum of all contacts and walls on it
   double contact_load_n = 0;   // the sum of their magnitudes (fem::contact_loads_n)
+  double away_m = 0;           // of its centre of mass from where the scene has it
 };
 struct FrameFigures {
   double time_s = 0;

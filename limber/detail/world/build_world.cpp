@@ -252,6 +252,8 @@ fem::BodySpec spec_of_body(const scenes::Scene& scene, const scenes::BodySpec& b
                        .density_kg_m3 = share * body.material.density_kg_m3,
                        .damping_ratio = body.material.damping_ratio,
                        .mass_damping_per_s = body.material.mass_damping_per_s,
+                       .fascia_hz = body.material.fascia_hz,
+                       .fascia_damping_ratio = body.material.fascia_damping_ratio,
                        .friction = body.material.friction,
                        .mesh_independent = body.material.mesh_independent};
   fem_body.fixed_nodes = scenes::fixed_nodes(body, scene.bounds_m, prepared.cage.positions);

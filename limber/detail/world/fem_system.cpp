@@ -67,6 +67,7 @@ std::uint64_t hash_of_world(const fem::World& world) {
       for (const double v : *of_tets) hasher.value(v);
     if (std::isfinite(body.max_contact_load_n)) hasher.text("contact load").value(body.max_contact_load_n);
     if (m.mass_damping_per_s != 0) hasher.text("mass damping").value(m.mass_damping_per_s);
+    if (m.fascia_hz > 0) hasher.text("fascia").value(m.fascia_hz).value(m.fascia_damping_ratio);
     if (body.gravity_m_s2 != gravity_m_s2) hasher.text("gravity").matrix(body.gravity_m_s2);
     for (const bool fixed : body.fixed) hasher.value(int(fixed));
     if (body.shape) hasher.value(limber::hash_of(*body.shape));

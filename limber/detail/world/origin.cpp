@@ -1,5 +1,6 @@
-// Whether bodies, scenery and the goal's shape that lie in a work folder are those of the scene: what limber
-// verify asks. Models are read, or made, and placed again, and the meshes compared.
+// Whether bodies, scenery and the goal's shape that lie in a work folder are those of the scene, and a body
+// by itself that of its model: what limber verify asks. Models are read, or made, and placed again, and the
+// meshes compared.
 //
 // Where the model's file is not here, or holds something else than the body was made from, nothing is said of
 // the surface: that proves nothing either way. What the report says of pose, cage and settings is compared in
@@ -9,6 +10,8 @@
 #include "core/error.h"
 #include "core/hash.h"
 #include "core/mesh_files.h"
+#include "limber/detail/body/model_content.h"
+#include "limber/detail/body/prepare.h"
 #include "limber/detail/world/body_source.h"
 #include "limber/detail/world/scene_world.h"
 #include "scenes/library.h"
@@ -92,6 +95,54 @@ Origin origin_of_scenery(const scenes::Scene& scene, const scenes::BodySpec& bod
   return origin;
 }
 
+namespace {
+
+// The words by which limber prepare was told to read a model.
+PrepareOptions words_of(const Json& identity, const fs::path& file) {
+  PrepareOptions words;
+  words.model = file;
+  identity.at("scale").get_to(words.scale), identity.at("y_up").get_to(words.y_up);
+  if (const auto label = identity.find("label"); label != identity.end()) {
+    label->at("name").get_to(words.label), label->at("gap").get_to(words.label_gap);
+    label->at("rounds").get_to(words.label_rounds), label->at("least_island").get_to(words.min_island);
+  }
+  return words;
+}
+
+void compare(const meshing::ImportedModel& model, const PreparedBody& prepared, Origin& origin) {
+  origin.same_surface = same_surface(model.surface, prepared.surface);
+  if (!model.appearance.empty() || !prepared.appearance.empty())
+    origin.appearance = *origin.same_surface && same_appearance(model.appearance, prepared.appearance)
+                            ? Appearing::same
+                            : Appearing::another;
+}
+
+}  // namespace
+
+Origin origin_of_model(const PreparedBody& prepared, const fs::path& file) {
+  const Json& said = prepared.report.at("input");
+  Origin origin;
+  if (!prepared.appearance.empty()) origin.appearance = Appearing::not_here;
+  const std::string file_hash = content_of_model(file).file_hash;
+  try {
+    const Json& identity = said.at("model");
+    if (identity.contains("model"))
+      throw InputError(
+          fmt::format("{}: the body was made for a scene; name that with --scene, and leave "
+                      "--model out",
+                      file.string()));
+    if (identity.at("file_hash") != file_hash) return origin;
+    const BodySource found = source_of(words_of(identity, file), file);
+    origin.placed_so = found.identity == identity;
+    meshing::ImportedModel model = found.load();
+    make_model_of_body(model, settings_of_input(said));
+    compare(model, prepared, origin);
+  } catch (const Json::exception&) {
+    origin.placed_so = false;
+  }
+  return origin;
+}
+
 // Where the file is not found, the body may have been made from the made model that takes its place: the hash
 // tells.
 Origin origin_of(const scenes::Scene& scene, const scenes::BodySpec& body, const std::vector<fs::path>& data,
@@ -112,11 +163,7 @@ Origin origin_of(const scenes::Scene& scene, const scenes::BodySpec& body, const
     if (file && found.identity.at("model").at("source") != source) return origin;
     meshing::ImportedModel model = found.load();
     make_model_of_body(model, settings_of(body));
-    origin.same_surface = same_surface(model.surface, prepared.surface);
-    if (!model.appearance.empty() || !prepared.appearance.empty())
-      origin.appearance = *origin.same_surface && same_appearance(model.appearance, prepared.appearance)
-                              ? Appearing::same
-                              : Appearing::another;
+    compare(model, prepared, origin);
     origin.made_cage = found.made_cage();
   } catch (const Json::exception&) {
     origin.placed_so = false;

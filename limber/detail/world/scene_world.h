@@ -63,6 +63,10 @@ struct Origin {
 };
 Origin origin_of(const scenes::Scene&, const scenes::BodySpec&, const std::vector<fs::path>& data,
                  const PreparedBody&);
+// The same of a body that limber prepare made by itself, of the model in `file`, read by the words that its
+// report tells (scale, axes, label); placed_so: the file holds what it was made from. Throws InputError when
+// the file cannot be read, or the body was made for a scene.
+Origin origin_of_model(const PreparedBody&, const fs::path& file);
 // The same of scenery. Throws InputError when its files are missing or damaged.
 Origin origin_of_scenery(const scenes::Scene&, const scenes::BodySpec&, const std::vector<fs::path>& data,
                          const fs::path& work_folder);
