@@ -69,8 +69,8 @@ void DescribedCommands::add_scene_commands() {
   new_command
       .add_option(
           "--fascia", new_options.fascia_hz,
-          "gravity, and soft organs hung in their places by what surrounds them, 1 … 30 Hz (11: they sag by "
-          "2 mm); default: no gravity, and organs held at their backs")
+          "gravity, and soft organs hung in their places by what surrounds them, 1 … 30 Hz (12: they sag by "
+          "1.7 mm); default: no gravity, and organs held at their backs")
       ->check(within(1.0, 30.0))
       ->type_name("HZ");
   new_command
