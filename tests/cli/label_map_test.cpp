@@ -88,8 +88,9 @@ TEST_F(Program_slow, ABodyOfAScanIsOfItsLabel) {
     SCOPED_TRACE(scan);
     const auto prepare = [&](const std::string& label, const std::string& to) {
       fs::remove_all(to);
-      ASSERT_EQ(limber_program({"prepare", scan, "--label", label, "-o", to, "--tets", "100"}).code,
-                exit_done);
+      ASSERT_EQ(
+          limber_program({"prepare", scan, "--label", label, "-o", to, "--tets", "60", "--shells", "2"}).code,
+          exit_done);
     };
     prepare("5", out("five")), prepare("17", out("seventeen"));
     const auto verified = [&](const std::string& body, const std::string& model) {

@@ -23,7 +23,10 @@ namespace limber::detail {
 
 namespace {
 
-constexpr const char* remedy = "submit anew with limber farm submit SCENE -o DIR";
+constexpr const char* remedy =
+    "submit anew what was submitted: limber farm submit SCENE, limber farm bench SCENE… or limber farm "
+    "prepare "
+    "MODEL…, with -o DIR";
 
 template <class T>
 Json or_null(const std::optional<T>& value) {
@@ -301,7 +304,7 @@ FarmSpec read_spec(const fs::path& work) {
   if (!fs::exists(file))
     throw InputError(
         fmt::format("{}: there is no such file; nothing was submitted in {}; limber farm submit "
-                    "SCENE -o {}",
+                    "SCENE -o {} does (or limber farm bench, limber farm prepare)",
                     file.string(), work.string(), work.string()));
   FarmSpec spec = spec_from(read_json(file), file);
   spec.options.plan.out = spec.options.film.folder = work;
