@@ -29,9 +29,9 @@ std::string text_of(const detail::RenderedFilm& film) {
   else if (film.failed == 0)
     text += "no film yet: not all frames are there\n";
   if (film.others > 0)
-    text += fmt::format(
-        "{} frames there are of another film; these options' take their places when all is rendered\n",
-        film.others);
+    text +=
+        fmt::format("{} of the frames that are there show it by other options than these; render all anew\n",
+                    film.others);
   if (film.old_film)
     text += fmt::format("{} is of an earlier render, and not of these frames\n", film.old_film->string());
   return text;

@@ -220,15 +220,17 @@ void draw_color_bar(Image8& image, const ColorBar& bar) {
     room = std::max(room, text_width(ticks.back().second, letter));
   }
   const double left = image.width - margin - room - 1.2 * letter - wide;
+  const detail::TextLook words = on_picture(letter, Weight::regular, bar.on_dark);
   for (double y = top; y < bottom; ++y)
     fill(image, left, y, left + wide, y + 1, bar.color_srgb((bottom - y - 0.5) / (bottom - top)));
   for (const auto& [value, label] : ticks) {
     const double y = bottom - (value - bar.low) / (bar.high - bar.low) * (bottom - top);
-    fill(image, left + wide, y - 0.06 * letter, left + wide + 0.5 * letter, y + 0.06 * letter + 1, ink);
-    write(image, label, left + wide + 1.0 * letter, y + 0.5 * letter, letter);
+    fill(image, left + wide, y - 0.06 * letter, left + wide + 0.5 * letter, y + 0.06 * letter + 1,
+         bar.on_dark ? white : ink);
+    detail::draw_text(image, label, left + wide + 1.0 * letter, y + 0.5 * letter, words);
   }
   const double width = text_width(bar.label, letter);
-  write(image, bar.label, image.width - margin - width, top - 1.6 * letter, letter);
+  detail::draw_text(image, bar.label, image.width - margin - width, top - 1.6 * letter, words);
 }
 
 std::vector<int> histogram_counts(const std::vector<double>& values, double low, double high, int bars) {

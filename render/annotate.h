@@ -52,6 +52,7 @@ struct ColorBar {
   std::string label;
   double low = 0, high = 1;
   std::function<Vec3(double)> color_srgb;
+  bool on_dark = false;  // the picture, so that words are light
 };
 void draw_color_bar(Image8&, const ColorBar&);
 

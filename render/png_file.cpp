@@ -264,14 +264,29 @@ std::string pixel_hash(const Raster8& image) {
 std::string pixel_hash(const Raster16& image) {
   return pixel_hash_of(image.width, image.height, image.channels, image.levels);
 }
-std::string pixel_hash(const fs::path& path) {
-  const Raster16 image = read_png_16(path);
+namespace {
+
+// `use` gets the image with as many bits a channel as the file has.
+auto with_image_of(const fs::path& path, const auto& use) {
+  Texts texts;
+  const Raster16 image = read_png_16(path, &texts);
   constexpr int bits_at = 24;  // in the file: of a channel
-  if (read_file(path)[bits_at] == 16) return pixel_hash(image);
+  if (read_file(path)[bits_at] == 16) return use(image, texts);
   Raster8 bytes{image.width, image.height, image.channels, std::vector<std::uint8_t>(image.levels.size())};
   std::transform(image.levels.begin(), image.levels.end(), bytes.levels.begin(),
                  [](std::uint16_t level) { return std::uint8_t(level / 257); });
-  return pixel_hash(bytes);
+  return use(bytes, texts);
+}
+
+}  // namespace
+
+std::string pixel_hash(const fs::path& path) {
+  return with_image_of(path, [](const auto& image, const Texts&) { return pixel_hash(image); });
+}
+bool is_as_written(const fs::path& path) {
+  return with_image_of(path, [&](const auto& image, const Texts& texts) {
+    return png_bytes(image, texts) == read_file(path);
+  });
 }
 
 Image8 rgb_of_png(const std::string& file, const std::string& name) {

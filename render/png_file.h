@@ -48,6 +48,9 @@ std::string pixel_hash(const Image8&);
 std::string pixel_hash(const Raster8&);
 std::string pixel_hash(const Raster16&);
 std::string pixel_hash(const fs::path&);
+// The file is, byte for byte, what write_png makes of its pixels and texts (another zlib may make others).
+// Throws as read_png.
+bool is_as_written(const fs::path&);
 
 // What the frame shows, as text "limber-hash" says: how a resumed run knows a good frame. nullopt also when
 // it does not say.

@@ -6,6 +6,7 @@
 #include <set>
 #include <sstream>
 
+#include "limber/detail/film/render.h"
 #include "limber/detail/plan/plan_folder.h"
 #include "render/camera.h"
 #include "render/png_file.h"
@@ -222,6 +223,15 @@ TEST_F(Filmed_slow, EveryFalseWordOfAFilmIsNamed) {
   const Result good = limber_program({"verify", out(), "--film"});
   ASSERT_EQ(good.code, exit_done) << good.out;
   EXPECT_THAT(good.out, HasSubstr("film-deep: frames that are painted again have the same pixels"));
+  // A film of another kind, made later, does not make the first a false one.
+  ASSERT_EQ(
+      limber_program({"render", out(), "--size", "64x48", "--resume", "--video", out() + "/film.webm"}).code,
+      exit_done);
+  const Result both = limber_program({"verify", out(), "--film"});
+  EXPECT_EQ(both.code, exit_done) << both.out;
+  EXPECT_THAT(both.out, HasSubstr("film.mp4"));
+  fs::remove(fs::path(out()) / "film.webm");
+  ASSERT_EQ(limber_program({"render", out(), "--size", "64x48"}).code, exit_done);
 
   const fs::path work = out(), keep = out("keep");
   fs::copy(work, keep, fs::copy_options::recursive);
@@ -273,8 +283,9 @@ TEST_F(Filmed_slow, EveryFalseWordOfAFilmIsNamed) {
   named("no pass", says, [&] { fs::remove(work / "frames-deep" / "0001.depth.png"); });
   // Another's pixels under the hash of what should be seen, and of what is.
   const auto texts = [](const fs::path& file, const auto& picture) {
-    return render::Texts{{"limber-hash", *render::frame_hash(file)},
-                         {"limber-pixels", render::pixel_hash(picture)}};
+    return render::Texts{
+        {"limber-hash", *render::frame_hash(file)},
+        {"limber-pixels", hash_of_shown(*render::frame_hash(file), render::pixel_hash(picture))}};
   };
   named("the last frame's pixels", pixels, [&] {
     const fs::path last = work / "frames" / number(frames - 1);
@@ -328,6 +339,18 @@ TEST_F(Filmed_slow, EveryFalseWordOfAFilmIsNamed) {
     more["Software"] = "another";
     render::write_png(second, picture, more);
   });
+  named("another frame's pixels and their hash", files, [&] {
+    const fs::path first = work / "frames" / number(0), second = work / "frames" / number(1);
+    render::Texts kept = texts(first, render::read_png(first));
+    kept.at("limber-hash") = *render::frame_hash(second);
+    render::write_png(second, render::read_png(first), kept);
+  });
+  named("words behind the end", files, [&] {
+    const fs::path second = work / "frames" / number(1);
+    write_file(second, read_file(second) + "hello");
+  });
+  named("a picture of another ending", "no other pictures",
+        [&] { fs::copy_file(work / "frames" / number(1), work / "frames" / "0001.PNG"); });
   named("a frame beyond the last", "no other pictures",
         [&] { fs::copy_file(work / "frames" / number(1), work / "frames" / "0500.png"); });
   named("a pass of nobody", "no other pictures",
@@ -341,6 +364,7 @@ TEST_F(Filmed_slow, EveryFalseWordOfAFilmIsNamed) {
         [&] { fs::copy(work / "frames", work / "frames-near", fs::copy_options::recursive); });
   named("no film", film, [&] { fs::remove(work / "film.mp4"); });
   named("another film", film, [&] { fs::resize_file(work / "film.mp4", 100); });
+  named("another film of its name", film, [&] { write_file(work / "film.gif", "GIF89a;"); });
   named("another film here, and the good one elsewhere", film, [&] {
     Json manifest = read_json(work / "manifest.json");
     manifest.at("render")["film"] = (keep / "film.mp4").string();
@@ -372,6 +396,10 @@ TEST_F(Filmed_slow, EveryFalseWordOfAFilmIsNamed) {
   Json manifest = read_json(work / "manifest.json");
   manifest.erase("render"), manifest.erase("render-deep");
   write_json(work / "manifest.json", manifest);
+  const Result untold = limber_program({"verify", out(), "--film"});
+  EXPECT_EQ(untold.code, 1);
+  EXPECT_THAT(untold.out, HasSubstr("manifest.json tells of no film"));
+  for (const char* made : {"film.mp4", "sheet.png", "frames", "frames-deep"}) fs::remove_all(work / made);
   const Result none = limber_program({"verify", out(), "--film"});
   EXPECT_EQ(none.code, exit_bad_input);
   EXPECT_THAT(none.err, HasSubstr("limber render"));

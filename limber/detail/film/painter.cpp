@@ -177,6 +177,8 @@ struct Shot::Painter::View {
     const PreparedBody& prepared = shot.bodies_[b];
     const Triangles& hull = shot.world_.bodies[b].surface;
     render::MeshLook look = look_of(shot.scene_.bodies[b], size_of(prepared.surface));
+    // Light through a body has a colour of its own, which would be read as a number.
+    if (shot.scene_.film.color_by != scenes::ColorBy::body) look.translucency = 0;
     look.casts_shadow = !has_caster(b);
     if (cages) look.crease_angle_deg = 0, look.grain = 0;
     const SurfaceMesh& fine = prepared.surface;
@@ -375,12 +377,13 @@ Shot::Painter::~Painter() = default;
 render::Image8 Shot::Painter::annotated(render::Image8 image, int frame) const {
   const scenes::FilmSpec& film = shot_.scene_.film;
   if (film.color_by != scenes::ColorBy::body)
-    render::draw_color_bar(
-        image, {.label = caption_of(film.color_by),
-                .low = shot_.low_,
-                .high = shot_.high_,
-                .color_srgb = film.color_by == scenes::ColorBy::volume ? render::diverging_srgb
-                                                                       : render::sequential_srgb});
+    render::draw_color_bar(image,
+                           {.label = caption_of(film.color_by),
+                            .low = shot_.low_,
+                            .high = shot_.high_,
+                            .color_srgb = film.color_by == scenes::ColorBy::volume ? render::diverging_srgb
+                                                                                   : render::sequential_srgb,
+                            .on_dark = shot_.words_.on_dark});
   for (const Name& name : shot_.names_at(frame))
     render::draw_label(image, name.words, name.place, name.end, shot_.letter_px_, shot_.words_.on_dark,
                        name.share);

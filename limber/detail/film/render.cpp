@@ -30,8 +30,9 @@ void write(const Picture& picture, const FrameFiles& files, int frame, const std
   const auto put = [&](const std::string& pass, const auto& any) {
     std::visit(
         [&](const auto& image) {
-          render::write_png(files.of(frame, pass), image,
-                            {{hash_of_frame, hash}, {hash_of_pixels, render::pixel_hash(image)}});
+          render::write_png(
+              files.of(frame, pass), image,
+              {{hash_of_frame, hash}, {hash_of_pixels, hash_of_shown(hash, render::pixel_hash(image))}});
         },
         any);
   };
@@ -87,6 +88,10 @@ Filming::Filming(const RenderOptions& options)
   size_px = options.size.empty() ? std::pair(film.width_px, film.height_px) : parse_size(options.size);
   shot.emplace(planned.scene, options.camera, planned.plan, of_plan.world, of_plan.bodies, scenery, size_px,
                output);
+}
+
+std::string hash_of_shown(const std::string& frame_hash, const std::string& pixel_hash) {
+  return content_hash(frame_hash + " " + pixel_hash);
 }
 
 bool Filming::is_good(int frame) const {

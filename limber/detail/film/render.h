@@ -48,8 +48,9 @@ struct FrameFiles {
   }
 };
 
-// The texts of a frame's PNG, and of its passes': the hash of what it shows, and that of its pixels.
+// The texts of a frame's PNG, and of its passes': the hash of what it shows, and one of that and its pixels.
 inline constexpr const char *hash_of_frame = "limber-hash", *hash_of_pixels = "limber-pixels";
+std::string hash_of_shown(const std::string& frame_hash, const std::string& pixel_hash);
 
 // What a film is made of: a folder's plan under the scene that it is filmed as, and the shot of it.
 struct Filming {

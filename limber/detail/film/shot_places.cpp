@@ -49,6 +49,10 @@ bool holds(const std::vector<Eigen::Vector2d>& hull, const Eigen::Vector2d& p) {
   return hull.size() > 2;
 }
 
+bool overlap(const Eigen::Vector4d& a, const Eigen::Vector4d& b) {
+  return a[0] < b[2] && b[0] < a[2] && a[1] < b[3] && b[1] < a[3];
+}
+
 // 1, 2 or 5 times a power of ten, at most this.
 double round_length_m(double most_m) {
   const double power = std::pow(10.0, std::floor(std::log10(most_m)));
@@ -125,8 +129,12 @@ void Shot::place_words() {
   for (std::size_t c = 0; c < boxes.size(); ++c)
     boxes[c] = render::place_of_caption(width, look_.height, film.caption, clock, render::corners[c]);
   std::array<int, 4> hidden = hidden_by(boxes);
-  for (std::size_t c = 0; c < hidden.size(); ++c)
-    if (inset_ && render::corners[c] == inset_corner_) hidden[c] = std::numeric_limits<int>::max();
+  if (inset_) {
+    const Eigen::Vector4d inset = place_of_inset(inset_corner_);
+    for (std::size_t c = 0; c < hidden.size(); ++c)
+      if (render::corners[c] == inset_corner_ || overlap(boxes[c], inset))
+        hidden[c] = std::numeric_limits<int>::max();
+  }
   words_.corner =
       render::corners[std::size_t(std::min_element(hidden.begin(), hidden.end()) - hidden.begin())];
 }

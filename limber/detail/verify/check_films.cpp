@@ -68,7 +68,13 @@ std::string odd_in(const fs::path& file) {
       return fmt::format("has a text \"{}\" that limber does not write", key);
   if (!info->texts.contains(hash_of_pixels))
     return "does not say what its pixels are; an older limber's did not: render it again";
-  return info->texts.at(hash_of_pixels) == render::pixel_hash(file) ? "" : "has other pixels than it says";
+  if (!info->texts.contains(hash_of_frame) ||
+      info->texts.at(hash_of_pixels) !=
+          hash_of_shown(info->texts.at(hash_of_frame), render::pixel_hash(file)))
+    return "has other pixels than it says";
+  return render::is_as_written(file)
+             ? ""
+             : "has other bytes than limber writes for these pixels (another zlib may write others)";
 }
 
 // The first file of these frames that is not as it was written, and what is odd in it; empty: none.
@@ -103,8 +109,16 @@ std::vector<int> picked(const Filming& filming, const std::vector<int>& frames, 
   return picks;
 }
 
-// A picture in the folder of frames that is named like none of this film; empty: none. Passes that an earlier
-// render made of the same frames may lie there.
+bool is_picture(const fs::path& file) {
+  std::string ending = file.extension().string();
+  for (char& c : ending) c = char(std::tolower(static_cast<unsigned char>(c)));
+  static const std::set<std::string> endings{".png", ".jpg", ".jpeg", ".webp", ".gif",
+                                             ".bmp", ".tif", ".tiff", ".exr"};
+  return endings.contains(ending);
+}
+
+// A picture or folder in the folder of frames that is named like none of this film; empty: none. Passes that
+// an earlier render made of the same frames may lie there.
 std::string stray_frame(const Filming& filming) {
   std::set<std::string> names, here;
   for (int f = 0; f < filming.shot->frames(); ++f) {
@@ -116,7 +130,8 @@ std::string stray_frame(const Filming& filming) {
         names.insert(file.filename().string());
   }
   for (const auto& entry : fs::directory_iterator(filming.files.folder))
-    if (entry.path().extension() == ".png" && !names.contains(entry.path().filename().string()))
+    if ((entry.is_directory() || is_picture(entry.path())) &&
+        !names.contains(entry.path().filename().string()))
       here.insert(entry.path().string());
   return here.empty() ? "" : *here.begin();
 }
@@ -142,6 +157,27 @@ fs::path found(const fs::path& folder, const Json& entry, const char* key) {
   return told.parent_path() == frames.parent_path() || fs::exists(here) ? here : told;
 }
 
+constexpr std::string_view stage = "render";
+constexpr const char* film_endings[] = {".mp4", ".webm", ".gif"};
+
+// The film that is told of, and those of other endings that lie beside it: an earlier --video made them.
+std::vector<fs::path> same_named(const fs::path& folder, const std::string& suffix, const fs::path& told) {
+  std::vector<fs::path> films{told};
+  for (const char* ending : film_endings)
+    if (const fs::path film = folder / ("film" + suffix + ending);
+        fs::exists(film) && film.filename() != told.filename())
+      films.push_back(film);
+  return films;
+}
+
+fs::path first_bad_file(const Filming& filming, int frame) {
+  for (const std::string& pass : filming.output.passes)
+    if (render::frame_hash(filming.files.of(frame)) == filming.shot->hash_of(frame) &&
+        render::frame_hash(filming.files.of(frame, pass)) != filming.shot->hash_of(frame))
+      return filming.files.of(frame, pass);
+  return filming.files.of(frame);
+}
+
 void check_film(const fs::path& folder, const std::string& suffix, const Json& entry, int repaint,
                 Promises& table) {
   const RenderOptions options = options_of(folder, suffix, entry);
@@ -161,10 +197,10 @@ void check_film(const fs::path& folder, const std::string& suffix, const Json& e
       bad.push_back(f);
   }
   table.row(name + "each frame says that it shows what it should", bad.empty() && !good.empty(),
-            good.empty() ? fmt::format("no frame is there, of {}", count)
-            : bad.empty()
-                ? fmt::format("{} of {} frames", good.size(), count)
-                : fmt::format("{} do not; the first is {}", bad.size(), filming.files.of(bad[0]).string()));
+            good.empty()  ? fmt::format("no frame is there, of {}", count)
+            : bad.empty() ? fmt::format("{} of {} frames", good.size(), count)
+                          : fmt::format("{} do not; the first is {}", bad.size(),
+                                        first_bad_file(filming, bad[0]).string()));
   if (!bad.empty() || good.empty()) return;
 
   const std::string odd = first_odd(filming, good);
@@ -194,13 +230,15 @@ void check_film(const fs::path& folder, const std::string& suffix, const Json& e
                           : other + " has others (another OSMesa may paint otherwise)");
   if (!is_whole) return;
 
-  const fs::path film = found(folder, entry, "film");
-  const fs::path again = scratch.path() / ("again" + film.extension().string());
-  render::make_film(filming.paths(), filming.planned.scene.film.frames_per_second, again);
-  const bool film_is = fs::exists(film) && read_file(film) == read_file(again);
-  table.row(
-      name + "made again from its frames: the same bytes", film_is,
-      film_is ? film.string() : film.string() + " has others, or is not there (another ffmpeg makes others)");
+  const fs::path told = found(folder, entry, "film");
+  for (const fs::path& film : same_named(folder, suffix, told)) {
+    const fs::path again = scratch.path() / ("again" + film.extension().string());
+    render::make_film(filming.paths(), filming.planned.scene.film.frames_per_second, again);
+    const bool film_is = fs::exists(film) && read_file(film) == read_file(again);
+    table.row(name + "made again from its frames: the same bytes", film_is,
+              film_is ? film.string()
+                      : film.string() + " has others, or is not there (another ffmpeg makes others)");
+  }
   const fs::path sheet = found(folder, entry, "sheet");
   const bool sheet_is = fs::exists(sheet) && render::read_png(sheet) == filming.sheet();
   table.row(name + "contact sheet made again from its frames: the same pixels", sheet_is, sheet.string());
@@ -213,12 +251,16 @@ std::string film_of_nobody(const fs::path& folder, const Json& manifest) {
     for (const char* file : {"film", "sheet", "folder"})
       if (entry.is_object() && entry.contains(file) && entry.at(file).is_string())
         told.insert(fs::path(entry.at(file).get<std::string>()).filename().string());
+  for (const auto& [key, entry] : manifest.items())  // same_named has looked at these
+    if (key.starts_with(stage) && entry.is_object() && entry.contains("film"))
+      for (const char* ending : film_endings) told.insert("film" + key.substr(stage.size()) + ending);
   for (const auto& entry : fs::directory_iterator(folder)) {
     const std::string stem = entry.path().stem().string(), ending = entry.path().extension().string();
     const auto is_called = [&](const char* name) {
       return stem == name || stem.starts_with(std::string(name) + "-");
     };
-    const bool moves = ending == ".mp4" || ending == ".webm" || ending == ".gif";
+    const bool moves =
+        std::find(std::begin(film_endings), std::end(film_endings), ending) != std::end(film_endings);
     if ((moves && is_called("film")) || (ending == ".png" && is_called("sheet")) ||
         (entry.is_directory() && is_called("frames")))
       here.insert(entry.path().filename().string());
@@ -231,7 +273,6 @@ std::string film_of_nobody(const fs::path& folder, const Json& manifest) {
 }  // namespace
 
 void check_films(const fs::path& folder, int repaint, Promises& table) {
-  constexpr std::string_view stage = "render";
   const Json manifest = read_manifest(folder);
   int films = 0;
   for (const auto& [key, entry] : manifest.items()) {
@@ -250,7 +291,10 @@ void check_films(const fs::path& folder, int repaint, Promises& table) {
   if (const std::string odd = film_of_nobody(folder, manifest); films > 0 && !odd.empty())
     table.row("films: manifest.json tells of each", false,
               odd + " is of no film that limber made here and tells of; render it to its end, or remove it");
-  if (films == 0)
+  if (films == 0 && !film_of_nobody(folder, manifest).empty())
+    table.row("films: manifest.json tells of each", false,
+              film_of_nobody(folder, manifest) + " is here, and manifest.json tells of no film");
+  else if (films == 0)
     throw InputError(
         fmt::format("{}: manifest.json tells of no film; make one with limber render", folder.string()));
 }
