@@ -24,8 +24,13 @@ std::string text_of(const detail::RenderedFilm& film) {
                                  film.wanted, film.frames, film.folder.string(), film.painted,
                                  film.wanted - film.painted - film.failed, film.failed, film.cpu_s) +
                      text_of(film.time);
+  const auto [width, height] = film.size_px;
   if (film.film)
-    text += fmt::format("film {}, contact sheet {}\n", film.film->string(), film.sheet->string());
+    text += fmt::format("film {}{}, contact sheet {}\n", film.film->string(),
+                        width % 2 + height % 2 == 0 ? ""
+                                                    : fmt::format(" ({}x{}: films have even sides)",
+                                                                  width + width % 2, height + height % 2),
+                        film.sheet->string());
   else if (film.failed == 0)
     text += "no film yet: not all frames are there\n";
   if (film.others > 0)

@@ -39,18 +39,19 @@ function(limber_module NAME)
   endforeach()
 endfunction()
 
-# limber_tests(NAME [LONG] SOURCES … USES module …): the executable NAME_tests; one ctest a TEST, labelled NAME, or NAME_slow
+# limber_tests(NAME [LONG] [WHOLE] SOURCES … USES module …): the executable NAME_tests; one ctest a TEST, labelled NAME, or NAME_slow
 # where the TEST's suite ends in _slow. What is labelled _slow stays out of the sanitizer runs, and is
 # not built for them either where the whole executable is slow. The slow ones of what is LONG are labelled NAME_slow_long:
-# tools/test leaves them to `tools/test long`.
+# tools/test leaves them to `tools/test long`. WHOLE: of whole commands, minutes under sanitizers, so the quick
+# ones are labelled _slow, too.
 function(limber_tests NAME)
-  cmake_parse_arguments(T "LONG" "" "SOURCES;USES" ${ARGN})
+  cmake_parse_arguments(T "LONG;WHOLE" "" "SOURCES;USES" ${ARGN})
   add_executable(${NAME}_tests ${T_SOURCES})
   foreach(module ${T_USES})
     target_link_libraries(${NAME}_tests PRIVATE limber_${module})
   endforeach()
   target_link_libraries(${NAME}_tests PRIVATE limber_places GTest::gtest_main GTest::gmock)
-  if(LIMBER_SANITIZE AND NAME MATCHES "_slow$")
+  if(LIMBER_SANITIZE AND (T_WHOLE OR NAME MATCHES "_slow$"))
     set_target_properties(${NAME}_tests PROPERTIES EXCLUDE_FROM_ALL ON)
     return()
   endif()
@@ -67,6 +68,8 @@ function(limber_tests NAME)
     if(T_LONG AND label MATCHES "_slow$")
       string(APPEND label "_long")
       set(timeout_s 1800)
+    elseif(T_WHOLE AND NOT label MATCHES "_slow$")
+      string(APPEND label "_slow")
     endif()
     gtest_discover_tests(${NAME}_tests TEST_PREFIX ${NAME}. TEST_FILTER "${filter}" DISCOVERY_TIMEOUT 60
                          PROPERTIES LABELS ${label} TIMEOUT ${timeout_s} ${environment})

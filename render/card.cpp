@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <sstream>
 
 #include "core/error.h"
 #include "render/detail/lettering.h"
@@ -40,25 +41,71 @@ void blurred(Image8& image) {
   }
 }
 
+struct Row {
+  std::string text;
+  double height_px, above_px;  // of a capital; from the row before
+  detail::Weight weight;
+};
+
+// At spaces, as soon as a word more would be wider.
+std::vector<std::string> broken(const std::string& line, const Row& look, double room_px) {
+  std::vector<std::string> rows;
+  std::istringstream words(line);
+  for (std::string word; words >> word;) {
+    const std::string longer = rows.empty() ? word : rows.back() + " " + word;
+    if (!rows.empty() && detail::text_width(longer, look.height_px, look.weight) <= room_px)
+      rows.back() = longer;
+    else
+      rows.push_back(word);
+  }
+  return rows;
+}
+
+// In as few rows as fit, of much the same width.
+std::vector<std::string> evenly_broken(const std::string& line, const Row& look, double room_px) {
+  if (detail::text_width(line, look.height_px, look.weight) <= room_px) return {line};
+  std::vector<std::string> rows = broken(line, look, room_px);
+  for (double narrower = 0.98 * room_px; narrower > 0.4 * room_px; narrower -= 0.02 * room_px) {
+    std::vector<std::string> closer = broken(line, look, narrower);
+    if (closer.size() > rows.size()) break;
+    rows = std::move(closer);
+  }
+  return rows;
+}
+
+// A long line becomes rows; a word that is wider than the room, and rows that are more than it is high, are
+// written smaller.
 void write_in_the_middle(Image8& image, const std::vector<std::string>& lines, bool on_dark) {
   using detail::text_width, detail::Weight;
   const double room = 0.84 * image.width, first = image.height / 18.0, other = image.height / 34.0;
-  const auto weight = [](std::size_t i) { return i == 0 ? Weight::semibold : Weight::regular; };
-  std::vector<double> heights;
+  std::vector<Row> rows;
   double total = 0;
   for (std::size_t i = 0; i < lines.size(); ++i) {
-    const double wanted = i == 0 ? first : other;
-    heights.push_back(wanted * std::min(1.0, room / std::max(1.0, text_width(lines[i], wanted, weight(i)))));
-    total += heights[i] + (i == 0 ? 0 : i == 1 ? 1.5 * other : 1.1 * other);
+    Row row{"", i == 0 ? first : other,
+            (i == 0   ? 0
+             : i == 1 ? 1.5
+                      : 1.1) *
+                other,
+            i == 0 ? Weight::semibold : Weight::regular};
+    for (std::string& text : evenly_broken(lines[i], row, room)) {
+      row.text = std::move(text);
+      const double width = text_width(row.text, row.height_px, row.weight);
+      rows.push_back(row);
+      rows.back().height_px *= std::min(1.0, room / std::max(1.0, width));
+      total += rows.back().height_px + row.above_px;
+      row.above_px = 0.7 * row.height_px;
+    }
   }
-  double baseline = 0.5 * (image.height - total);
-  for (std::size_t i = 0; i < lines.size(); ++i) {
-    baseline += heights[i] + (i == 0 ? 0 : i == 1 ? 1.5 * other : 1.1 * other);
-    detail::draw_text(image, lines[i], 0.5 * (image.width - text_width(lines[i], heights[i], weight(i))),
+  const double shrink = std::min(1.0, 0.84 * image.height / total);
+  double baseline = 0.5 * (image.height - shrink * total);
+  for (const Row& row : rows) {
+    const double height = shrink * row.height_px;
+    baseline += height + shrink * row.above_px;
+    detail::draw_text(image, row.text, 0.5 * (image.width - text_width(row.text, height, row.weight)),
                       baseline,
-                      {.height_px = heights[i],
+                      {.height_px = height,
                        .color_srgb = on_dark ? Vec3(0.97, 0.97, 0.96) : Vec3(0.16, 0.17, 0.20),
-                       .weight = weight(i)});
+                       .weight = row.weight});
   }
 }
 

@@ -151,7 +151,7 @@ void require_film_possible(double frames_per_second, const fs::path& film) {
     throw InputError(fmt::format("{}: a GIF shows at most 50 frames a second, not {}; choose .mp4 or .webm",
                                  film.string(), frames_per_second));
   if (const fs::path folder = film.parent_path(); !folder.empty() && !fs::is_directory(folder))
-    throw DiskError(fmt::format("{}: there is no folder {}; make it first", film.string(), folder.string()));
+    throw InputError(fmt::format("{}: there is no folder {}; make it first", film.string(), folder.string()));
   if (!is_in_path("ffmpeg"))
     throw InputError(
         fmt::format("{}: films are made by ffmpeg, and there is none in PATH; install it, or add it to PATH",

@@ -30,10 +30,6 @@ bool cross(const Vec2& a, const Vec2& b, const Vec2& c, const Vec2& d) {
   return (side_of(a, b, c) > 0) != (side_of(a, b, d) > 0) && (side_of(c, d, a) > 0) != (side_of(c, d, b) > 0);
 }
 
-bool overlap(const Eigen::Vector4d& a, const Eigen::Vector4d& b) {
-  return a[0] < b[2] && b[0] < a[2] && a[1] < b[3] && b[1] < a[3];
-}
-
 // Liang and Barsky.
 bool passes(const Vec2& from, const Vec2& to, const Eigen::Vector4d& box) {
   double first = 0, last = 1;
@@ -56,6 +52,10 @@ struct Slot {
 };
 
 }  // namespace
+
+bool overlap(const Eigen::Vector4d& a, const Eigen::Vector4d& b) {
+  return a[0] < b[2] && b[0] < a[2] && a[1] < b[3] && b[1] < a[3];
+}
 
 bool runs_through(const LabelPlace& label, const Vec2& end, const Eigen::Vector4d& box) {
   return passes(label.foot, end, box);

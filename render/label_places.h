@@ -35,6 +35,9 @@ struct LabelPlace {
 // seldom, as a search of changes one by one finds. Same input, same places.
 std::vector<std::optional<LabelPlace>> place_labels(const std::vector<WantedLabel>&, const LabelRoom&);
 
+// Of two boxes (left, top, right, bottom).
+bool overlap(const Eigen::Vector4d&, const Eigen::Vector4d&);
+
 // Whether the label's line, to this end, runs through a box.
 bool runs_through(const LabelPlace&, const Eigen::Vector2d& end, const Eigen::Vector4d& box);
 

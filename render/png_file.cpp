@@ -148,7 +148,7 @@ std::uint32_t big_endian(const char* p) {
 std::optional<PngInfo> inspect(std::string_view file) {
   constexpr std::string_view signature = "\x89PNG\r\n\x1a\n";
   if (!file.starts_with(signature)) return std::nullopt;
-  PngInfo info{0, 0, {}, {}};
+  PngInfo info{0, 0, {}};
   bool has_pixels = false;
   for (std::size_t at = signature.size(); file.size() - at >= 12;) {
     const std::size_t length = big_endian(&file[at]);
@@ -156,7 +156,6 @@ std::optional<PngInfo> inspect(std::string_view file) {
     const std::string_view type = file.substr(at + 4, 4), data = file.substr(at + 8, length);
     const auto checksum = crc32(0, reinterpret_cast<const Bytef*>(type.data()), uInt(length + 4));
     if (checksum != big_endian(&file[at + 8 + length])) return std::nullopt;
-    info.chunks.emplace(type);
     if (type == "IHDR") {
       if (length != 13 || at != signature.size()) return std::nullopt;  // one, and it comes first
       info.width = int(big_endian(data.data())), info.height = int(big_endian(data.data() + 4));

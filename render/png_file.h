@@ -3,7 +3,6 @@
 
 #include <map>
 #include <optional>
-#include <set>
 #include <string>
 #include <string_view>
 
@@ -36,7 +35,6 @@ Image8 rgb_of_png(const std::string& file, const std::string& name);
 struct PngInfo {
   int width, height;
   Texts texts;
-  std::set<std::string> chunks;  // their four letters
 };
 // Walks all chunks and their checksums without decoding. nullopt: missing, not a PNG, cut short, or damaged.
 std::optional<PngInfo> inspect_png(const fs::path&);

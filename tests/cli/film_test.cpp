@@ -57,6 +57,49 @@ TEST_F(Filmed_slow, EveryKeyOfTheFilmChangesThePicture) {
             frame_3({"--set", "bodies.robot.deformation=linear"}));
 }
 
+// Of what differs: left, top, right, bottom.
+Eigen::Vector4i box_of_changes(const render::Image8& a, const render::Image8& b) {
+  Eigen::Vector4i box(a.width, a.height, 0, 0);
+  for (int y = 0; y < a.height; ++y)
+    for (int x = 0; x < a.width; ++x)
+      if (const std::size_t at = 3 * (std::size_t(y) * std::size_t(a.width) + std::size_t(x));
+          !std::equal(&a.rgb[at], &a.rgb[at] + 3, &b.rgb[at]))
+        box = {std::min(box[0], x), std::min(box[1], y), std::max(box[2], x + 1), std::max(box[3], y + 1)};
+  return box;
+}
+
+TEST_F(Filmed_slow, WordsKeepClearOfTheLargestInset) {
+  const std::vector<std::string> plain{"--size", "320x200", "--set",
+                                       "cameras=[{ name = \"above\", direction = [0, 0, 1] }]"};
+  std::vector<std::string> inset = plain;
+  inset.insert(inset.end(), {"--set", "film.inset={ camera = \"above\", size = 0.5 }"});
+  std::vector<std::string> words = inset;
+  words.insert(words.end(),
+               {"--set", "film.caption=A long line of words, and some more", "--set", "film.clock=true"});
+  const render::Image8 before = frame_3(inset);
+  const Eigen::Vector4i of_inset = box_of_changes(frame_3(plain), before),
+                        of_words = box_of_changes(before, frame_3(words));
+  ASSERT_GT(of_inset[2] - of_inset[0], 150);
+  ASSERT_GT(of_words[2] - of_words[0], 20);
+  EXPECT_TRUE(of_words[2] <= of_inset[0] || of_inset[2] <= of_words[0] || of_words[3] <= of_inset[1] ||
+              of_inset[3] <= of_words[1])
+      << of_inset.transpose() << " and " << of_words.transpose();
+}
+
+TEST_F(Filmed_slow, AnEarlierFilmIsToldToBeThat) {
+  ASSERT_EQ(limber_program({"render", out(), "--size", "63x47"}).code, exit_done);
+  const Result part =
+      limber_program({"render", out(), "--size", "63x47", "--frames", "0-1", "--set", "film.look=dark"});
+  EXPECT_EQ(part.code, exit_done) << part.err;
+  EXPECT_THAT(part.out, HasSubstr("film.mp4 is of an earlier render, and not of these frames"));
+  EXPECT_THAT(part.out,
+              HasSubstr(fmt::format("{} of the frames that are there show it by other options", frames - 2)));
+  const Result whole = limber_program({"render", out(), "--size", "63x47", "--set", "film.look=dark"});
+  EXPECT_EQ(whole.code, exit_done) << whole.err;
+  EXPECT_THAT(whole.out, Not(HasSubstr("earlier")));
+  EXPECT_THAT(whole.out, HasSubstr("film.mp4 (64x48: films have even sides)"));
+}
+
 // Wherever the bodies are in the picture, no letter is on them.
 TEST_F(Filmed_slow, WordsStandWhereNoBodyIs) {
   std::set<std::pair<bool, bool>> corners;
@@ -83,6 +126,16 @@ TEST_F(Filmed_slow, WordsStandWhereNoBodyIs) {
       ASSERT_GT(words, 20);
       EXPECT_EQ(on_body, 0) << camera;
       corners.insert({middle_x / words < before.width / 2.0, middle_y / words < before.height / 2.0});
+      // Bodies that are cut away are in no one's way: of equal corners it is the first.
+      const std::string all =
+          "film.cuts=[{ point_m = [0, 0, -1], normal = [0, 0, 1], bodies = [\"robot\", \"block\"] }]";
+      std::vector<std::string> bare{"--camera", "near", "--set", camera, "--set", "film.bounds_lines=false",
+                                    "--set",    all};
+      const render::Image8 nothing = frame_3(bare);
+      bare.insert(bare.end(), {"--set", "film.caption=Hello"});
+      const Eigen::Vector4i box = box_of_changes(nothing, frame_3(bare));
+      EXPECT_LT(box[2], nothing.width / 2 + 8) << camera;
+      EXPECT_GT(box[1], nothing.height / 2) << camera;
     }
   EXPECT_GT(corners.size(), 1u) << "bodies stood in the way of none";
 }
@@ -348,6 +401,29 @@ TEST_F(Filmed_slow, EveryFalseWordOfAFilmIsNamed) {
   named("words behind the end", files, [&] {
     const fs::path second = work / "frames" / number(1);
     write_file(second, read_file(second) + "hello");
+  });
+  named("pixels that can't be had", files, [&] {  // a whole file, by its checksums
+    const fs::path second = work / "frames" / number(1), small = work / "small.png";
+    render::write_png(small, render::filled(16, 16, Vec3(0, 0, 0)));
+    const std::string large_file = read_file(second), small_file = read_file(small);
+    write_file(second, large_file.substr(0, large_file.find("IDAT") - 4) +
+                           small_file.substr(small_file.find("IDAT") - 4));
+    fs::remove(small);
+    ASSERT_TRUE(render::inspect_png(second));
+  });
+  named("depths of a pass that is not told of", pixels, [&] {
+    const fs::path frame = work / "frames" / number(1), pass = work / "frames" / "0001.depth.png";
+    const render::Raster8 depths{64, 48, 1, std::vector<std::uint8_t>(64 * 48, 7)};
+    render::write_png(
+        pass, depths,
+        {{"limber-hash", *render::frame_hash(frame)},
+         {"limber-pixels", hash_of_shown(*render::frame_hash(frame), render::pixel_hash(depths))}});
+    write_json(work / "frames" / "passes.json", read_json(keep / "frames-deep" / "passes.json"));
+  });
+  named("a table that is not limber's", "manifest.json holds what limber writes", [&] {
+    Json manifest = read_json(work / "manifest.json");
+    manifest["certified"] = {{"by", "somebody"}};
+    write_json(work / "manifest.json", manifest);
   });
   named("a picture of another ending", "no other pictures",
         [&] { fs::copy_file(work / "frames" / number(1), work / "frames" / "0001.PNG"); });

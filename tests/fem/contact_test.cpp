@@ -470,7 +470,7 @@ TEST(Contact, AFineSurfaceHoldsAndSlidesOnTheFloor) {
 
 // A soft slab, as soft as our scenes' bodies are, on a slope that friction holds: it comes to rest and stays.
 // Touched at its cage, on the floor and on a static body, and at its fine surface, moved either way.
-TEST(Contact, ASoftSlabRestsOnASlope) {
+TEST(Contact_slow, ASoftSlabRestsOnASlope) {
   enum class Slope { floor, cage, surface, phong };
   const double tangent = 0.4, angle = std::atan(tangent);
   for (const Slope on : {Slope::floor, Slope::cage, Slope::surface, Slope::phong})

@@ -46,8 +46,8 @@ TEST(FrameList, SeedsHaveTheSameFormAndNoEnd) {
 }
 
 TEST(FrameList, RefusesWhatItCannotRead) {
-  for (const char* text :
-       {"a", "1-", "-3", "5-3", "1-3:0", "1-3:x", "1-9x2:2", "1-9x", "1,,2", "1 2", "99999999999999"})
+  for (const char* text : {"a", "1-", "-3", "5-3", "1-3:0", "1-3:x", "1-9x2:2", "1-9x", "0x3", "7:2", "1,,2",
+                           "1 2", "99999999999999"})
     EXPECT_THROW(parse_frames(text, 100), InputError) << text;
 }
 

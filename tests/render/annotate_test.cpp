@@ -114,6 +114,24 @@ TEST(ScaleBar, IsAsLongAsItShouldBe) {
   }
 }
 
+// A tick is of the brightness of words; that of 0.4 is right of the bar, at two fifths of its height.
+TEST(ColorBar, IsLightOnDarkAndDarkOnLight) {
+  for (const bool dark : {false, true}) {
+    Image8 image = filled(1920, 1080, Vec3::Constant(dark ? 0.1 : 0.95));
+    const Vec3 ground = pixel(image, 0, 0), gray(0.5, 0.5, 0.5);
+    draw_color_bar(
+        image,
+        {.label = "", .low = 0, .high = 1, .color_srgb = [&](double) { return gray; }, .on_dark = dark});
+    const int y = int(1080 * (0.75 - 0.4 * 0.5));
+    int right = image.width - 1;
+    while (right > 0 && (pixel(image, right, y + 8) - gray).norm() > 0.01) --right;
+    const Vec3 tick = pixel(image, right + 4, y);
+    EXPECT_GT(right, 1600);
+    EXPECT_GT((tick - ground).norm(), 1) << tick.transpose();
+    EXPECT_EQ(tick.mean() > ground.mean(), dark);
+  }
+}
+
 TEST(Histogram, EveryValueIsCountedOnce) {
   EXPECT_EQ(histogram_counts({0, 0.5, 1, 1.999, 2, 3.5}, 0, 4, 4), (std::vector{2, 2, 1, 1}));
   EXPECT_EQ(histogram_counts({-7, 4, 9}, 0, 4, 4), (std::vector{1, 0, 0, 2})) << "outside: in the outer bars";

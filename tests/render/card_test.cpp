@@ -71,6 +71,45 @@ TEST(Card, TheWordsStandInTheMiddleAndFitTheWidth) {
   EXPECT_NEAR(wide[2] - wide[0], 0.84 * 640, 16);
 }
 
+// As large as a short one's letters, in rows that are in the picture and much as wide as one another.
+TEST(Card, ALongLineIsBrokenAtItsSpaces) {
+  const Vec3 ground(0.9, 0.9, 0.9);
+  const Image8 empty = plain_card(640, 360, {""}, ground);
+  const auto rows_of = [&](const std::string& line) {
+    const Image8 image = plain_card(640, 360, {line}, ground);
+    std::vector<Eigen::Vector4i> rows;  // boxes, parted by rows of pixels without ink
+    for (int y = 0; y < 360; ++y) {
+      Eigen::Vector4i row(640, y, 0, y + 1);
+      for (int x = 0; x < 640; ++x)
+        if (const std::size_t at = 3 * std::size_t(640 * y + x); image.rgb[at] != empty.rgb[at])
+          row[0] = std::min(row[0], x), row[2] = std::max(row[2], x + 1);
+      if (row[2] == 0) continue;
+      if (rows.empty() || rows.back()[3] < y)
+        rows.push_back(row);
+      else
+        rows.back() = {std::min(rows.back()[0], row[0]), rows.back()[1], std::max(rows.back()[2], row[2]),
+                       y + 1};
+    }
+    return rows;
+  };
+  const auto one = rows_of("nmnm xnxn");
+  ASSERT_EQ(one.size(), 1u);
+  std::string line = "nmnm";
+  for (int words = 1; words < 12; ++words) line += " xnxn";
+  const auto several = rows_of(line);
+  ASSERT_GE(several.size(), 2u);
+  for (const Eigen::Vector4i& row : several) {
+    EXPECT_EQ(row[3] - row[1], one[0][3] - one[0][1]) << "letters of another size";
+    EXPECT_LE(row[2] - row[0], 0.84 * 640 + 2);
+    EXPECT_GE(row[2] - row[0], 0.6 * (several[0][2] - several[0][0])) << "a lonely word";
+  }
+  // However long it is, it stays in the picture.
+  for (int words = 0; words < 200; ++words) line += " xnxn";
+  const auto many = rows_of(line);
+  EXPECT_GT(many.front()[1], 0.05 * 360);
+  EXPECT_LT(many.back()[3], 0.95 * 360);
+}
+
 TEST(Card, WordsAreDarkOnPaleAndPaleOnDark) {
   for (const double value : {0.1, 0.9}) {
     const Image8 image = plain_card(320, 180, {"Words"}, Vec3::Constant(value)),

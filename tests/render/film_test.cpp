@@ -142,10 +142,10 @@ TEST(Film, SaysWhatFfmpegSaid) {
   EXPECT_EQ(files_in(folder), 3);
 }
 
-TEST(Film, AFolderThatIsMissingIsADiskError) {
+TEST(Film, AFolderThatIsMissingIsNamed) {
   const Folder folder;
   const auto frames = write_frames(folder, 2, 32, 16);
-  EXPECT_THROW(make_film(frames, 24, folder / "missing" / "a.mp4"), DiskError);
+  EXPECT_THROW(make_film(frames, 24, folder / "missing" / "a.mp4"), InputError);
 }
 
 TEST(Sheet, HoldsEveryFrameInItsPlace) {

@@ -133,6 +133,26 @@ TEST(Outlines, WhereOneHidesTheOtherTheNearerHasTheLine) {
   EXPECT_EQ(on_far, 0);
 }
 
+// Pixels of other normals on a plane, as a crease finer than the pixels has them: single ones and short rows
+// are none, a row that is long enough is one.
+TEST(Outlines, SpecksAreNone) {
+  const Camera camera = camera_from({0, -5, 0});
+  const SurfaceMesh plane = quad_mesh({-9, 0, -9}, {9, 0, -9}, {9, 0, 9}, {-9, 0, 9});
+  const Passes plain = passes_of({plane}, camera);
+  const auto inked = [&](int length) {
+    Passes passes = plain;
+    for (int x = 0; x < length; ++x) {
+      const std::size_t at = 3 * (120 * std::size_t(width) + 100 + std::size_t(x));
+      passes.normal[at] = 1, passes.normal[at + 1] = passes.normal[at + 2] = 0;
+    }
+    double total = 0;
+    for (const float line : outlines_of(passes, 0.02)) total += double(line);
+    return total;
+  };
+  for (const int length : {0, 1, 2, 3}) EXPECT_EQ(inked(length), 0) << length;
+  EXPECT_GT(inked(12), 12);
+}
+
 TEST(Outlines, AreInkOnWhatWasThere) {
   const Camera camera = camera_from({0, -5, 0});
   const Passes passes = passes_of({sphere_mesh(Vec3::Zero(), 1, 40)}, camera);
@@ -148,6 +168,13 @@ TEST(Outlines, AreInkOnWhatWasThere) {
     EXPECT_EQ(image.rgb[0], 255);
     EXPECT_EQ(image.rgb[3 * (120 * width + 160)], 255);  // the middle of the sphere
   }
+  // Thinner than a pixel they are paler: at a quarter half as dark.
+  const auto darkest = [&](double line_width) {
+    Image8 image = white;
+    draw_outlines(image, passes, 0.02, line_width, Vec3::Zero());
+    return 255 - *std::min_element(image.rgb.begin(), image.rgb.end());
+  };
+  EXPECT_NEAR(darkest(0.25), 0.5 * darkest(1), 1);
 }
 
 }  // namespace

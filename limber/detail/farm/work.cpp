@@ -53,6 +53,10 @@ class EndWatcher : public Watcher {
     stop_ = stop_ || signal() != 0 || farm_.is_cancelled() || is_over();
     return stop_;
   }
+  void warn(const std::string& text) override {  // into the worker's log
+    const WorkingFor nobody(nullptr);
+    log::warn("{}", text);
+  }
 
  protected:
   virtual bool is_over() { return false; }

@@ -46,7 +46,7 @@ std::vector<Range> ranges_of(const std::string& text, const char* what, const ch
     const std::string_view range = part.substr(0, colon);
     const auto step =
         colon == part.npos ? std::optional<std::int64_t>(1) : whole_number(part.substr(colon + 1));
-    const auto single = whole_number(range);
+    const auto single = colon == part.npos ? whole_number(range) : std::nullopt;  // a step is a range's
     const auto ends = single ? std::optional(std::pair(*single, *single)) : pair_of(range, '-');
     if (!step || !ends)
       throw InputError(

@@ -409,7 +409,7 @@ render::Image8 Shot::Painter::without_words(int frame, render::Passes* wanted) {
     render::Image8 image = view.renderer.draw_shown(camera, passes);
     if (outlines)
       render::draw_outlines(image, *passes, outline_step * shot_.look_.stage.diagonal(),
-                            std::max(1.0, outline_width * image.height), outline_color);
+                            outline_width * image.height, outline_color);
     return image;
   };
   render::Image8 image = drawn(*views_[0]);

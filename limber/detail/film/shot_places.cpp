@@ -14,6 +14,7 @@
 #include "limber/detail/film/outermost.h"
 #include "limber/detail/film/shot.h"
 #include "render/film.h"
+#include "render/label_places.h"
 
 namespace limber::detail {
 
@@ -47,10 +48,6 @@ bool holds(const std::vector<Eigen::Vector2d>& hull, const Eigen::Vector2d& p) {
     if (a.x() * b.y() - a.y() * b.x() < 0) return false;
   }
   return hull.size() > 2;
-}
-
-bool overlap(const Eigen::Vector4d& a, const Eigen::Vector4d& b) {
-  return a[0] < b[2] && b[0] < a[2] && a[1] < b[3] && b[1] < a[3];
 }
 
 // 1, 2 or 5 times a power of ten, at most this.
@@ -97,12 +94,17 @@ std::array<int, 4> Shot::hidden_by(const std::array<Eigen::Vector4d, 4>& boxes) 
   Points outermost;
   for (std::size_t b = 0; b < bodies_.size(); ++b) {
     const ffd::Binding part = outermost_part(bodies_[b]);
+    const std::vector<render::Plane> cuts = cuts_of(int(b));
     for (const int frame : render::spread_over(frames(), max_frames)) {
       deform(bodies_[b], part, fem::body_positions(world_, state_at(frame), int(b)), outermost);
       const render::Camera camera = camera_of(frame);
       std::vector<Eigen::Vector2d> seen;
       for (Eigen::Index p = 0; p < outermost.rows(); ++p) {
-        const Vec3 pixel = render::pixel_from_world(camera, outermost.row(p), look_.width, look_.height);
+        const Vec3 place = outermost.row(p);
+        if (std::any_of(cuts.begin(), cuts.end(),
+                        [&](const auto& cut) { return cut.dot(place.homogeneous()) < 0; }))
+          continue;
+        const Vec3 pixel = render::pixel_from_world(camera, place, look_.width, look_.height);
         if (pixel.z() > 0) seen.push_back(pixel.head<2>());
       }
       const std::vector<Eigen::Vector2d> hull = convex_hull(std::move(seen));
@@ -132,7 +134,7 @@ void Shot::place_words() {
   if (inset_) {
     const Eigen::Vector4d inset = place_of_inset(inset_corner_);
     for (std::size_t c = 0; c < hidden.size(); ++c)
-      if (render::corners[c] == inset_corner_ || overlap(boxes[c], inset))
+      if (render::corners[c] == inset_corner_ || render::overlap(boxes[c], inset))
         hidden[c] = std::numeric_limits<int>::max();
   }
   words_.corner =

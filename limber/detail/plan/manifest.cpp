@@ -16,7 +16,7 @@ Json read_manifest(const fs::path& folder) {
   try {
     manifest = read_json(file);
   } catch (const InputError& error) {
-    log::warn("{}; it is made anew", error.what());
+    log::warn("{}; nothing is taken from it", error.what());
     return Json::object();
   }
   const char* const remedy = "remove the file, which limber makes anew";

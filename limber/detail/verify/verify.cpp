@@ -76,6 +76,10 @@ Verified verify(const VerifyOptions& options) {
   const bool scene_is_named = !options.scene.scene.empty();
   if (!scene_is_named && !(options.scene.sets.empty() && options.scene.data.empty()))
     throw InputError("--set and --data are of the scene that --scene names, and none is named");
+  if (const auto& csv = options.observables;
+      csv && !csv->parent_path().empty() && !fs::is_directory(csv->parent_path()))
+    throw InputError(
+        fmt::format("{}: there is no folder {}; make it first", csv->string(), csv->parent_path().string()));
   if (fs::exists(folder / "plan.npz")) {
     if (options.model)
       throw InputError(

@@ -138,6 +138,10 @@ void check_plan(const fs::path& folder, const PlanFolder& planned, const std::ve
 void check_pictures(const fs::path& folder, const PlanFolder& planned, const fem::World& world,
                     const MotionFigures& figures, Promises& table) {
   const Json manifest = read_manifest(folder);
+  for (const auto& [key, entry] : manifest.items())
+    if (key != "version" && key != "plan" && key != "export" && key != "render" &&
+        !key.starts_with("render-"))
+      table.row("manifest.json holds what limber writes, and no more", false, key + " is not limber's");
   const Json entry = manifest.value("plan", Json());
   const std::string other = first_difference(kept_summary(planned), entry);
   const std::string what = planned.plan.simulation ? "simulation" : "plan";
