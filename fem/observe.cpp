@@ -27,6 +27,35 @@ Points body_positions(const World& world, const State& state, int index) {
       .cast<double>();
 }
 
+std::vector<LigamentPull> ligament_pulls(const World& world, const State& state) {
+  std::vector<LigamentPull> pulls;
+  const auto at_end = [&](const Ligament::End& end) {
+    if (end.body < 0) return std::pair<Vec3, Vec3>(end.point_m, Vec3::Zero());
+    std::pair<Vec3, Vec3> sums(Vec3::Zero(), Vec3::Zero());  // place, velocity
+    for (std::size_t i = 0; i < end.nodes.size(); ++i)
+      for (int c = 0; c < 3; ++c) {
+        const Body& body = world.bodies[std::size_t(end.body)];
+        const std::size_t at = std::size_t(3 * end.nodes[i] + c);
+        sums.first[c] +=
+            end.weights[i] * (body.moving ? double(state.positions[at])
+                                          : body.cage.positions(end.nodes[i] - body.first_node, c));
+        if (body.moving) sums.second[c] += end.weights[i] * double(state.velocities[at]);
+      }
+    return sums;
+  };
+  for (const Ligament& ligament : world.ligaments) {
+    const auto [from, velocity] = at_end(ligament.ends[0]);
+    const auto [to, other_velocity] = at_end(ligament.ends[1]);
+    const double length = (to - from).norm(), longer = length - ligament.rest_length_m;
+    double tension = 0;
+    if (length > 0 && (longer > 0 || ligament.pushes))
+      tension = ligament.stiffness_n_m * longer +
+                ligament.damping_n_s_m * (other_velocity - velocity).dot(to - from) / length;
+    pulls.push_back({from, to, ligament.pushes ? tension : std::max(0.0, tension)});
+  }
+  return pulls;
+}
+
 double time_s(const World& world, const State& state) { return double(state.step) * world.dt_s; }
 
 double volume_m3(const World& world, const State& state, int body) {

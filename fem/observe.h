@@ -44,6 +44,13 @@ std::vector<double> volume_changes(const World&, const State&, int body);  // (T
 double turn_from_goal_shape_deg(const World&, const State&);
 double distance_from_goal_shape_m(const World&, const State&);
 
+// Where a ligament's ends are, and what it pulls with; below 0 where it pushes.
+struct LigamentPull {
+  Vec3 from_m, to_m;
+  double tension_n;
+};
+std::vector<LigamentPull> ligament_pulls(const World&, const State&);  // in their order
+
 int inverted_tets(const World&, const State&);  // of all moving bodies: volume ≤ 0
 // No tet is inverted, or stretched by more than its body's max_stretch, and no body's volume has changed by
 // more than its max_volume_change.

@@ -21,6 +21,7 @@
 
 #include "core/error.h"
 #include "fem/detail/check_world.h"
+#include "fem/detail/ligaments.h"
 #include "fem/detail/make_body.h"
 #include "fem/detail/make_elements.h"
 #include "fem/detail/make_surface_tables.h"
@@ -34,7 +35,8 @@ namespace {
 
 // Share of the largest stable elastic step that is taken: contact needs the rest (docs/contact.md).
 // Neo-Hookean tets stiffen when stretched, and so need more.
-constexpr double step_safety = 1.0 / 3, neo_hookean_step_safety = 0.25, fascia_step_safety = 0.25;
+constexpr double step_safety = 1.0 / 3, neo_hookean_step_safety = 0.25, fascia_step_safety = 0.25,
+                 ligament_step_safety = 0.25;
 // Of a world in which only rigid bodies move, and so no elastic step exists.
 constexpr double rigid_step_s = 1e-3;
 
@@ -69,12 +71,13 @@ void choose_step(double max_dt_s, World& world) {
     if (const double ratio = body.material.fascia_damping_ratio; body.material.fascia_hz > 0)
       step_s = std::min(step_s, fascia_step_safety * 2 * (std::hypot(1, ratio) - ratio) /
                                     (2 * std::numbers::pi * body.material.fascia_hz));
+  step_s = std::min(step_s, ligament_step_safety * detail::largest_stable_step(world.ligaments));
   world.contact_dt_s = float(step_s);
   world.dt_s = max_dt_s > 0 ? std::min(world.contact_dt_s, double(float(max_dt_s))) : world.contact_dt_s;
   if (!(world.dt_s >= 1e-7))
     throw InputError(fmt::format(
         "body {}: its stable time step is {:.2g} s, too short to be of use; soften it, or mesh it "
-        "without slivers",
+        "without slivers, and see that no ligament is too stiff for what hangs on it",
         stiffest->name, world.dt_s));
 }
 
@@ -169,6 +172,8 @@ World build_world(const WorldSpec& spec) {
     tables.skin.push_back(0.2 * detail::mean_edge(a));
   }
   world.tables = detail::single_precision(tables);
+  for (const LigamentSpec& ligament : spec.ligaments)
+    world.ligaments.push_back(detail::make_ligament(ligament, world));
   choose_step(spec.max_dt_s, world);
   for (const ForceSpec& force : spec.forces) world.forces.push_back(make_force(force, world));
   detail::make_surface_tables(spec.contact_offset_m, world);

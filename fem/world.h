@@ -13,6 +13,7 @@
 #include "core/state.h"
 #include "fem/detail/surface_tables.h"
 #include "fem/detail/tables.h"
+#include "fem/ligament.h"
 #include "fem/script.h"
 
 namespace limber::fem {
@@ -92,6 +93,7 @@ struct WorldSpec {
   // start.
   double max_overlap_m = std::numeric_limits<double>::infinity();
   std::vector<ForceSpec> forces = {};
+  std::vector<LigamentSpec> ligaments = {};
   // World::start_positions of a world of this spec, which spares it the parting; empty: not known.
   std::vector<float> start_positions = {};
 };
@@ -165,15 +167,16 @@ struct World {
   bool part_overlaps;                            // as asked for
   double max_overlap_m;                          // as asked for
   std::vector<Force> forces;                     // in the order of WorldSpec
+  std::vector<Ligament> ligaments;               // likewise
   std::vector<detail::RigidTable> rigid_tables;  // a body; empty unless it is rigid
 };
 
 // Throws InputError naming body and element: a cage that is not valid, a node in no tet, a fixed node that
 // does not exist or belongs to a rigid body, a material out of range, a robot that is missing or cannot move,
 // a body outside the bounds, a force between no times or on a body or nodes that nothing can push, keyframes
-// that do not ascend from above 0, two bodies that overlap at the start (and how deep) and are not parted,
-// coordinates too large for float32, a step too small to be of use, start_positions of another number. Throws
-// Interrupted after a stop signal.
+// that do not ascend from above 0, a ligament that hangs on nothing that moves or away from its bodies, two
+// bodies that overlap at the start (and how deep) and are not parted, coordinates too large for float32, a
+// step too small to be of use, start_positions of another number. Throws Interrupted after a stop signal.
 World build_world(const WorldSpec&);
 
 // How deep two cages are in one another, as build_world measures it at the start.

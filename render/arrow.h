@@ -1,4 +1,4 @@
-// Arrows that stand for vectors: closed surfaces, lit and shadowed like all else.
+// Arrows that stand for vectors, and rods: closed surfaces, lit and shadowed like all else.
 #pragma once
 
 #include "core/mesh.h"
@@ -11,5 +11,9 @@ Triangles arrow_triangles();
 // From `from` to the tip at `to`, metres. Longer than 8 radii the head keeps its size; a shorter arrow
 // shrinks as a whole. Of no length all corners are `from`.
 Points arrow(const Vec3& from, const Vec3& to, double shaft_radius_m);
+
+// A rod from one place to another, with a little of a cone at either end, in the same way.
+Triangles rod_triangles();
+Points rod(const Vec3& from, const Vec3& to, double radius_m);
 
 }  // namespace limber::render

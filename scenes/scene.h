@@ -170,6 +170,20 @@ struct MotionSpec {
   std::string where;
 };
 
+// A spring from a point of one body to one of another, or of the world.
+struct LigamentSpec {
+  std::string name;
+  int from = -1, to = -1;  // bodies; `to` −1: the world
+  Vec3 from_m = Vec3::Zero(), to_m = Vec3::Zero();
+  double radius_m = 0;  // of the cages' nodes that share the pull; 0: those round the point alone
+  double stiffness_n_m = 0, damping_ratio = 0;
+  double rest_length = 1;  // of its length at the start
+  bool pushes = false;
+  std::optional<double> diameter_m;  // as it is drawn; nothing: by its length
+  Vec3 color_srgb = Vec3::Zero();
+  std::string where;
+};
+
 struct Goal {
   Vec3 center_of_mass_m = Vec3::Zero();
   int moves_with = -1;  // index of the body whose centre of mass takes the goal along; −1: none
@@ -312,6 +326,7 @@ struct Scene {
   std::vector<BodySpec> bodies;
   std::vector<ForceSpec> forces;
   std::vector<MotionSpec> motions;  // of one body each
+  std::vector<LigamentSpec> ligaments;
   // Index of the one body whose role is robot; of a scene without, the first that can be pushed: shares of
   // "the robot's size" are of its.
   int robot = -1;

@@ -2,7 +2,8 @@
 // evaluation of forces. The velocity belongs to the middle of a step (docs/dynamics.md, "Integration"). In a
 // step come, in this order,
 //
-//     who sleeps, contact, controls, limits of stretch, elastic forces, friction, integration.
+//     who sleeps, contact, controls, limits of stretch, fascia, ligaments, elastic forces, friction,
+//     integration.
 //
 // Friction is last, because it is chosen against the velocities with which the step would end. The order is
 // fixed, since the last bits of a sum of forces depend on it.
@@ -114,6 +115,10 @@ Stepper<Real>::Stepper(const World& world, int lanes, Isa isa)
   unchanged_.assign(bodies, 0), asleep_.assign(bodies, 0), stands_.assign(bodies, 0);
   touches_.assign(bodies, 0);
   met_.assign(world.bodies.size() * bodies, false);
+  tied_.assign(world.bodies.size() * world.bodies.size(), false);
+  for (const Ligament& ligament : world.ligaments)
+    if (const auto [one, other] = std::minmax(ligament.ends[0].body, ligament.ends[1].body); one >= 0)
+      tied_[std::size_t(one) * world.bodies.size() + std::size_t(other)] = true;
   all_asleep_.assign(world.bodies.size(), false), pushed_asleep_ = all_asleep_;
   leader_.resize(world.bodies.size());
   for (int n = 0; n < world.nodes; ++n)
@@ -260,7 +265,7 @@ void Stepper<Real>::step() {
   for (int lane = 0; lane < lanes_; ++lane)
     if (contact_[lane] && step_[lane] >= next_change_[lane]) follow_forces(lane);
   if (cost_.steps++ % Cost::sampled != Cost::sampled / 2) {
-    find_sleepers(), add_contact_forces(), find_pushes(), add_stretch_limits(), add_fascia(),
+    find_sleepers(), add_contact_forces(), find_pushes(), add_stretch_limits(), add_fascia(), add_ligaments(),
         add_elastic_forces(), add_friction(), integrate();
     return;
   }
@@ -268,7 +273,7 @@ void Stepper<Real>::step() {
   const auto spent = [&] { return Cost::sampled * watch.lap_s(); };
   find_sleepers(), add_contact_forces(), cost_.contact_s += spent();
   find_pushes(), cost_.controls_s += spent();
-  add_stretch_limits(), add_fascia(), add_elastic_forces(), cost_.elastic_s += spent();
+  add_stretch_limits(), add_fascia(), add_ligaments(), add_elastic_forces(), cost_.elastic_s += spent();
   add_friction(), cost_.contact_s += spent();
   integrate(), cost_.integration_s += spent();
 }
@@ -305,11 +310,11 @@ bool Stepper<Real>::goes_on(int lane, int body) const {
            pose_at(track, double(step_[lane] + 1) * world_.dt_s));
 }
 
-// A body that did not change in the last step, and whose box met only such bodies' boxes then and now, will
-// not change in this one either: every force is what it was. So it sleeps, and nothing of it is computed
-// where all lanes sleep. Friction is solved from body to body, so those that meet and rub one another sleep
-// and wake together; leader_ joins them (union by the lowest number). Lanes without contact are idle, and
-// sleep altogether.
+// A body that did not change in the last step, and whose box met only such bodies' boxes then and now, and
+// that ligaments tie to none but such, will not change in this one either: every force is what it was. So it
+// sleeps, and nothing of it is computed where all lanes sleep. Friction is solved from body to body, so those
+// that meet and rub one another sleep and wake together; leader_ joins them (union by the lowest number).
+// Lanes without contact are idle, and sleep altogether.
 //
 // touches_ tells the kernels where a box meets another's or a wall: there rest is judged by the mean of
 // nodes, too. pushed_asleep_: bodies that sleep in all lanes, but touch one that does not; forces that fell
@@ -350,9 +355,9 @@ void Stepper<Real>::find_sleepers() {
     for (int a = 0; a < bodies && contact_[lane]; ++a)
       for (int b = a + 1; b < bodies; ++b) {
         const std::size_t pair = at(a * bodies + b);
-        const bool met = met_[pair], now = meet(a, b);
+        const bool touch = meet(a, b), met = met_[pair], now = touch || tied_[std::size_t(a * bodies + b)];
         met_[pair] = now;
-        if (now) touches_[at(a)] = touches_[at(b)] = 1;
+        if (touch) touches_[at(a)] = touches_[at(b)] = 1;
         if (!met && !now) continue;
         if (unchanged_[at(a)] == 0) asleep_[at(b)] = 0;
         if (unchanged_[at(b)] == 0) asleep_[at(a)] = 0;
@@ -431,6 +436,47 @@ void Stepper<Real>::add_fascia() {
   }
 }
 
+// Of each lane in the order of the ligaments (fem/ligament.h). Where both ends sleep, or stand, the force is
+// what it was, and needs not fall on anybody.
+template <class Real>
+void Stepper<Real>::add_ligaments() {
+  for (const Ligament& ligament : world_.ligaments)
+    for (int lane = 0; lane < lanes_; ++lane) {
+      const auto stands = [&](const Ligament::End& end) {
+        return end.body < 0 || asleep_[std::size_t(end.body * lanes_ + lane)] > 0;
+      };
+      if (!contact_[lane] || (stands(ligament.ends[0]) && stands(ligament.ends[1]))) continue;
+      const LaneView<Real> all = view(lane);
+      Real place[2][3], velocity[2][3];
+      for (int e = 0; e < 2; ++e) {
+        const Ligament::End& end = ligament.ends[std::size_t(e)];
+        for (int c = 0; c < 3; ++c) {
+          place[e][c] = end.body < 0 ? Real(end.point_m[c]) : Real(0), velocity[e][c] = 0;
+          for (std::size_t i = 0; i < end.nodes.size(); ++i) {
+            const int at = all.state.at(end.nodes[i], c);
+            place[e][c] += Real(end.weights[i]) * all.x[at];
+            velocity[e][c] += Real(end.weights[i]) * all.v[at];
+          }
+        }
+      }
+      Real along[3], length2 = 0, rate = 0;
+      for (int c = 0; c < 3; ++c) along[c] = place[1][c] - place[0][c], length2 += along[c] * along[c];
+      const Real length = std::sqrt(length2), longer = length - Real(ligament.rest_length_m);
+      if (!(length > 0) || (longer <= 0 && !ligament.pushes)) continue;
+      for (int c = 0; c < 3; ++c) along[c] /= length, rate += (velocity[1][c] - velocity[0][c]) * along[c];
+      Real tension = Real(ligament.stiffness_n_m) * longer + Real(ligament.damping_n_s_m) * rate;
+      if (!ligament.pushes) tension = std::max(tension, Real(0));
+      for (int e = 0; e < 2; ++e) {
+        const Ligament::End& end = ligament.ends[std::size_t(e)];
+        if (end.body < 0 || !world_.bodies[std::size_t(end.body)].pushed()) continue;
+        for (std::size_t i = 0; i < end.nodes.size(); ++i)
+          for (int c = 0; c < 3; ++c)
+            all.f[all.force.at(end.nodes[i], c)] +=
+                (e == 0 ? tension : -tension) * Real(end.weights[i]) * along[c];
+      }
+    }
+}
+
 // Pushes that depend on the state; constant ones were set when the lane was loaded.
 template <class Real>
 void Stepper<Real>::find_pushes() {
@@ -484,7 +530,8 @@ std::vector<ContactRecord<Real>> Stepper<Real>::contact_records(int lane) {
   };
   follow_forces(lane), find_sleepers();
   record_to(&records), add_contact_forces(), record_to(nullptr);
-  find_pushes(), add_stretch_limits(), add_fascia(), add_elastic_forces(), add_friction(&records);
+  find_pushes(), add_stretch_limits(), add_fascia(), add_ligaments(), add_elastic_forces(),
+      add_friction(&records);
   std::fill(f_.begin(), f_.end(), Real(0));  // as integration leaves it
   return records;
 }

@@ -62,6 +62,7 @@ class Stepper {
   void find_pushes();
   void add_stretch_limits();
   void add_fascia();
+  void add_ligaments();
   void add_elastic_forces();
   void add_friction(std::vector<ContactRecord<Real>>* records = nullptr);
   void integrate();
@@ -98,8 +99,9 @@ class Stepper {
   // Sleep (docs/dynamics.md), all [body][lane], 0 or 1: is as it was a step ago; takes no part in this step;
   // stood still in this step. And [pair of bodies][lane]: their boxes met a step ago.
   Numbers unchanged_, asleep_, stands_;
-  Numbers touches_;  // its box meets another's or a wall
-  std::vector<bool> met_;
+  Numbers touches_;                               // its box meets another's or a wall
+  std::vector<bool> met_;                         // or a ligament ties them, always
+  std::vector<bool> tied_;                        // [pair of bodies]
   std::vector<int> leader_;                       // [body] of those that rub, the first; in the lane at hand
   std::vector<bool> all_asleep_, pushed_asleep_;  // [body] in all lanes; some force fell on it there
   std::vector<Control> controls_;                 // [lane]

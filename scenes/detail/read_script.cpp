@@ -1,6 +1,6 @@
 // What happens by itself, whatever the planner does: [[forces]] on bodies that can be pushed, [[motions]] of
-// rigid obstacles. Bodies are called by their names and kept by their numbers. Meaning: docs/simulation.md,
-// "What happens by itself".
+// rigid obstacles, [[ligaments]] between bodies. Bodies are called by their names and kept by their numbers.
+// Meaning: docs/simulation.md, "What happens by itself".
 #include "scenes/detail/scene_parts.h"
 #include "scenes/detail/typed_reads.h"
 
@@ -60,6 +60,34 @@ void read_motion(const Node& table, Scene& scene) {
                     "0, 1] }}]",
                     what));
   scene.motions.push_back(std::move(motion));
+}
+
+// That its ends are where the bodies are, fem sees (docs/dynamics.md, "Ligaments").
+void read_ligament(const Node& table, Scene& scene) {
+  LigamentSpec ligament;
+  ligament.where = table.where.text();
+  ligament.name = text(table, "name");
+  const std::string what = fmt::format("ligaments.{}", ligament.name);
+  for (const LigamentSpec& other : scene.ligaments)
+    if (other.name == ligament.name)
+      complain(child(table, "name"),
+               fmt::format("two ligaments are called \"{}\"; give one another name", ligament.name));
+  ligament.from = body_called(child(table, "from"), scene, what + ".from");
+  if (const Node* to = table.find("to")) ligament.to = body_called(*to, scene, what + ".to");
+  if (ligament.from == ligament.to)
+    complain(child(table, "to"),
+             fmt::format("{} goes from {} to itself; name another body, or leave `to` out: then "
+                         "that end stands in the world",
+                         what, scene.bodies[std::size_t(ligament.from)].name));
+  ligament.from_m = vector(table, "from_m"), ligament.to_m = vector(table, "to_m");
+  ligament.radius_m = number(table, "radius_m");
+  ligament.stiffness_n_m = number(table, "stiffness_n_m");
+  ligament.damping_ratio = number(table, "damping_ratio");
+  ligament.rest_length = number(table, "rest_length");
+  ligament.pushes = flag(table, "pushes");
+  ligament.diameter_m = maybe_number(table, "diameter_m");
+  ligament.color_srgb = as_color(text(table, "color"));
+  scene.ligaments.push_back(std::move(ligament));
 }
 
 }  // namespace limber::scenes

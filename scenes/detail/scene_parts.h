@@ -24,9 +24,10 @@ bool is_rigid_obstacle(const BodySpec&);
 int body_called(const Node&, const Scene&, const std::string& key);
 int other_body(const Node&, const Scene&, const std::string& key);  // other than the robot
 
-// What happens by itself: one of [[forces]], one of [[motions]]. scenes/detail/read_script.cpp
+// What happens by itself: one of [[forces]], [[motions]], [[ligaments]]. scenes/detail/read_script.cpp
 void read_force(const Node& table, Scene&);
 void read_motion(const Node& table, Scene&);
+void read_ligament(const Node& table, Scene&);
 
 // goal and [[via]], or what the scene lacks to be planned. scenes/detail/read_goals.cpp
 void read_goals(const Node& root, Scene&, const Complaints&);

@@ -176,6 +176,9 @@ constexpr const char* keyed = "camera.keyframes=[{ at = 0, eye_m = [0, -5, 1], t
 constexpr const char* side_keyed =
     "cameras=[{ name = \"side\", keyframes = [{ at = 0, eye_m = [0, -5, 1], target_m = [2, 1, 1] }] }]";
 constexpr const char* one_force = "forces=[{ body = \"cart\", to_s = 1, force_n = [1, 0, 0] }]";
+constexpr const char* one_ligament =
+    "ligaments=[{ name = \"band\", from = \"robot\", from_m = [0.6, 1, 1.3], to = \"block\", to_m = [2, 1, "
+    "0.45], stiffness_n_m = 40 }]";
 constexpr const char* one_motion =
     "bodies.block.kind=rigid|"
     "motions=[{ body = \"block\", keyframes = [{ at_s = 1, position_m = [3, 1, 1] }] }]";
@@ -239,6 +242,54 @@ const std::vector<Row> rows{
     {"forces[].box_m",
      "forces=[{ body = \"cart\", to_s = 1, force_n = [1, 0, 0], box_m = [[3, 0, 0], [4, 2, 0.2]] }]", world,
      one_force},
+    {"ligaments[].name",
+     "ligaments=[{ name = \"other\", from = \"robot\", from_m = [0.6, 1, 1.3], to = \"block\", to_m = [2, 1, "
+     "0.45], stiffness_n_m = 40 }]",
+     film, one_ligament},
+    {"ligaments[].from",
+     "ligaments=[{ name = \"band\", from = \"block\", from_m = [0.6, 1, 1.3], to = \"robot\", to_m = [2, 1, "
+     "0.45], stiffness_n_m = 40 }]",
+     world | film, one_ligament},
+    {"ligaments[].from_m",
+     "ligaments=[{ name = \"band\", from = \"robot\", from_m = [0.6, 1, 1.4], to = \"block\", to_m = [2, 1, "
+     "0.45], stiffness_n_m = 40 }]",
+     world | film, one_ligament},
+    {"ligaments[].to",
+     "ligaments=[{ name = \"band\", from = \"robot\", from_m = [0.6, 1, 1.3], to_m = [2, 1, 0.45], "
+     "stiffness_n_m = 40 }]",
+     world | film, one_ligament},
+    {"ligaments[].to_m",
+     "ligaments=[{ name = \"band\", from = \"robot\", from_m = [0.6, 1, 1.3], to = \"block\", to_m = [2, 1, "
+     "0.5], stiffness_n_m = 40 }]",
+     world | film, one_ligament},
+    {"ligaments[].radius_m",
+     "ligaments=[{ name = \"band\", from = \"robot\", from_m = [0.6, 1, 1.3], to = \"block\", to_m = [2, 1, "
+     "0.45], stiffness_n_m = 40, radius_m = 0.5 }]",
+     world | film, one_ligament},
+    {"ligaments[].stiffness_n_m",
+     "ligaments=[{ name = \"band\", from = \"robot\", from_m = [0.6, 1, 1.3], to = \"block\", to_m = [2, 1, "
+     "0.45], stiffness_n_m = 41 }]",
+     world, one_ligament},
+    {"ligaments[].damping_ratio",
+     "ligaments=[{ name = \"band\", from = \"robot\", from_m = [0.6, 1, 1.3], to = \"block\", to_m = [2, 1, "
+     "0.45], stiffness_n_m = 40, damping_ratio = 0.4 }]",
+     world, one_ligament},
+    {"ligaments[].rest_length",
+     "ligaments=[{ name = \"band\", from = \"robot\", from_m = [0.6, 1, 1.3], to = \"block\", to_m = [2, 1, "
+     "0.45], stiffness_n_m = 40, rest_length = 0.9 }]",
+     world, one_ligament},
+    {"ligaments[].pushes",
+     "ligaments=[{ name = \"band\", from = \"robot\", from_m = [0.6, 1, 1.3], to = \"block\", to_m = [2, 1, "
+     "0.45], stiffness_n_m = 40, pushes = true }]",
+     world, one_ligament},
+    {"ligaments[].diameter_m",
+     "ligaments=[{ name = \"band\", from = \"robot\", from_m = [0.6, 1, 1.3], to = \"block\", to_m = [2, 1, "
+     "0.45], stiffness_n_m = 40, diameter_m = 0.05 }]",
+     film, one_ligament},
+    {"ligaments[].color",
+     "ligaments=[{ name = \"band\", from = \"robot\", from_m = [0.6, 1, 1.3], to = \"block\", to_m = [2, 1, "
+     "0.45], stiffness_n_m = 40, color = \"#112233\" }]",
+     film, one_ligament},
     {"motions[].keyframes[].at_s",
      "motions=[{ body = \"block\", keyframes = [{ at_s = 2, position_m = [3, 1, 1] }] }]", world, one_motion},
     {"motions[].keyframes[].position_m",

@@ -70,6 +70,11 @@ TEST(Batch, ResultsDoNotDependOnLanesNeighboursOrderOrInstructionSet) {
   spec.bodies[0].material.model = MaterialModel::neo_hookean;
   spec.bodies[2].material.fascia_hz = 3;
   spec.bodies[1].material.mass_damping_per_s = 1, spec.bodies[1].gravity_m_s2 = Vec3(0, 0.3, -0.5);
+  LigamentSpec band;
+  band.name = "band";
+  band.ends = {{{0, {1, 1.5, 2}, 0.3}, {1, {3.4, 1.5, 2}, 0}}};
+  band.stiffness_n_m = 50, band.rest_length = 0.5;
+  spec.ligaments = {band};
   const World world = build_world(spec);
   const std::vector<Case> cases = pressed_cases(world, 24);
   std::vector<int> order;

@@ -507,6 +507,32 @@ TEST(Script, StandsInTheSceneOrInAFileOfItsOwn) {
   EXPECT_EQ(read_scene(good, "s.toml", {}, {"# nothing", "c.toml"}).forces.size(), 0U);
 }
 
+TEST(Ligaments, AreBetweenTwoBodiesOrABodyAndTheWorld) {
+  const std::string band =
+      "[[ligaments]]\nname = \"band\"\nfrom = \"robot\"\nfrom_m = [1, 2, 3]\nto = \"gate\"\nto_m = [4, 5, "
+      "6]\n"
+      "stiffness_n_m = 70\n";
+  const Scene scene = read_scene(good + band, "s.toml");
+  ASSERT_EQ(scene.ligaments.size(), 1u);
+  EXPECT_EQ(scene.ligaments[0].to, 1);
+  EXPECT_EQ(scene.ligaments[0].damping_ratio, 0.3);
+  EXPECT_EQ(read_scene(replaced(good + band, "to = \"gate\"\n", ""), "s.toml").ligaments[0].to, -1);
+  const Slip slips[] = {
+      {"from = \"robot\"", "from = \"robt\"", "\"robt\"", "it must be a body that is not scenery"},
+      {"to = \"gate\"", "to = \"robot\"", "\"robot\"\nto_m", "goes from robot to itself"},
+      {"stiffness_n_m = 70\n", "", "[[ligaments]]", "lacks \"stiffness_n_m\""},
+      {"stiffness_n_m = 70", "stiffness_n_m = -70", "-70", "must be"},
+      {"name = \"band\"", "name = \"a band\"", "\"a band\"", "letters"},
+  };
+  for (const Slip& slip : slips) {
+    SCOPED_TRACE(fmt::format("{} → {}", slip.from, slip.to));
+    const std::string slipped = replaced(good + band, slip.from, slip.to), said = complaint(slipped);
+    EXPECT_THAT(said, HasSubstr(slip.words));
+    EXPECT_THAT(said, StartsWith(place(slipped, slip.at)));
+  }
+  EXPECT_THAT(complaint(good + band + band), HasSubstr("two ligaments are called \"band\""));
+}
+
 TEST(Script, ComplainsWithLineAndColumn) {
   const std::string text = good + shutter + script;
   const Slip slips[] = {
@@ -669,6 +695,8 @@ std::string another_value(const Key& key) {
       {"forces[].body", "\"gate\""},
       {"forces[].box_m", "[[0, 0, 0], [1, 2, 2]]"},
       {"motions[].body", "\"shutter\""},
+      {"ligaments[].from", "\"shutter\""},
+      {"ligaments[].to", "\"shutter\""},
       {"film.inset.camera", "\"main\""},
       {"film.labels", "[\"gate\"]"},
       {"film.cuts[].bodies", "[\"gate\"]"},
@@ -757,6 +785,11 @@ TEST(Keys, EveryKeyChangesTheScene) {
                   ? "bodies.robot.parts=[{ box_m = [[0, 0, 0], [1, 1, 1]], density_kg_m3 = 1 }]"
                   : "bodies.robot.parts=[{ shell = 0, density_kg_m3 = 1 }]"};
     if (key.parent() == "forces[]") sets = {"forces=[{ body = \"robot\", to_s = 1, force_n = [1, 0, 0] }]"};
+    if (key.parent() == "ligaments[]")
+      sets = {
+          "ligaments=[{ name = \"band\", from = \"robot\", from_m = [0, 0, 0], to = \"gate\", to_m = [1, 0, "
+          "0], "
+          "stiffness_n_m = 1 }]"};
     if (key.path.starts_with("motions[]"))
       sets = {"bodies.gate.kind=rigid",
               "motions=[{ body = \"gate\", keyframes = [{ at_s = 1, angle_deg = 10 }] }]"};
@@ -765,7 +798,7 @@ TEST(Keys, EveryKeyChangesTheScene) {
                                      key.path == "bodies[].triangles"
                                  ? "bodies.gate"
                                  : "bodies.robot";
-    for (const char* list : {"via", "forces", "motions"})
+    for (const char* list : {"via", "forces", "motions", "ligaments"})
       if (path.starts_with(list + std::string("[]")))
         path = replaced(path, list + std::string("[]"), list + std::string(".0"));
     if (path.starts_with("bodies[]")) path = replaced(path, "bodies[]", body);
@@ -774,8 +807,9 @@ TEST(Keys, EveryKeyChangesTheScene) {
     if (path.starts_with("film.cuts[]")) path = replaced(path, "cuts[]", "cuts.0");
     if (path.starts_with("cameras[]")) path = replaced(path, "cameras[]", "cameras.side");
     if (path.find("keyframes[]") != path.npos) path = replaced(path, "keyframes[]", "keyframes.0");
-    const std::string text = key.path == "motions[].body" ? good + shutter : good,
-                      before = all_of(read_scene(text, "s", sets));
+    const bool other =
+        key.path == "motions[].body" || key.path == "ligaments[].from" || key.path == "ligaments[].to";
+    const std::string text = other ? good + shutter : good, before = all_of(read_scene(text, "s", sets));
     sets.push_back(path + "=" + another_value(key));
     SCOPED_TRACE(sets.back());
     EXPECT_NE(all_of(read_scene(text, "s", sets)), before);
@@ -936,6 +970,10 @@ std::string all_of(const Scene& s) {
     for (const MotionSpec::Keyframe& k : m.keyframes)
       t += fmt::format(" {} {} {} {}\n", k.at_s, v(k.position_m), v(k.axis), k.angle_deg);
   }
+  for (const LigamentSpec& l : s.ligaments)
+    t += fmt::format("{} {} {} {} {} {} {} {} {} {} {} {}\n", l.name, l.from, v(l.from_m), l.to, v(l.to_m),
+                     l.radius_m, l.stiffness_n_m, l.damping_ratio, l.rest_length, l.pushes,
+                     l.diameter_m.value_or(-1), v(l.color_srgb));
   const PlannerSpec& p = s.planner;
   t += fmt::format("{} {} {} {} {}\n", s.robot, v(s.goal.center_of_mass_m), s.goal.radius_m,
                    s.goal.moves_with, s.goal.lost_below_m.value_or(-1));

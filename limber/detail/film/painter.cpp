@@ -121,6 +121,12 @@ struct Shot::Painter::View {
             renderer.add_mesh(shot.scenery_[s].triangles, shot.scenery_[s].positions,
                               look_of(shot.scene_.scenery[s], size_of(shot.scenery_[s]))),
             shot.cuts_of(int(shot.bodies_.size() + s)));
+    for (std::size_t l = 0; l < shot.scene_.ligaments.size(); ++l) {
+      const scenes::LigamentSpec& ligament = shot.scene_.ligaments[l];
+      ligaments.push_back(renderer.add_mesh(
+          render::rod_triangles(), render::rod(ligament.from_m, ligament.to_m, radius_of(l)),
+          {.name = ligament.name, .color_srgb = ligament.color_srgb, .roughness = 0.5}));
+    }
     for (std::size_t b = 0; b < shot.bodies_.size(); ++b) add_caster(b);
     const scenes::FilmSpec& film = shot.scene_.film;
     if (film.bounds_lines) renderer.add_lines(render::edges_of(shot.scene_.bounds_m), {});
@@ -135,6 +141,12 @@ struct Shot::Painter::View {
             render::arrow_triangles(), render::arrow(nowhere, nowhere + Vec3::UnitX(), shot.arrow_radius_m_),
             {.name = "arrow", .color_srgb = is_push ? push_color : contact_color, .roughness = 0.6}));
       }
+  }
+
+  double radius_of(std::size_t ligament) const {
+    constexpr double usual = 1 / 15.0;  // of its length
+    const scenes::LigamentSpec& spec = shot.scene_.ligaments[ligament];
+    return 0.5 * spec.diameter_m.value_or(usual * (spec.to_m - spec.from_m).norm());
   }
 
   // Behind the body where it is now.
@@ -335,6 +347,9 @@ struct Shot::Painter::View {
       hulls[b] = fem::body_positions(shot.world_, state, int(b));
       move_body(b);
     }
+    const std::vector<fem::LigamentPull> pulls = fem::ligament_pulls(shot.world_, state);
+    for (std::size_t l = 0; l < pulls.size(); ++l)
+      renderer.set_positions(ligaments[l], render::rod(pulls[l].from_m, pulls[l].to_m, radius_of(l)));
     occlude();
     for (std::size_t p = 0; p < panes.size(); ++p) show_pane(p, shot.shown(shot.panes_[p].shown, frame));
     if (arrows.empty()) return;
@@ -353,7 +368,7 @@ struct Shot::Painter::View {
   const Shot& shot;
   bool cages;
   render::Renderer renderer;
-  std::vector<int> meshes, cage_lines_of, arrows;
+  std::vector<int> meshes, ligaments, cage_lines_of, arrows;
   struct PaneMeshes {
     int glass, rim;
   };

@@ -50,12 +50,14 @@ scenes::Scene filmed_as(const scenes::Scene& planned, const std::vector<std::str
         (last == "color" || last == "texture" || last == "opacity" || last == "look" || last == "roughness" ||
          last == "metallic" || (last == "deformation" && all_touched_at_cages(planned)));
     const bool film = key.starts_with("film.") && key != "film.speed" && key != "film.frames_per_second";
-    if (!look && !film && key != "cameras" && !key.starts_with("camera.") && !key.starts_with("cameras."))
+    const bool ligament = key.starts_with("ligaments.") && (last == "color" || last == "diameter_m");
+    if (!look && !film && !ligament && key != "cameras" && !key.starts_with("camera.") &&
+        !key.starts_with("cameras."))
       throw InputError(fmt::format(
           "--set {}: the motion is planned already; what can be set here are film (but speed and "
           "frames_per_second), camera, cameras, and color, texture, opacity, look, roughness and metallic "
-          "of bodies (and "
-          "deformation, where all are touched at their cages); "
+          "of bodies (and deformation, where all are touched at their cages), color and diameter_m of "
+          "ligaments; "
           "for the rest plan anew with limber plan",
           set));
   }

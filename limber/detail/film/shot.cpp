@@ -83,6 +83,8 @@ Shot::Shot(const scenes::Scene& scene, const std::string& camera, const plan::Pl
   lay_out_time();
   look_.stage = box_of_motion();
   for (const SurfaceMesh& mesh : scenery) look_.stage.include(bounding_box(mesh.positions));
+  for (const scenes::LigamentSpec& ligament : scene.ligaments)
+    look_.stage.include(ligament.from_m), look_.stage.include(ligament.to_m);
   lay_out_camera(double(look_.width) / look_.height);
   look_.toward_key = toward_key_light(path_.front().camera);
   if (!output.passes.empty()) measure_depths();

@@ -80,6 +80,11 @@ std::uint64_t Shot::hash_of_look() const {
     hasher.value(limber::hash_of(scenery_[s]));
     add_look(scene_.scenery[s]);
   }
+  for (const scenes::LigamentSpec& ligament : scene_.ligaments) {
+    hasher.text(ligament.name).value(ligament.from).value(ligament.to).value(ligament.radius_m);
+    hasher.matrix(ligament.from_m).matrix(ligament.to_m).matrix(ligament.color_srgb);
+    if (ligament.diameter_m) hasher.value(*ligament.diameter_m);
+  }
   return hasher.digest();
 }
 

@@ -31,6 +31,7 @@ Json Shot::key_of_passes() const {
   std::vector<std::string> objects{""};
   for (const auto* bodies : {&scene_.bodies, &scene_.scenery})
     for (const scenes::BodySpec& body : *bodies) objects.push_back(body.name);
+  for (const scenes::LigamentSpec& ligament : scene_.ligaments) objects.push_back(ligament.name);
   Json key{{"depth_m", {near_m_, far_m_}}, {"objects", objects}};
   if (scene_.film.color_by != scenes::ColorBy::body)
     key["scalar"] = {{"of", caption_of(scene_.film.color_by)}, {"range", {low_, high_}}};

@@ -107,17 +107,10 @@ void stage(Page& page) {
       "plays, arrow keys step. Click in a plot to go there.</p>\n");
 }
 
-// At most eight pairs, those that press most, each in a color of its own: bodies' colors may be alike.
-std::vector<render::Curve> curves_of_pairs(const Findings& f) {
+// At most eight, those that reach highest, each in a color of its own: bodies' colors may be alike.
+std::vector<render::Curve> highest(std::vector<std::pair<double, render::Curve>> all) {
   const Vec3 colors[] = {{0.80, 0.20, 0.15}, {0.16, 0.50, 0.73}, {0.90, 0.49, 0.13}, {0.25, 0.60, 0.30},
                          {0.55, 0.35, 0.70}, {0.45, 0.35, 0.25}, {0.85, 0.45, 0.65}, {0.40, 0.40, 0.45}};
-  std::vector<std::pair<double, render::Curve>> all;
-  for (const auto& [body, other, name] : touching_pairs(f.world, f.figures)) {
-    render::Curve curve{name, {}, {}, {}};
-    for (const FrameFigures& frame : f.figures.frames)
-      curve.x.push_back(frame.time_s), curve.y.push_back(pair_force_n(frame, body, other));
-    all.emplace_back(*std::max_element(curve.y.begin(), curve.y.end()), std::move(curve));
-  }
   std::stable_sort(all.begin(), all.end(), [](const auto& a, const auto& b) { return a.first > b.first; });
   std::vector<render::Curve> curves;
   for (const Vec3& color : colors) {
@@ -126,6 +119,30 @@ std::vector<render::Curve> curves_of_pairs(const Findings& f) {
     curves.back().color_srgb = color;
   }
   return curves;
+}
+
+std::pair<double, render::Curve> curve_of(const Findings& f, const std::string& name, const auto& value) {
+  render::Curve curve{name, {}, {}, {}};
+  for (const FrameFigures& frame : f.figures.frames)
+    curve.x.push_back(frame.time_s), curve.y.push_back(value(frame));
+  const double most = *std::max_element(curve.y.begin(), curve.y.end());
+  return {most, std::move(curve)};
+}
+
+std::vector<render::Curve> curves_of_pairs(const Findings& f) {
+  std::vector<std::pair<double, render::Curve>> all;
+  for (const TouchingPair& pair : touching_pairs(f.world, f.figures))
+    all.push_back(curve_of(
+        f, pair.name, [&](const FrameFigures& frame) { return pair_force_n(frame, pair.body, pair.other); }));
+  return highest(std::move(all));
+}
+
+std::vector<render::Curve> curves_of_ligaments(const Findings& f) {
+  std::vector<std::pair<double, render::Curve>> all;
+  for (std::size_t l = 0; l < f.world.ligaments.size(); ++l)
+    all.push_back(curve_of(f, f.world.ligaments[l].name,
+                           [&](const FrameFigures& frame) { return frame.ligament_tension_n[l]; }));
+  return highest(std::move(all));
 }
 
 void plots(const Findings& f, Page& page) {
@@ -174,6 +191,7 @@ void plots(const Findings& f, Page& page) {
   for (std::size_t b = away.size(); b-- > 0;)
     if (!(f.world.bodies[b].material.fascia_hz > 0)) away.erase(away.begin() + std::ptrdiff_t(b));
   if (!away.empty()) plot("How far organs in fascia are from their places", "centre of mass (mm)", away);
+  if (const auto pulls = curves_of_ligaments(f); !pulls.empty()) plot("Ligaments", "tension (N)", pulls);
   if (const auto pairs = curves_of_pairs(f); !pairs.empty())
     plot("Contact, pair by pair", "sum of forces of a pair (N)", pairs);
   plot("Largest strain of a tet", "Green's strain",

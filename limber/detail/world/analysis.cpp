@@ -57,6 +57,8 @@ FrameFigures measure_frame(const fem::World& world, const State& state) {
     body.away_m =
         (fem::center_of_mass_m(world, state, b) - place_in_scene(world.bodies[std::size_t(b)])).norm();
   }
+  for (const fem::LigamentPull& pull : fem::ligament_pulls(world, state))
+    frame.ligament_tension_n.push_back(pull.tension_n);
   frame.penetration = fem::deepest_penetration(world, state);
   frame.penetration_between = between(world, frame.penetration.body, frame.penetration.other);
   frame.inverted_tets = fem::inverted_tets(world, state);
@@ -229,6 +231,7 @@ void write_observables(const fs::path& csv, const fem::World& world, const Motio
       "m";
   const std::vector<TouchingPair> pairs = touching_pairs(world, figures);
   for (const TouchingPair& pair : pairs) text += fmt::format(",{}.contact_force_n", pair.name);
+  for (const fem::Ligament& ligament : world.ligaments) text += fmt::format(",{}.tension_n", ligament.name);
   text += "\n";
   for (const FrameFigures& frame : figures.frames) {
     text += fmt::format("{}", frame.time_s);
@@ -257,6 +260,7 @@ void write_observables(const fs::path& csv, const fem::World& world, const Motio
                         wall ? wall->at_contact_m : 0.0);
     for (const auto& [body, other, name] : pairs)
       text += fmt::format(",{}", pair_force_n(frame, body, other));
+    for (const double tension_n : frame.ligament_tension_n) text += fmt::format(",{}", tension_n);
     text += "\n";
   }
   write_file(csv, text);

@@ -28,6 +28,7 @@ struct BodyFigures {          // of one frame; all 0 for a body that does not mo
 struct FrameFigures {
   double time_s = 0;
   std::vector<BodyFigures> bodies;
+  std::vector<double> ligament_tension_n;              // in their order
   std::map<std::pair<int, int>, double> pair_force_n;  // of two bodies that touch, the lower first; walls: −1
   double contact_force_n = 0;   // the largest sum over one pair of bodies, or a body and the walls
   std::string contact_between;  // "robot and floor", "robot and a wall"; "nothing touches"

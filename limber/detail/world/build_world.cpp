@@ -62,6 +62,17 @@ void set_script(const scenes::Scene& scene, const std::vector<PreparedBody>& pre
   }
 }
 
+void set_ligaments(const scenes::Scene& scene, fem::WorldSpec& spec) {
+  for (const scenes::LigamentSpec& ligament : scene.ligaments)
+    spec.ligaments.push_back({.name = ligament.name,
+                              .ends = {{{ligament.from, ligament.from_m, ligament.radius_m},
+                                        {ligament.to, ligament.to_m, ligament.radius_m}}},
+                              .stiffness_n_m = ligament.stiffness_n_m,
+                              .damping_ratio = ligament.damping_ratio,
+                              .rest_length = ligament.rest_length,
+                              .pushes = ligament.pushes});
+}
+
 // The cage weighs what the model does, as far as that has an inside: densities are of the model, and the cage
 // is larger, so its own density is lower by the ratio of the volumes. Where the model is not closed the ratio
 // is 1.
@@ -272,6 +283,7 @@ fem::WorldSpec spec_of_world(const scenes::Scene& scene, const std::vector<Prepa
   for (std::size_t b = 0; b < prepared.size(); ++b)
     spec.bodies.push_back(spec_of_body(scene, scene.bodies[b], prepared[b]));
   set_script(scene, prepared, spec);
+  set_ligaments(scene, spec);
   require_patches(scene, prepared[std::size_t(scene.robot)]);
   set_contact(scene, prepared, spec);
   spec.robot = scene.robot;
@@ -290,6 +302,9 @@ fem::World build_world_of(const scenes::Scene& scene, const fem::WorldSpec& spec
   try {
     return fem::build_world(spec);
   } catch (const InputError& error) {
+    for (const scenes::LigamentSpec& ligament : scene.ligaments)
+      if (std::string_view(error.what()).starts_with(fmt::format("ligament {}:", ligament.name)))
+        throw InputError(fmt::format("{}: {}", ligament.where, error.what()));
     for (const scenes::BodySpec& body : scene.bodies)  // the first that is named has the place
       if (fmt::format(" {} ", error.what()).find(fmt::format(" {} ", body.name)) != std::string::npos ||
           std::string_view(error.what()).find(fmt::format("body {}:", body.name)) != std::string_view::npos)

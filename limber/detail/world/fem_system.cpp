@@ -30,6 +30,16 @@ void add_script(const fem::World& world, Hasher& hasher) {
     hasher.matrix(force.force_n).value(force.mass_kg);
     for (const int n : force.nodes) hasher.value(n);
   }
+  for (const fem::Ligament& ligament : world.ligaments) {
+    hasher.text("ligament").value(ligament.stiffness_n_m).value(ligament.damping_n_s_m);
+    hasher.value(ligament.rest_length_m).value(int(ligament.pushes));
+    for (const fem::Ligament::End& end : ligament.ends) {
+      hasher.value(end.body);
+      if (end.body < 0) hasher.matrix(end.point_m);
+      for (const int node : end.nodes) hasher.value(node);
+      for (const double weight : end.weights) hasher.value(weight);
+    }
+  }
   for (const fem::Body& body : world.bodies) {
     if (!body.velocity_m_s.isZero(0) || !body.angular_velocity_rad_s.isZero(0))
       hasher.text("velocity").text(body.name).matrix(body.velocity_m_s).matrix(body.angular_velocity_rad_s);
