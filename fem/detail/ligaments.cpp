@@ -8,12 +8,15 @@
 // 2 (√(1 + ζ²) − ζ)/ω (docs/dynamics.md, "Step").
 #include "fem/detail/ligaments.h"
 
+#include <Eigen/Eigenvalues>
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
 #include "core/error.h"
 #include "fem/detail/make_body.h"
+#include "fem/detail/overlap.h"
 
 namespace limber::fem::detail {
 namespace {
@@ -25,26 +28,37 @@ Eigen::Vector4d weights_in(const Body& body, Eigen::Index tet, const Vec3& point
   return {1 - rest.sum(), rest.x(), rest.y(), rest.z()};
 }
 
-// The tet that holds the point, or, of a point that is by a tenth of the body's size away at most, the one
-// that it is least outside of.
+// The tet that holds the point, or, as far as a tenth of the body's size away, that of the nearest point of
+// its cage.
 void hang_at_point(const LigamentSpec& spec, const LigamentSpec::End& end, const Body& body,
                    Ligament::End& made) {
-  double best = -std::numeric_limits<double>::infinity();
+  Vec3 point = end.point_m;
   Eigen::Index tet = 0;
-  for (Eigen::Index t = 0; t < body.cage.tets.rows(); ++t)
-    if (const double least = weights_in(body, t, end.point_m).minCoeff(); least > best) best = least, tet = t;
-  Eigen::Vector4d weights = weights_in(body, tet, end.point_m).cwiseMax(0);
+  const auto find = [&] {
+    double best = -std::numeric_limits<double>::infinity();
+    for (Eigen::Index t = 0; t < body.cage.tets.rows(); ++t)
+      if (const double least = weights_in(body, t, point).minCoeff(); least > best) best = least, tet = t;
+    return best;
+  };
+  if (find() < 0) {
+    const auto corner = [&](int node) -> Vec3 { return body.cage.positions.row(node); };
+    Vec3 nearest = corner(body.surface(0, 0));
+    for (const auto& t : body.surface.rowwise())
+      if (const Vec3 on = nearest_on_triangle(end.point_m, corner(t[0]), corner(t[1]), corner(t[2]));
+          (on - point).norm() < (nearest - point).norm())
+        nearest = on;
+    constexpr double farthest = 0.1;
+    if (const double away_m = (nearest - point).norm();
+        away_m > farthest * bounding_box(body.cage.positions).diagonal())
+      throw InputError(
+          fmt::format("ligament {}: its end is {:.3g} m away from body {}, at {:.4g}, {:.4g}, {:.4g} the "
+                      "nearest; put it there",
+                      spec.name, away_m, body.name, nearest.x(), nearest.y(), nearest.z()));
+    point = nearest;
+    find();
+  }
+  Eigen::Vector4d weights = weights_in(body, tet, point).cwiseMax(0);
   weights /= weights.sum();
-  Vec3 hung = Vec3::Zero();
-  for (int i = 0; i < 4; ++i)
-    hung += weights[i] * body.cage.positions.row(body.cage.tets(tet, i)).transpose();
-  constexpr double farthest = 0.1;
-  const double away_m = (hung - end.point_m).norm(), size_m = bounding_box(body.cage.positions).diagonal();
-  if (away_m > farthest * size_m)
-    throw InputError(
-        fmt::format("ligament {}: its end is {:.3g} m away from body {}, at {:.4g}, {:.4g}, {:.4g} the "
-                    "nearest; put it there",
-                    spec.name, away_m, body.name, hung.x(), hung.y(), hung.z()));
   for (int i = 0; i < 4; ++i)
     if (weights[i] > 0)
       made.nodes.push_back(body.first_node + body.cage.tets(tet, i)), made.weights.push_back(weights[i]);

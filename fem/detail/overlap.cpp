@@ -32,6 +32,8 @@ bool is_above(const Vec3& p, const Vec3& n, const Vec3& a, const Vec3& b, const 
          n.dot((a - c).cross(p - c)) >= 0;
 }
 
+}  // namespace
+
 Vec3 nearest_on_triangle(const Vec3& p, const Vec3& a, const Vec3& b, const Vec3& c) {
   const Vec3 n = (b - a).cross(c - a);
   if (is_above(p, n, a, b, c)) return p - n.dot(p - a) / n.squaredNorm() * n;
@@ -40,8 +42,6 @@ Vec3 nearest_on_triangle(const Vec3& p, const Vec3& a, const Vec3& b, const Vec3
     if ((p - other).norm() < (p - nearest).norm()) nearest = other;
   return nearest;
 }
-
-}  // namespace
 
 double distance_to_triangle(const Vec3& p, const Vec3& a, const Vec3& b, const Vec3& c) {
   const Vec3 n = (b - a).cross(c - a);

@@ -12,6 +12,7 @@ struct Shape {
   const Triangles& surface;
 };
 
+Vec3 nearest_on_triangle(const Vec3& p, const Vec3& a, const Vec3& b, const Vec3& c);
 double distance_to_triangle(const Vec3& p, const Vec3& a, const Vec3& b, const Vec3& c);
 
 struct Overlap {

@@ -3,9 +3,12 @@
 
 #include <cmath>
 #include <limits>
+#include <map>
 #include <set>
 
+#include "core/hash.h"
 #include "fem/observe.h"
+#include "limber/detail/film/shot.h"
 #include "limber/detail/plan/plan_folder.h"
 #include "limber/detail/world/scene_world.h"
 #include "render/png_file.h"
@@ -88,6 +91,34 @@ int changed_pixels(const render::Image8& a, const render::Image8& b) {
   for (std::size_t i = 0; i + 2 < a.rgb.size(); i += 3)
     changed += !std::equal(&a.rgb[i], &a.rgb[i] + 3, &b.rgb[i]);
   return changed;
+}
+
+// A hash tells what a frame is painted from, not how. So where the same film gets other pixels, its
+// generation is another, too: else frames of before would be kept beside those of now.
+TEST_F(Story_slow, OtherPicturesAreAnotherGeneration) {
+  std::string pixels;
+  for (const char* look : {"studio", "dark", "clinical", "paper"}) {
+    const Result painted = limber_program(
+        {"render",   out(),
+         "--as",     "try",
+         "--frames", "0",
+         "--size",   "320x180",
+         "--set",    std::string("film.look=") + look,
+         "--set",    "film.caption=Words",
+         "--set",    "film.clock=true",
+         "--set",    "film.scale_bar=true",
+         "--set",    look == std::string("paper") ? "film.outlines=true" : "bodies.cube.opacity=0.5",
+         "--set",    look == std::string("dark") ? "film.color_by=speed" : "bodies.cube.look=tissue",
+         "--set",    "film.inset={ camera = \"behind\" }"});
+    ASSERT_EQ(painted.code, exit_done) << painted.err;
+    pixels += render::pixel_hash(frame("0000.png")) + " ";
+  }
+  const std::map<int, std::string> known{{9, ""}};
+  ASSERT_TRUE(known.contains(picture_generation));
+  EXPECT_EQ(known.at(picture_generation), hex(hash_of(std::string_view(pixels))))
+      << "pictures are others than they were: raise picture_generation in limber/detail/film/shot.h, and "
+         "write it and "
+         "this hash into the list";
 }
 
 TEST_F(Story_slow, FilmsAreSlowWhereTheRobotIsTouchedAndQuickWhereItIsNot) {

@@ -129,7 +129,9 @@ TEST(Ligaments, AreSlackWhereTheyAreShort) {
   LigamentSpec ligament = between_centres(300);
   ligament.rest_length = 1.2;
   const World slack = build_world(pair(ligament));
-  EXPECT_EQ(after(slack, 0.5).positions, start_state(slack).positions);
+  WorldSpec without = pair(ligament);
+  without.ligaments.clear(), without.max_dt_s = slack.dt_s;
+  EXPECT_EQ(after(slack, 0.5), after(build_world(without), 0.5));
   ligament.pushes = true;
   const World pushes = build_world(pair(ligament));
   EXPECT_GT(apart(pushes, after(pushes, 0.2)), 3.05);
@@ -141,7 +143,7 @@ TEST(Ligaments, AreSlackWhereTheyAreShort) {
 TEST(Ligaments, StiffOnesShortenTheStep) {
   const double loose = build_world(pair(between_centres(1))).dt_s;
   for (const double ratio : {0.0, 2.0}) {
-    WorldSpec spec = pair(between_centres(1e7));
+    WorldSpec spec = pair(between_centres(1e8));
     spec.ligaments[0].pushes = true, spec.ligaments[0].rest_length = 0.99,
     spec.ligaments[0].damping_ratio = ratio;
     for (int more = 1; more < 6; ++more) spec.ligaments.push_back(spec.ligaments[0]);

@@ -3,18 +3,25 @@
 
 #include <gtest/gtest.h>
 
+#include <map>
+
 #include "meshing/contact_shape.h"
 #include "scenes/shapes.h"
 
 namespace limber::detail {
 namespace {
 
+// Its shape is made once a size, and moved.
 LaidBody cube(const Vec3& center, double edge = 1, bool held = false) {
-  TetMesh cage = scenes::make_box_cage(Vec3::Constant(edge), {2, 2, 2});
-  cage.positions.rowwise() += center.transpose();
-  return {std::make_shared<const ContactShape>(meshing::make_contact_shape(
-              {cage.positions, boundary_triangles(cage.tets)}, cage, {.cells = 48, .max_cells = 48})),
-          held};
+  static std::map<double, ContactShape> made;
+  if (!made.contains(edge)) {
+    const TetMesh cage = scenes::make_box_cage(Vec3::Constant(edge), {2, 2, 2});
+    made[edge] = meshing::make_contact_shape({cage.positions, boundary_triangles(cage.tets)}, cage,
+                                             {.cells = 48, .max_cells = 48});
+  }
+  ContactShape shape = made[edge];
+  shape.field.lower_m += center, shape.samples.positions_m.rowwise() += center.transpose();
+  return {std::make_shared<const ContactShape>(std::move(shape)), held};
 }
 
 double deepest(const std::vector<LaidBody>& bodies, const std::vector<Vec3>& ways) {
@@ -57,12 +64,22 @@ TEST(Layout, GoesNoFartherThanItMust) {
   EXPECT_LT(std::abs((*ways)[0].y()) + std::abs((*ways)[0].z()), 0.01);
 }
 
-// Two cubes with a gap of 0.005 go on to the room that is asked for.
-TEST(Layout, LeavesTheRoomThatIsAskedFor) {
-  const std::vector<LaidBody> bodies{cube({0, 0, 0}), cube({1.005, 0, 0})};
-  const auto ways = ways_apart(bodies, 0.012, 1);
+// Two cubes that are 0.015 in one another go on to the room that is asked for; with a gap of their own they
+// keep it, also when a third comes between others.
+TEST(Layout, LeavesTheRoomThatIsAskedForOrThatThereWas) {
+  const auto ways = ways_apart({cube({0, 0, 0}), cube({0.985, 0, 0})}, 0.012, 1);
   ASSERT_TRUE(ways);
-  EXPECT_NEAR((*ways)[1].x() - (*ways)[0].x(), 0.007, 0.003);
+  EXPECT_NEAR((*ways)[1].x() - (*ways)[0].x(), 0.027, 0.004);
+  const auto stay = ways_apart({cube({0, 0, 0}), cube({1.006, 0, 0})}, 0.012, 1);
+  ASSERT_TRUE(stay);
+  EXPECT_EQ((*stay)[0], Vec3::Zero());
+  EXPECT_EQ((*stay)[1], Vec3::Zero());
+  // The middle one of three has 0.006 of room on both sides, and nowhere to go: the fourth gives way.
+  const auto four = ways_apart(
+      {cube({0, 0, 0}, 1, true), cube({1.006, 0, 0}), cube({2.012, 0, 0}, 1, true), cube({1.006, 0.9, 0})},
+      0.012, 1);
+  ASSERT_TRUE(four);
+  EXPECT_NEAR((*four)[1].x(), 0, 0.004);
 }
 
 TEST(Layout, WhatIsApartStays) {

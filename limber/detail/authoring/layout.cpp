@@ -12,6 +12,9 @@ namespace {
 constexpr int max_rounds = 200;
 // Parting goes by so much farther, of the size of all.
 constexpr double slack = 1e-4;
+// Of the cells of the coarser field: by so much two surfaces that touch nowhere may seem to be in one
+// another, at their edges.
+constexpr double field_error = 0.3;
 
 Vec3 gradient(const DistanceField& field, const Vec3& p) {
   Vec3 rise;
@@ -43,19 +46,29 @@ void look_up(const SurfaceSamples& samples, const DistanceField& field, const Ve
 struct Layout {
   std::vector<LaidBody> bodies;
   std::vector<Vec3> way_m;
-  double room_m, slack_m;
+  std::vector<double> room_m;  // [pair]
+  double slack_m;
 
   Layout(std::vector<LaidBody> laid, double room)
-      : bodies(std::move(laid)), way_m(bodies.size(), Vec3::Zero()), room_m(room) {
+      : bodies(std::move(laid)),
+        way_m(bodies.size(), Vec3::Zero()),
+        room_m(bodies.size() * bodies.size(), room) {
     Box all;
     for (const LaidBody& body : bodies) all.include(box_of(body.shape->field));
     slack_m = slack * all.diagonal();
+    for (std::size_t i = 0; i < bodies.size(); ++i)
+      for (std::size_t j = i + 1; j < bodies.size(); ++j) {
+        const double gap = room - overlap(i, j).depth_m,
+                     cell = std::max(bodies[i].shape->field.cell_m, bodies[j].shape->field.cell_m);
+        if (gap > -field_error * cell) room_m[i * bodies.size() + j] = gap - 0.01 * slack_m;
+      }
   }
   void move(std::size_t i, const Vec3& by) { way_m[i] += by; }
   // Of two that may part.
   Nearness overlap(std::size_t i, std::size_t j) const {
     if (bodies[i].held && bodies[j].held) return {};
-    return nearness(*bodies[i].shape, way_m[i], *bodies[j].shape, way_m[j], room_m);
+    const double room = room_m[std::min(i, j) * bodies.size() + std::max(i, j)];
+    return nearness(*bodies[i].shape, way_m[i], *bodies[j].shape, way_m[j], room);
   }
   bool is_free(std::size_t i) const {
     for (std::size_t j = 0; j < bodies.size(); ++j)
@@ -81,6 +94,15 @@ struct Layout {
         move(i, share * way), move(j, -(1 - share) * way);
       }
     return apart;
+  }
+
+  std::pair<std::size_t, std::size_t> deepest() const {
+    std::pair<std::size_t, std::size_t> pair(0, 0);
+    double depth_m = -1;
+    for (std::size_t i = 0; i < bodies.size(); ++i)
+      for (std::size_t j = i + 1; j < bodies.size(); ++j)
+        if (const double found_m = overlap(i, j).depth_m; found_m > depth_m) depth_m = found_m, pair = {i, j};
+    return pair;
   }
 
   // Whether one went back by more than a little.
@@ -111,15 +133,20 @@ Nearness nearness(const ContactShape& one, const Vec3& way_of_one_m, const Conta
   return deepest;
 }
 
-std::optional<std::vector<Vec3>> ways_apart(std::vector<LaidBody> bodies, double room_m, double reach_m) {
+std::optional<std::vector<Vec3>> ways_apart(std::vector<LaidBody> bodies, double room_m, double reach_m,
+                                            std::pair<std::size_t, std::size_t>* stuck) {
   Layout layout(std::move(bodies), room_m);
+  const auto give_up = [&] {
+    if (stuck) *stuck = layout.deepest();
+    return std::nullopt;
+  };
   int round = 0;
   for (; !layout.part_all(); ++round) {
     throw_if_stopped();
-    if (round == max_rounds || layout.farthest() > 2 * reach_m) return std::nullopt;
+    if (round == max_rounds || layout.farthest() > 2 * reach_m) return give_up();
   }
   while (round > 0 && layout.go_back()) throw_if_stopped();
-  if (layout.farthest() > reach_m) return std::nullopt;
+  if (layout.farthest() > reach_m) return give_up();
   return layout.way_m;
 }
 

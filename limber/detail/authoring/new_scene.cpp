@@ -38,8 +38,6 @@ constexpr double min_thickness = 0.02;
 constexpr double scale_step = 0.05, min_scale = 0.3;
 constexpr double reach = 0.03;
 constexpr double room = 0.005;  // between two surfaces, as a share of the robot's size: so near they push
-// Good enough to part organs by; a plan takes the usual ones.
-constexpr meshing::ContactShapeSettings rough{.cells = 48, .max_cells = 64, .max_nodes = 300'000};
 constexpr int max_triangles_seen_through = 30'000;
 constexpr int points_looked_at = 150;  // of the robot
 
@@ -146,10 +144,10 @@ void make_cage(const NewSceneOptions& options, Organ& organ) {
   SurfaceMesh surface = organ.surface;
   to_our_frame(options, surface.positions);
   organ.cage = meshing::build_cage(surface, {}, {.tets = organ.bone ? bone_tets : options.tets}).mesh;
-  ContactShape shape = meshing::make_contact_shape(surface, organ.cage, rough);
+  ContactShape shape = meshing::make_contact_shape(surface, organ.cage);
   if (!shape.usable)  // as in a scene: touched at its cage
-    shape = meshing::make_contact_shape({organ.cage.positions, boundary_triangles(organ.cage.tets)},
-                                        organ.cage, rough);
+    shape =
+        meshing::make_contact_shape({organ.cage.positions, boundary_triangles(organ.cage.tets)}, organ.cage);
   organ.shape = std::make_shared<const ContactShape>(std::move(shape));
 }
 
@@ -183,8 +181,14 @@ bool move_apart(std::vector<Organ>& organs, double scale, double room_m, double 
   std::vector<LaidBody> bodies;
   for (const std::size_t i : simulated(organs))
     bodies.push_back({scaled(*organs[i].shape, organs[i].box.center(), scale), organs[i].bone});
-  const auto ways = ways_apart(std::move(bodies), room_m, reach_m);
-  if (!ways) return false;
+  std::pair<std::size_t, std::size_t> stuck;
+  const auto ways = ways_apart(std::move(bodies), room_m, reach_m, &stuck);
+  if (!ways) {
+    const std::vector<std::size_t> which = simulated(organs);
+    log::info("  {} and {} do not come apart", organs[which[stuck.first]].name,
+              organs[which[stuck.second]].name);
+    return false;
+  }
   std::size_t next = 0;
   for (const std::size_t i : simulated(organs)) organs[i].way_m += (*ways)[next++];
   return true;
@@ -624,7 +628,7 @@ std::vector<PreparedBody> bodies_of(const scenes::Scene& scene, const std::vecto
                       surface.positions);
     PreparedBody& prepared = bodies.emplace_back();
     prepared.cage = meshing::build_cage(surface, {}, {.tets = body.cage.tets}).mesh;
-    prepared.contact = meshing::make_contact_shape(surface, prepared.cage, rough);
+    prepared.contact = meshing::make_contact_shape(surface, prepared.cage);
     prepared.surface = std::move(surface);
   }
   return bodies;

@@ -28,6 +28,9 @@ struct Output {
   std::vector<std::string> passes;  // of pass_names
   bool occlusion = true;            // what cages hide of one another's sky; false where none are made yet
 };
+// Raised when the same film comes out otherwise, so that it is painted anew (a test holds one by the other).
+inline constexpr int picture_generation = 9;
+
 inline const std::vector<std::string> pass_names{"depth", "normal", "object", "scalar"};
 
 struct Picture {

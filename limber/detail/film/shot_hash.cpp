@@ -4,7 +4,7 @@
 // It is made of what the picture is made from, not of its pixels, so that it is known before anything is
 // painted. What is the same for all frames is hashed once (hash_of_look). A key that is added to the film
 // must be added here, too; keys that came later add nothing where they are off, so that pictures of older
-// films keep their hash. `generation` is raised when the painting itself changes.
+// films keep their hash. `picture_generation` is raised when the painting itself changes.
 #include <fmt/ranges.h>
 
 #include "core/hash.h"
@@ -13,17 +13,10 @@
 
 namespace limber::detail {
 
-namespace {
-
-// Of pictures: raised when the same film comes out otherwise, so that it is painted anew.
-constexpr int generation = 8;
-
-}  // namespace
-
 std::uint64_t Shot::hash_of_look() const {
   const scenes::FilmSpec& film = scene_.film;
   Hasher hasher;
-  hasher.text(version).value(generation).value(look_.width).value(look_.height).value(int(film.look));
+  hasher.text(version).value(picture_generation).value(look_.width).value(look_.height).value(int(film.look));
   if (film.background_srgb) hasher.matrix(*film.background_srgb);
   if (film.ground_m) hasher.text("ground").value(*film.ground_m);
   hasher.matrix(look_.stage.lower).matrix(look_.stage.upper).matrix(scene_.bounds_m.lower);
