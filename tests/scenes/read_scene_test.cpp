@@ -695,6 +695,7 @@ std::string another_value(const Key& key) {
       {"forces[].body", "\"gate\""},
       {"forces[].box_m", "[[0, 0, 0], [1, 2, 2]]"},
       {"motions[].body", "\"shutter\""},
+      {"ligaments[].name", "\"other\""},
       {"ligaments[].from", "\"shutter\""},
       {"ligaments[].to", "\"shutter\""},
       {"film.inset.camera", "\"main\""},
