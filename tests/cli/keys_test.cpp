@@ -247,7 +247,7 @@ const std::vector<Row> rows{
      "0.45], stiffness_n_m = 40 }]",
      film, one_ligament},
     {"ligaments[].from",
-     "ligaments=[{ name = \"band\", from = \"block\", from_m = [0.6, 1, 1.3], to = \"robot\", to_m = [2, 1, "
+     "ligaments=[{ name = \"band\", from = \"cart\", from_m = [3.4, 1, 0.3], to = \"block\", to_m = [2, 1, "
      "0.45], stiffness_n_m = 40 }]",
      world | film, one_ligament},
     {"ligaments[].from_m",
