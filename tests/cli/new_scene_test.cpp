@@ -12,6 +12,7 @@
 #include "scenes/scene.h"
 #include "tests/cli/program.h"
 #include "tests/imaging/made_maps.h"
+#include "tests/places.h"
 
 namespace limber::detail {
 namespace {
@@ -190,6 +191,23 @@ TEST_F(NewScene_slow, FasciaHoldsOrgansInTheirPlaces) {
   EXPECT_LT(at_the_end.at("heart.away_m"), 1e-6) << "nobody pushes it";
   const Result planned = limber_program({"plan", file, "--data", models().string(), "-o", out(), "--json"});
   EXPECT_EQ(planned.code, exit_done) << planned.err;
+}
+
+// Labels of a scan are apart by their gap, a vein in its tunnel through the liver, too: all stand at their
+// true size, where they are.
+TEST_F(NewScene_slow, PartsOfAScanStandWhereTheyAre) {
+  const std::string tool = std::string(limber_source_dir) + "/tools/make_torso",
+                    scan = (folder / "torso.nii.gz").string();
+  ASSERT_EQ(std::system(("/usr/bin/python3 '" + tool + "' '" + scan + "' --voxel 4 > /dev/null").c_str()), 0);
+  EXPECT_EQ(read_json(folder / "torso.json").size(), 80u);
+  const Result made =
+      limber_program({"scene", "new", "--from", scan, "--labels", (folder / "torso.json").string(), "--robot",
+                      "heart", "--only", "heart,liver,portal_vein,gallbladder,stomach,aorta", "-o",
+                      (folder / "belly.toml").string(), "--json"});
+  ASSERT_EQ(made.code, exit_done) << made.err;
+  EXPECT_EQ(made.json().at("scale"), 1);
+  EXPECT_EQ(made.json().at("bodies"), 6);
+  EXPECT_EQ(made.json().at("moved_m"), Json::object());
 }
 
 TEST_F(NewScene_slow, IsPlannedAsItIs) {
