@@ -90,9 +90,14 @@ class SurfaceContacts {
   // How far a surface is, negative below it, along its unit normal.
   struct Surface {
     Real distance, normal[3];
-    bool set(Real at_rest, const Real gradient[3]) {
-      const Real steepness = std::sqrt(dot(gradient, gradient));
+    // By the field's value and gradient at rest, and what that becomes as the body is deformed. A distance
+    // has slope 1; where the field has hardly any, in a slit that is finer than its cells, the point is about
+    // as far off as it says, and not many times so far.
+    bool set(Real at_rest, const Real rest_gradient[3], const Real gradient[3]) {
+      constexpr Real min_slope = Real(0.5);
+      const Real steepness = std::sqrt(dot(gradient, gradient)), slope2 = dot(rest_gradient, rest_gradient);
       distance = at_rest / steepness;
+      if (slope2 < min_slope * min_slope) distance *= std::sqrt(slope2) / min_slope;
       for (int c = 0; c < 3; ++c) normal[c] = gradient[c] / steepness;
       return steepness > Real(1e-3);
     }

@@ -199,7 +199,7 @@ TEST_F(NewScene_slow, PartsOfAScanStandWhereTheyAre) {
   const std::string tool = std::string(limber_source_dir) + "/tools/make_torso",
                     scan = (folder / "torso.nii.gz").string();
   ASSERT_EQ(std::system(("/usr/bin/python3 '" + tool + "' '" + scan + "' --voxel 4 > /dev/null").c_str()), 0);
-  EXPECT_EQ(read_json(folder / "torso.json").size(), 80u);
+  EXPECT_EQ(read_json(folder / "torso.json").size(), 81u);
   const Result made =
       limber_program({"scene", "new", "--from", scan, "--labels", (folder / "torso.json").string(), "--robot",
                       "heart", "--only", "heart,liver,portal_vein,gallbladder,stomach,aorta", "-o",

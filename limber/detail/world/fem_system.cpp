@@ -20,7 +20,7 @@ namespace {
 constexpr int preferred_lanes = 16;
 // Goes up where the laws of motion or of what a search refuses change: plans made before are of another
 // world.
-constexpr int edition = 2;
+constexpr int edition = 3;
 constexpr int widths[] = {1, 4, 8, 16};
 
 // Nothing where nothing happens by itself.
