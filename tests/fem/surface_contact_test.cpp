@@ -91,6 +91,43 @@ TEST_P(SurfaceContact, DepthIsThatOfTheSurfacesThroughAffineMaps) {
     }
 }
 
+// A plate lies in a slit of 40 mm in a block whose field has cells of 100: there distances are off by half a
+// cell at most, but the field has hardly any slope. Nothing is taken for many times as deep as it is said to
+// be.
+TEST_P(SurfaceContact, InSlitsThatTheFieldDoesNotSeeNothingIsDeep) {
+  const auto block = [](const Vec3& p) {
+    const auto half = [&](double side) {
+      return rounded_box_surface({Vec3(-1, -1, side > 0 ? 0.02 : -1), Vec3(1, 1, side > 0 ? 1 : -0.02)},
+                                 0.01)(p);
+    };
+    return std::min(half(1), half(-1));
+  };
+  WorldSpec spec;
+  spec.bodies = {
+      {"plate", testing::grid({-0.3, -0.3, 2}, {0.6, 0.6, 0.1}, 3, 3, 1), {}, {}, BodyKind::deformable},
+      {"block", cube(Vec3::Zero(), 2, 4), {}, {}, BodyKind::immovable}};
+  spec.bodies[0].shape =
+      shape_of(spec.bodies[0].cage,
+               rounded_box_surface({Vec3(-0.28, -0.28, 2.04), Vec3(0.28, 0.28, 2.06)}, 0.005), 0.01, 0.02);
+  spec.bodies[1].shape = shape_of(spec.bodies[1].cage, block, 0.1, 0.05);
+  spec.bodies[0].phong = GetParam();
+  spec.bounds_m = {Vec3::Constant(-20), Vec3::Constant(20)};
+  spec.walls = false, spec.contact_offset_m = 0.005;
+  const World world = build_world(spec);
+  int flat = 0;
+  for (const double x : {0.0, 0.031, 0.077})
+    for (const double z : {-0.005, 0.0, 0.005}) {
+      Lane lane(world);
+      lane.move(0, [&](const Vec3f& p) { return Vec3f(p + Vec3(x, x, z - 2.05).cast<float>()); });
+      for (const auto& contact : touches_of(lane)) {
+        if (contact.against != 1) continue;
+        EXPECT_LT(contact.depth, 2 * 0.05 + 0.005) << x << ' ' << z;
+        ++flat;
+      }
+    }
+  EXPECT_GT(flat, 100);
+}
+
 // A small ball is pressed into an ellipsoid, a ball that is drawn out and sheared, from twelve sides. Depths
 // of its samples are those below the tangent plane at the nearest of many places of the ellipsoid.
 TEST_P(SurfaceContact, DepthsInAnEllipsoidAreThoseOfBruteForce) {
