@@ -11,6 +11,7 @@
 #include "core/error.h"
 #include "core/log.h"
 #include "core/progress.h"
+#include "core/threads.h"
 #include "imaging/label_map.h"
 #include "limber/detail/authoring/layout.h"
 #include "limber/detail/authoring/line_of_sight.h"
@@ -618,19 +619,20 @@ std::string scene_text(const std::vector<Organ>& organs, const NewSceneOptions& 
 
 // The bodies as limber plan will prepare them, as far as a world asks for them.
 std::vector<PreparedBody> bodies_of(const scenes::Scene& scene, const std::vector<Organ>& organs) {
-  std::vector<PreparedBody> bodies;
-  for (const scenes::BodySpec& body : scene.bodies) {
+  std::vector<PreparedBody> bodies(scene.bodies.size());
+  parallel_for(int(bodies.size()), [&](int i) {
     throw_if_stopped();
+    const scenes::BodySpec& body = scene.bodies[std::size_t(i)];
     const auto organ =
         std::find_if(organs.begin(), organs.end(), [&](const Organ& o) { return o.name == body.name; });
     SurfaceMesh surface = organ != organs.end() ? organ->surface : *scenes::made_surface(body);
     scenes::transform(scenes::world_from_model(body, surface.positions, organ == organs.end()),
                       surface.positions);
-    PreparedBody& prepared = bodies.emplace_back();
+    PreparedBody& prepared = bodies[std::size_t(i)];
     prepared.cage = meshing::build_cage(surface, {}, {.tets = body.cage.tets}).mesh;
     prepared.contact = meshing::make_contact_shape(surface, prepared.cage);
     prepared.surface = std::move(surface);
-  }
+  });
   return bodies;
 }
 
@@ -679,8 +681,9 @@ NewScene scene_of_folder(const NewSceneOptions& options, const std::string& wher
   for (Organ& organ : organs) organ.file = where + organ.file;
   if (options.only.empty()) leave_out_doubles(organs, notes);
   log::info("making cages");
-  for (Organ& organ : organs)
-    if (!organ.see_through) make_cage(options, organ);
+  parallel_for(int(organs.size()), [&](int i) {
+    if (Organ& organ = organs[std::size_t(i)]; !organ.see_through) make_cage(options, organ);
+  });
   const double scale = come_apart(options, organs);
   const scenes::Scene scene = laid_out(options, organs, scale);
   write_file(options.out, scene.text);
