@@ -213,7 +213,7 @@ class Scenes(unittest.TestCase):
         self.assertTrue(limber.export(self.path("2"), "gltf")[0].endswith(".glb"))
         with self.assertRaisesRegex(limber.InputError, "no format is named"):
             limber.export(self.path("2"), [])
-        with self.assertRaisesRegex(OSError, "there is no folder"):  # before any frame
+        with self.assertRaisesRegex(limber.InputError, "there is no folder"):  # before any frame
             limber.render(self.path("2"), size=(64, 36), video=self.path("none/film.mp4"),
                           progress=lambda *event: self.fail(event))
         with self.assertRaisesRegex(limber.InputError, "mp4"):
