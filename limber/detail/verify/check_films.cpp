@@ -1,5 +1,6 @@
 #include "limber/detail/verify/check_films.h"
 
+#include <optional>
 #include <set>
 
 #include "core/error.h"
@@ -184,8 +185,8 @@ std::vector<std::string> untold_passes(const Filming& filming) {
   std::vector<std::string> untold;
   for (const std::string& pass : pass_names) {
     const auto& told = filming.output.passes;
-    bool lies_there = std::find(told.begin(), told.end(), pass) != told.end();
-    if (lies_there) continue;
+    if (std::find(told.begin(), told.end(), pass) != told.end()) continue;
+    bool lies_there = false;
     for (int f = 0; f < filming.shot->frames() && !lies_there; ++f)
       if (const fs::path file = filming.files.of(f, pass); fs::exists(file))
         lies_there = render::frame_hash(file) == filming.shot->hash_of(f);
@@ -221,7 +222,8 @@ void check_film(const fs::path& folder, const std::string& suffix, const Json& e
 
   const std::vector<std::string> untold = untold_passes(filming);
   options.passes.insert(options.passes.end(), untold.begin(), untold.end());
-  const Filming seen(options);
+  std::optional<Filming> with_untold;
+  const Filming& seen = untold.empty() ? filming : with_untold.emplace(options);
   const std::string odd = first_odd(seen, good);
   table.row(name + "its frames' files are as limber wrote them", odd.empty(), odd);
   const std::string stray = stray_frame(seen);
