@@ -120,7 +120,6 @@ class Parter {
     refuse_what_is_too_deep();
     Progress progress("parting bodies that overlap", 0);
     state_ = rest_state(world_);
-    Batch batch(world_, 1);
     double push = gentle_push, min_lack = std::numeric_limits<double>::infinity();
     int waited = 0, resting = 0;
     bool calm = false;  // the last stage moved nothing
@@ -132,7 +131,7 @@ class Parter {
         set_offset(a, b, offset);
       }
       const bool to_its_end = calm;
-      calm = take_stage(batch, to_its_end) < at_rest * offset_m_ && whole;
+      calm = take_stage(to_its_end) < at_rest * offset_m_ && whole;
       double lack = 0, min_gap = offset_m_;
       for (const auto& [a, b] : pairs_) lack += offset_m_ - gap(a, b), min_gap = std::min(min_gap, gap(a, b));
       progress.update(steps_, fmt::format("{:.2g} m deep", std::max(0.0, -min_gap)));
@@ -158,9 +157,10 @@ class Parter {
     world_.surfaces.offset[a * bodies_ + b] = world_.surfaces.offset[b * bodies_ + a] = float(offset_m);
   }
 
-  // From rest to rest, `to_its_end` or until nothing gains speed any more; how far a node went at most. The
-  // batch reads the offsets as they are now.
-  double take_stage(Batch& batch, bool to_its_end) {
+  // From rest to rest, `to_its_end` or until nothing gains speed any more; how far a node went at most. A
+  // batch of its own, whose lists go by the offsets as they are now.
+  double take_stage(bool to_its_end) {
+    Batch batch(world_, 1);
     Control coast;
     coast.steps = stage_steps_;
     batch.load(0, state_, coast);

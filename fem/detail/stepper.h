@@ -52,7 +52,9 @@ class Stepper {
 
  private:
   LaneView<Real> view(int lane);
+  bool goes_on_from(int lane, const Real* positions) const;
   Real& x(int lane, int node, int c) { return state_[state_layout_.at(node, c) + lane]; }
+  Real x(int lane, int node, int c) const { return state_[state_layout_.at(node, c) + lane]; }
   Real& v(int lane, int node, int c) { return state_[first_velocity_ + state_layout_.at(node, c) + lane]; }
   void pull_towards_goal(int lane);
   void follow_forces(int lane);
