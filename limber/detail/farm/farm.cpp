@@ -72,6 +72,8 @@ std::vector<std::string> told_dry(const FarmFolder& farm) {
 }
 
 FarmSpec spec_to_submit(FarmOptions options) {
+  const bool goes_on = !options.bench && !options.batch && options.plan.scene.scene.empty();
+  if (options.engine.empty() && goes_on) options.engine = FarmFolder(options.plan.out).spec().options.engine;
   if (options.engine.empty()) options.engine = slurm_is_there() ? "slurm" : "local";
   if (options.engine == "slurm" && !slurm_is_there() && !options.dry_run)
     throw InputError(
@@ -79,7 +81,7 @@ FarmSpec spec_to_submit(FarmOptions options) {
         "local");
   if (!options.sbatch.empty() && options.engine != "slurm")
     throw InputError(fmt::format("--sbatch is for Slurm, and the engine is {}", options.engine));
-  if (options.bench || options.batch || !options.plan.scene.scene.empty()) return spec_of(std::move(options));
+  if (!goes_on) return spec_of(std::move(options));
   // As before, but for who does it.
   FarmSpec spec = FarmFolder(options.plan.out).spec();
   options.plan = spec.options.plan, options.film = spec.options.film, options.bench = spec.options.bench;
