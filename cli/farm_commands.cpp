@@ -65,7 +65,7 @@ void add_engine(CLI::App& command, detail::FarmOptions& options) {
           "--engine", options.engine,
           "who runs the workers: slurm (sbatch); local (this machine, waits for the end); openjd (writes "
           "farm/template.yaml); none (you do: limber farm work DIR); default: slurm where sbatch is in "
-          "PATH, else local")
+          "PATH, else local; what goes on keeps its own")
       ->check(CLI::IsMember({"slurm", "local", "openjd", "none"}));
   command
       .add_option("--workers", options.workers,

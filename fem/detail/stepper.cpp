@@ -136,7 +136,7 @@ Stepper<Real>::Stepper(const World& world, int lanes, Isa isa)
 template <class Real>
 void Stepper<Real>::load(int lane, std::int64_t step, const Real* positions, const Real* velocities,
                          const Control& control, bool contact) {
-  const bool forget = !contact || !goes_on_from(lane, positions);
+  const bool forget = !(contact && goes_on_from(lane, positions));
   for (int n = 0; n < world_.moving_nodes; ++n)
     for (int c = 0; c < 3; ++c) {
       x(lane, n, c) = positions[3 * n + c];
@@ -168,7 +168,8 @@ void Stepper<Real>::load(int lane, std::int64_t step, const Real* positions, con
     surface_contacts_ ? surface_contacts_->forget(lane) : contacts_->forget(lane);
     stretch_limits_.forget(lane);
     for (std::size_t b = 0; b < world_.bodies.size(); ++b) {
-      travel_[b * lanes_ + lane] = 0;  // of idle lanes nothing wakes
+      travel_[b * lanes_ + lane] = 0;
+      // Of idle lanes nothing wakes.
       inner_travel_[b * lanes_ + lane] = contact ? Real(0) : -std::numeric_limits<Real>::infinity();
     }
   }

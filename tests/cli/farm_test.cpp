@@ -486,6 +486,14 @@ TEST_F(Farm, WrongWordsAreRefusedBeforeAnythingIsWritten) {
   EXPECT_FALSE(fs::exists(out()));
 }
 
+// `none` is never what is taken by itself.
+TEST_F(Farm, WhatGoesOnKeepsItsEngine) {
+  ASSERT_EQ(limber_program(submit_none()).code, exit_done);
+  const Result goes_on = limber_program({"farm", "submit", "-o", out()});
+  EXPECT_EQ(goes_on.code, exit_done) << goes_on.err;
+  EXPECT_THAT(goes_on.out, HasSubstr("ready: limber farm work " + out()));
+}
+
 // Each key of farm.json, of its result too, is asked for.
 void expect_a_sentence_of_each_key(const fs::path& work) {
   const fs::path file = work / "farm" / "farm.json";

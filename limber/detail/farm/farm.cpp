@@ -2,6 +2,7 @@
 
 #include <fmt/ranges.h>
 
+#include <optional>
 #include <set>
 
 #include "core/error.h"
@@ -72,18 +73,19 @@ std::vector<std::string> told_dry(const FarmFolder& farm) {
 }
 
 FarmSpec spec_to_submit(FarmOptions options) {
-  const bool goes_on = !options.bench && !options.batch && options.plan.scene.scene.empty();
-  if (options.engine.empty() && goes_on) options.engine = FarmFolder(options.plan.out).spec().options.engine;
-  if (options.engine.empty()) options.engine = slurm_is_there() ? "slurm" : "local";
+  std::optional<FarmSpec> before;  // where nothing is named, and what was submitted goes on
+  if (!options.bench && !options.batch && options.plan.scene.scene.empty())
+    before = FarmFolder(options.plan.out).spec();
+  if (options.engine.empty())
+    options.engine = before ? before->options.engine : slurm_is_there() ? "slurm" : "local";
   if (options.engine == "slurm" && !slurm_is_there() && !options.dry_run)
     throw InputError(
         "--engine slurm: sbatch is not in PATH; submit on a machine of the cluster, or --engine "
         "local");
   if (!options.sbatch.empty() && options.engine != "slurm")
     throw InputError(fmt::format("--sbatch is for Slurm, and the engine is {}", options.engine));
-  if (!goes_on) return spec_of(std::move(options));
-  // As before, but for who does it.
-  FarmSpec spec = FarmFolder(options.plan.out).spec();
+  if (!before) return spec_of(std::move(options));
+  const FarmSpec& spec = *before;
   options.plan = spec.options.plan, options.film = spec.options.film, options.bench = spec.options.bench;
   options.batch = spec.options.batch;
   options.runs_per_task = spec.options.runs_per_task, options.models_per_task = spec.options.models_per_task;
