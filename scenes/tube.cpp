@@ -4,7 +4,8 @@
 // which has no loops and overshoots little. Its frames are carried along by double reflection (Wang, Jüttler,
 // Zheng, Liu 2008), so that nothing twists. The cage is a grid swept likewise, with fewer sections. Between
 // two of them it is ruled, and the surface bulges out of it where the curve bends; so its outer radius is
-// larger, and its inner one smaller, by as much as that is at most.
+// larger, and its inner one smaller, by as much as that is at most. A curve that ends where it begins is
+// closed: a ring, whose frames are turned along it until the last is the first.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -34,11 +35,12 @@ struct Frame {
 
 class Curve {
  public:
-  explicit Curve(const std::vector<Vec3>& path) {
+  explicit Curve(const std::vector<Vec3>& path) : closed_(is_closed(path)) {
     LIMBER_CHECK(path.size() >= 2, path.size());
-    std::vector<Vec3> points{2 * path[0] - path[1]};
+    const Vec3 before_last = path[path.size() - 2];
+    std::vector<Vec3> points{closed_ ? before_last : Vec3(2 * path[0] - path[1])};
     points.insert(points.end(), path.begin(), path.end());
-    points.push_back(2 * path.back() - path[path.size() - 2]);
+    points.push_back(closed_ ? path[1] : Vec3(2 * path.back() - before_last));
     for (std::size_t i = 1; i + 2 < points.size(); ++i)
       for (int k = 0; k < samples_a_span; ++k) add(span(&points[i - 1], double(k) / samples_a_span));
     add(path.back());
@@ -46,7 +48,8 @@ class Curve {
   }
 
   double length() const { return along_.back(); }
-  // Beyond the ends the curve goes on straight.
+  bool closed() const { return closed_; }
+  // Beyond its ends an open curve goes on straight.
   Frame at(double s) const {
     const auto next = std::upper_bound(along_.begin() + 1, along_.end() - 1, s);
     const std::size_t b = std::size_t(next - along_.begin()), a = b - 1;
@@ -63,8 +66,10 @@ class Curve {
   // The least radius of the circles through three neighbouring samples.
   double least_radius() const {
     double least = std::numeric_limits<double>::infinity();
-    for (std::size_t i = 1; i + 1 < frames_.size(); ++i) {
-      const Vec3 a = frames_[i].place - frames_[i - 1].place, b = frames_[i + 1].place - frames_[i].place;
+    const std::size_t last = frames_.size() - 1;
+    for (std::size_t i = closed_ ? 0 : 1; i < last; ++i) {
+      const Vec3 a = frames_[i].place - frames_[i == 0 ? last - 1 : i - 1].place,
+                 b = frames_[i + 1].place - frames_[i].place;
       const double twice_area = a.cross(b).norm();
       if (twice_area > 0) least = std::min(least, a.norm() * b.norm() * (a + b).norm() / (2 * twice_area));
     }
@@ -96,9 +101,11 @@ class Curve {
 
   void set_frames() {
     const std::size_t n = frames_.size();
+    const std::size_t after_last = closed_ ? 1 : n - 1, before_first = closed_ ? n - 2 : 0;
     for (std::size_t i = 0; i < n; ++i)
       frames_[i].tangent =
-          (frames_[std::min(i + 1, n - 1)].place - frames_[i == 0 ? 0 : i - 1].place).normalized();
+          (frames_[i == n - 1 ? after_last : i + 1].place - frames_[i == 0 ? before_first : i - 1].place)
+              .normalized();
     const Vec3 t = frames_[0].tangent;
     int least = 0;
     t.cwiseAbs().minCoeff(&least);
@@ -112,8 +119,15 @@ class Curve {
       const Vec3 v2 = frames_[i + 1].tangent - tangent;
       frames_[i + 1].normal = v2.squaredNorm() > 1e-24 ? reflected(normal, v2) : normal;
     }
+    if (!closed_) return;
+    const Vec3 from = frames_.back().normal, to = frames_[0].normal;
+    const double turn = std::atan2(from.cross(to).dot(t), from.dot(to));
+    for (std::size_t i = 0; i < n; ++i)
+      frames_[i].normal =
+          Eigen::AngleAxisd(turn * along_[i] / length(), frames_[i].tangent) * frames_[i].normal;
   }
 
+  bool closed_;
   std::vector<Frame> frames_;
   std::vector<double> along_;  // way from the beginning
 };
@@ -134,6 +148,13 @@ std::vector<Ring> rings_of_rod(double length, double radius, double longest) {
   for (int i = 1; i <= arc; ++i) cap(i, false);
   for (int i = 1; i < straight; ++i) rings.push_back({radius + (length - 2 * radius) * i / straight, radius});
   for (int i = arc; i >= 1; --i) cap(i, true);
+  return rings;
+}
+
+std::vector<Ring> rings_of_loop(double length, double radius, double longest) {
+  std::vector<Ring> rings(std::size_t(std::max(12, pieces(length, longest))));
+  for (std::size_t i = 0; i < rings.size(); ++i)
+    rings[i] = {length * double(i) / double(rings.size()), radius};
   return rings;
 }
 
@@ -219,15 +240,18 @@ int vertices_round(const TubeModel& tube) {
 
 }  // namespace
 
+bool is_closed(const std::vector<Vec3>& path) { return path.size() > 2 && path.front() == path.back(); }
 double least_bend_radius_m(const TubeModel& tube) { return Curve(tube.path_m).least_radius(); }
 double length_m(const TubeModel& tube) { return Curve(tube.path_m).length(); }
 
 SurfaceMesh make_tube(const TubeModel& tube) {
   const Curve curve(tube.path_m);
   const double radius = tube.diameter_m / 2;
-  const bool hollow = tube.wall_m > 0;
+  const bool hollow = tube.wall_m > 0, ends = !hollow && !curve.closed();
+  LIMBER_CHECK(!(hollow && curve.closed()), tube.wall_m);
   const std::vector<Ring> rings = hollow ? rings_of_tube(curve.length(), radius, tube.wall_m, tube.triangle_m)
-                                         : rings_of_rod(curve.length(), radius, tube.triangle_m);
+                                  : ends ? rings_of_rod(curve.length(), radius, tube.triangle_m)
+                                         : rings_of_loop(curve.length(), radius, tube.triangle_m);
   const int round = vertices_round(tube);
   SurfaceBuilder builder;
   for (const Ring& ring : rings) {
@@ -236,11 +260,11 @@ SurfaceMesh make_tube(const TubeModel& tube) {
   }
   const int count = int(rings.size());
   const auto vertex = [&](int ring, int i) { return ring % count * round + i % round; };
-  for (int ring = 0; ring < (hollow ? count : count - 1); ++ring)
+  for (int ring = 0; ring < (ends ? count - 1 : count); ++ring)
     for (int i = 0; i < round; ++i)
       builder.quad(vertex(ring, i), vertex(ring, i + 1), vertex(ring + 1, i + 1), vertex(ring + 1, i),
                    (ring + i) % 2);
-  if (!hollow)
+  if (ends)
     for (const bool last : {false, true}) {
       const int pole = builder.add(curve.at(last ? curve.length() : 0).place), ring = last ? count - 1 : 0;
       for (int i = 0; i < round; ++i)
@@ -249,15 +273,12 @@ SurfaceMesh make_tube(const TubeModel& tube) {
   return builder.mesh();
 }
 
-TetMesh make_tube_cage(const TubeModel& tube, const Eigen::Vector3i& cells) {
-  const Curve curve(tube.path_m);
+namespace {
+
+// The cage whose outer radius is larger, and whose inner one smaller, by `margin`.
+TetMesh swept_cage(const TubeModel& tube, const Curve& curve, const Eigen::Vector3i& cells, double margin) {
   const double length = curve.length(), radius = tube.diameter_m / 2;
   const bool hollow = tube.wall_m > 0;
-  double margin = 0;
-  for (int k = 0; k < cells[2]; ++k)
-    for (const double r : {radius, radius - tube.wall_m})
-      margin = std::max(margin, bulge(curve, length * k / cells[2], length * (k + 1) / cells[2], r));
-  margin = 1.2 * margin + 1e-4 * radius;
   // Chords of the surface's inner circles come nearer to the middle than their ends.
   const double inner = (radius - tube.wall_m) * std::cos(pi / vertices_round(tube)) - margin;
   if (hollow && !(inner > margin))
@@ -268,9 +289,10 @@ TetMesh make_tube_cage(const TubeModel& tube, const Eigen::Vector3i& cells) {
   const Section section = hollow ? section_of_tube(cells[0], cells[1], inner, radius + margin)
                                  : section_of_rod(cells[0], radius + margin);
   const int a_section = int(section.nodes.size());
-  TetMesh cage{Points(Eigen::Index(a_section) * (cells[2] + 1), 3), Tets()};
-  for (int k = 0; k <= cells[2]; ++k) {
-    const double beyond = k == 0 ? -margin : k == cells[2] ? margin : 0;
+  const int sections = curve.closed() ? cells[2] : cells[2] + 1;
+  TetMesh cage{Points(Eigen::Index(a_section) * sections, 3), Tets()};
+  for (int k = 0; k < sections; ++k) {
+    const double beyond = curve.closed() ? 0 : k == 0 ? -margin : k == cells[2] ? margin : 0;
     const Frame frame = curve.at(length * k / cells[2] + beyond);
     for (int n = 0; n < a_section; ++n)
       cage.positions.row(Eigen::Index(k) * a_section + n) =
@@ -285,8 +307,8 @@ TetMesh make_tube_cage(const TubeModel& tube, const Eigen::Vector3i& cells) {
         for (const auto& corners : five_tets[(i + j + k) % 2]) {
           Eigen::RowVector4i tet;
           for (int c = 0; c < 4; ++c)
-            tet[c] = (k + (corners[c] >> 2)) * a_section + (j + (corners[c] >> 1 & 1)) * section.columns +
-                     (i + (corners[c] & 1)) % section.columns;
+            tet[c] = (k + (corners[c] >> 2)) % sections * a_section +
+                     (j + (corners[c] >> 1 & 1)) * section.columns + (i + (corners[c] & 1)) % section.columns;
           if (is_mirrored(corners) != section.round) std::swap(tet[2], tet[3]);
           const auto p = [&](int c) -> Vec3 { return cage.positions.row(tet[c]); };
           if (!(signed_volume(p(0), p(1), p(2), p(3)) > 0))
@@ -296,6 +318,49 @@ TetMesh make_tube_cage(const TubeModel& tube, const Eigen::Vector3i& cells) {
                             length * (k + 0.5) / cells[2], cells[0], cells[1], cells[2]));
           cage.tets.row(t++) = tet;
         }
+  return cage;
+}
+
+// Whether all points are in the cage. Neighbours are likely in tets of near numbers, so the search for each
+// begins a little before that of the one before it.
+bool holds(const TetMesh& cage, const Points& points, Eigen::Index a_little) {
+  const Eigen::Index tets = cage.tets.rows();
+  const auto is_in = [&](const Vec3& p, Eigen::Index t) {
+    Vec3 q[4];
+    for (int c = 0; c < 4; ++c) q[c] = cage.positions.row(cage.tets(t, c));
+    for (int c = 0; c < 4; ++c) {
+      const Vec3 corner = std::exchange(q[c], p);
+      if (signed_volume(q[0], q[1], q[2], q[3]) < 0) return false;
+      q[c] = corner;
+    }
+    return true;
+  };
+  Eigen::Index first = 0;
+  for (Eigen::Index v = 0; v < points.rows(); ++v) {
+    Eigen::Index n = 0;
+    while (n < tets && !is_in(points.row(v), (first + n) % tets)) ++n;
+    if (n == tets) return false;
+    first = (first + n + tets - std::min(a_little, tets)) % tets;
+  }
+  return true;
+}
+
+}  // namespace
+
+// The margin is an estimate, so it grows where the surface leaves the cage.
+TetMesh make_tube_cage(const TubeModel& tube, const Eigen::Vector3i& cells) {
+  constexpr double growth = 1.15;
+  const Curve curve(tube.path_m);
+  const double length = curve.length(), radius = tube.diameter_m / 2;
+  double margin = 0;
+  for (int k = 0; k < cells[2]; ++k)
+    for (const double r : {radius, radius - tube.wall_m})
+      margin = std::max(margin, bulge(curve, length * k / cells[2], length * (k + 1) / cells[2], r));
+  margin = 1.2 * margin + 1e-4 * radius;
+  const Points surface = make_tube(tube).positions;
+  TetMesh cage = swept_cage(tube, curve, cells, margin);  // ends in an error once its cells fold
+  while (!holds(cage, surface, cage.tets.rows() / cells[2]))
+    cage = swept_cage(tube, curve, cells, margin *= growth);
   return cage;
 }
 

@@ -63,6 +63,10 @@ CageSpec read_cage(const Node& table, const Model& model, const std::string& bod
   if (tube && tube->wall_m == 0 && cage.cells[0] != cage.cells[1])
     complain(*cells, fmt::format("{}.cage.cells has {} and {} cells across the rod; write one number twice",
                                  body, cage.cells[0], cage.cells[1]));
+  if (tube && is_closed(tube->path_m) && (cage.cells[2] % 2 == 1 || cage.cells[2] < 6))
+    complain(*cells,
+             fmt::format("{}.cage.cells has {} cells along the ring; write an even number, 6 at least", body,
+                         cage.cells[2]));
   if (const int made = 5 * cage.cells.prod(), most = 200'000; made > most)
     complain(*cells,
              fmt::format("{}.cage.cells make {} tets; write fewer cells, at most {} tets", body, made, most));

@@ -98,6 +98,11 @@ TubeModel read_tube(const Node& table, const std::string& what) {
   if (!(model.wall_m < model.diameter_m / 2))
     complain(child(table, "wall_m"), fmt::format("{}.wall_m is {}, which leaves no lumen; it must be < {}",
                                                  what, model.wall_m, model.diameter_m / 2));
+  if (is_closed(model.path_m) && model.wall_m > 0)
+    complain(child(table, "wall_m"),
+             what +
+                 ".path_m ends where it begins, and such a ring is solid; leave wall_m out, or move its last "
+                 "point");
   const double length = length_m(model), bend = least_bend_radius_m(model);
   if (!(length > model.diameter_m))
     complain(path, fmt::format("{} is {:.3g} m long, no longer than it is thick; move its points apart", what,

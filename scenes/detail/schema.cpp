@@ -290,8 +290,8 @@ constexpr Key all_keys[] = {
      "a tube, or a rod, along a smooth curve, in coordinates of its own",
      "",
      ""},
-    {"bodies[].model.tube.path_m", Type::points, any, 0, required, "m; its middle line goes through them", "",
-     ""},
+    {"bodies[].model.tube.path_m", Type::points, any, 0, required,
+     "m; its middle line goes through them; a rod whose last point is its first is a ring", "", ""},
     {"bodies[].model.tube.diameter_m", Type::number, positive, 0, required, "m; outer", "", ""},
     {"bodies[].model.tube.wall_m", Type::number, at_least_zero, 0, "0.0",
      "m; 0: a rod, with half a ball at each end", "", ""},
@@ -314,8 +314,7 @@ constexpr Key all_keys[] = {
      "budget of a cage made round the model", "", ""},
     {"bodies[].cage.cells", Type::integers, from_to(1, 200), 3, may_lack,
      "five tets each; boxes, and plates without a hole: along x, y, z; tubes: round (even, 6 at least), "
-     "through "
-     "the wall, along; rods: across, across (the same), along",
+     "through the wall, along; rods: across, across (the same), along (even, 6 at least, of a ring)",
      "", ""},
     {"bodies[].cage.cell_m", Type::number, positive, 0, may_lack,
      "m; blocks: cells between their faces, five tets each, no longer than this, two at least through a "

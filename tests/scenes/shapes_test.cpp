@@ -49,6 +49,14 @@ TubeModel bent(double diameter, double wall, double triangle) {
           triangle};
 }
 
+// A ring that is not plane, so that its frames would not meet by themselves.
+TubeModel loop(double diameter, double triangle) {
+  return {{{0.4, 0, 0}, {0.2, 0.3, 0.1}, {-0.2, 0.3, -0.1}, {-0.4, 0, 0.1}, {0, -0.35, 0}, {0.4, 0, 0}},
+          diameter,
+          0,
+          triangle};
+}
+
 // By Pappus and Guldin: a section's area times the way of its middle, whatever the curve. Round ends are half
 // balls and half rings.
 double tube_volume(const TubeModel& tube) {
@@ -88,6 +96,8 @@ std::vector<Shape> shapes() {
   made.push_back({"straight rod", make_tube(straight), 2, tube_volume(straight), 4e-3});
   made.push_back({"bent rod", make_tube(rod), 2, tube_volume(rod), 6e-3});
   made.push_back({"bent tube", make_tube(tube), 0, tube_volume(tube), 6e-3});
+  const TubeModel ring = loop(0.1, 0.008);
+  made.push_back({"ring", make_tube(ring), 0, pi * 0.05 * 0.05 * length_m(ring), 6e-3});
   for (const Vec3& s : {Vec3(0.3, 3, 2), Vec3(3, 0.3, 2), Vec3(3, 2, 0.3)}) {
     made.push_back({"plate, square hole", make_plate({{s, 0, 0.1}, Hole{false, 0.8, {0.2, -0.1}}}), 0,
                     1.8 - 0.64 * 0.3, 1e-9});
@@ -273,6 +283,8 @@ TEST(TubeCage, HoldsItsSurfaceLeavesTheLumenAndSharesItsFaces) {
   holds_all(rod, {3, 3, 31});
   holds_all(tube, {8, 1, 30});
   holds_all(tube, {12, 2, 25});
+  holds_all(loop(0.1, 0.03), {1, 1, 24});
+  holds_all(loop(0.1, 0.03), {2, 2, 36});
   // With many sections it is the polygon round the circle, less that in the lumen, along the tube.
   const auto polygon = [](int n, double apothem) { return n * apothem * apothem * std::tan(pi / n); };
   EXPECT_NEAR(volume(make_tube_cage(rod, {2, 2, 800})), polygon(8, 0.015) * length_m(rod),
