@@ -17,6 +17,7 @@ bool same_bits(const Vec3f& a, const Vec3f& b) { return std::memcmp(a.data(), b.
 bool same_bits(const Control& a, const Control& b) {
   const auto same = [](float one, float other) { return std::memcmp(&one, &other, sizeof one) == 0; };
   return a.manipulation == b.manipulation && a.node == b.node && a.steps == b.steps &&
+         a.second_node == b.second_node && same_bits(a.second_force_n, b.second_force_n) &&
          same_bits(a.force_n, b.force_n) && same_bits(a.target_m, b.target_m) &&
          same(a.radius_m, b.radius_m) && same(a.max_force_n, b.max_force_n);
 }

@@ -1,5 +1,7 @@
 #include "core/state.h"
 
+#include <algorithm>
+
 #include "core/hash.h"
 
 namespace limber {
@@ -17,8 +19,9 @@ float largest_force(const Control& control) {
     case Manipulation::none:
       return 0;
     case Manipulation::body:
-    case Manipulation::control_point:
       return control.force_n.norm();
+    case Manipulation::control_point:
+      return std::max(control.force_n.norm(), control.second_force_n.norm());
     case Manipulation::interpolation:
     case Manipulation::hold:
       return control.max_force_n;

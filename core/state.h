@@ -39,10 +39,15 @@ struct Control {
   Vec3f target_m = Vec3f::Zero();  // interpolation, hold: centre of mass of the goal shape
   float max_force_n = 0;           // interpolation, hold: no node gets more than its mass share of this
   std::int32_t steps = 0;
+  // control_point: another of the same radius, pushed at the same time, as by a second carrier; node −1:
+  // none.
+  std::int32_t second_node = -1;
+  Vec3f second_force_n = Vec3f::Zero();
 
   bool operator==(const Control&) const = default;
 };
-// The largest force, in newtons on the whole robot, that this control may exert: |force_n| or max_force_n.
+// The largest force, in newtons, that this control may exert: |force_n|, that of the stronger carrier, or
+// max_force_n.
 float largest_force(const Control&);
 
 }  // namespace limber

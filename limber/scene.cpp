@@ -101,19 +101,26 @@ Control control_of(const Push& push, int row, int robot_nodes) {
   require(kind >= 0 && kind <= 4, fmt::format("kind {} is none", kind));
   require(push.steps > 0, fmt::format("steps is {}; it must be above 0", push.steps));
   for (const float x : {push.force_n[0], push.force_n[1], push.force_n[2], push.target_m[0], push.target_m[1],
-                        push.target_m[2], push.radius_m, push.max_force_n})
+                        push.target_m[2], push.radius_m, push.max_force_n, push.second_force_n[0],
+                        push.second_force_n[1], push.second_force_n[2]})
     require(std::isfinite(x), "a number of it is not finite");
   require(push.max_force_n >= 0 && push.radius_m >= 0, "max_force_n and radius_m must not be negative");
   if (push.kind == Push::Kind::control_point)
     require(push.node >= 0 && push.node < robot_nodes,
             fmt::format("node is {}; the robot has the nodes 0 … {}", push.node, robot_nodes - 1));
+  require(push.second_node >= -1 && push.second_node < robot_nodes &&
+              (push.second_node < 0 || push.kind == Push::Kind::control_point),
+          fmt::format("second_node is {}; it must be -1, or of a control_point a node in [0, {}]",
+                      push.second_node, robot_nodes - 1));
   return {.manipulation = Manipulation(kind),
           .force_n = {push.force_n[0], push.force_n[1], push.force_n[2]},
           .node = push.node,
           .radius_m = push.radius_m,
           .target_m = {push.target_m[0], push.target_m[1], push.target_m[2]},
           .max_force_n = push.max_force_n,
-          .steps = push.steps};
+          .steps = push.steps,
+          .second_node = push.second_node,
+          .second_force_n = {push.second_force_n[0], push.second_force_n[1], push.second_force_n[2]}};
 }
 
 Push push_of(const Control& c) {
@@ -123,7 +130,9 @@ Push push_of(const Control& c) {
           .radius_m = c.radius_m,
           .target_m = {c.target_m.x(), c.target_m.y(), c.target_m.z()},
           .max_force_n = c.max_force_n,
-          .steps = c.steps};
+          .steps = c.steps,
+          .second_node = c.second_node,
+          .second_force_n = {c.second_force_n.x(), c.second_force_n.y(), c.second_force_n.z()}};
 }
 
 std::vector<detail::PreparedBody> prepare_bodies(const Scene::Impl& scene,

@@ -58,6 +58,9 @@ struct Push {
   std::array<float, 3> target_m{};  // interpolation, hold: of the centre of mass
   float max_force_n = 0;            // interpolation, hold
   std::int32_t steps = 0;           // > 0
+  // control_point: another, pushed at the same time, as by a second carrier; −1: none
+  std::int32_t second_node = -1;
+  std::array<float, 3> second_force_n{};
 };
 
 struct SolveOptions {

@@ -39,6 +39,7 @@ Sample draw_sample(const Settings& s, const System& system, std::int64_t iterati
   d.guided = rng.uniform() < s.search_options.guidance && !d.towards_goal;
   d.rank = rng.uniform(), d.ahead = rng.uniform(), d.stretch = rng.uniform();
   d.aside = rng.direction();
+  d.lift = rng.uniform();
   return d;
 }
 
@@ -57,6 +58,35 @@ Control steered_control(const Sample& d, const Settings& s, const System& system
   control.force_n = (force * best_direction(way, velocity, acceleration)).cast<float>();
   const double lasts = time_to_go(way, velocity, acceleration) * (shortest_stretch + stretches * d.stretch);
   control.steps = steps_of(std::clamp(lasts, s.min_duration_s, s.max_duration_s), system.dt_s());
+  return control;
+}
+
+Control carriers_control(const Sample& d, const Settings& s, const System& system, const NodeMotion& from,
+                         const std::array<Vec3, 2>& targets, const Vec3& target_velocity) {
+  const double most = d.force_n * just_below_one;
+  Vec3 lift = -0.5 * d.lift * system.carriers()->weight_n;
+  if (lift.norm() > most) lift *= most / lift.norm();
+  // However the two point, together they are no more than may be.
+  const double force = most - lift.norm(), acceleration = 2 * force / system.robot_mass_kg();
+  Control control;
+  control.manipulation = Manipulation::control_point;
+  control.node = system.carriers()->nodes[0], control.second_node = system.carriers()->nodes[1];
+  control.radius_m = float(s.control_point_radius_m);
+  control.steps = d.steps;
+  double lasts = 0;
+  for (std::size_t i = 0; i < 2; ++i) {
+    const Vec3 way = targets[i] - from.carried[i].place,
+               velocity = from.carried[i].velocity - target_velocity;
+    Vec3f& on_it = i == 0 ? control.force_n : control.second_force_n;
+    on_it = lift.cast<float>();
+    if (acceleration <= 0 || way.squaredNorm() == 0) continue;
+    on_it = (lift + force * best_direction(way, velocity, acceleration)).cast<float>();
+    lasts = std::max(lasts, time_to_go(way, velocity, acceleration));
+  }
+  if (s.search_options.steer && lasts > 0)
+    control.steps = steps_of(
+        std::clamp(lasts * (shortest_stretch + stretches * d.stretch), s.min_duration_s, s.max_duration_s),
+        system.dt_s());
   return control;
 }
 

@@ -22,6 +22,7 @@ struct Sample {
   double ahead = 0;           // how far ahead it aims
   double stretch = 0;         // how much longer than it should take it pushes
   Vec3 aside = Vec3::Zero();  // unit; where it aims besides
+  double lift = 0;            // share of the robot's weight that carriers bear
 };
 Sample draw_sample(const Settings&, const System&, std::int64_t iteration);
 
@@ -29,12 +30,19 @@ Sample draw_sample(const Settings&, const System&, std::int64_t iteration);
 struct NodeMotion {
   Vec3 center = Vec3::Zero(), velocity = Vec3::Zero();
   Vec3 goal_shift = Vec3::Zero(), goal_velocity = Vec3::Zero();
+  std::array<NodePlace, 2> carried{};  // where the system has carriers
 };
 
 // Pushes towards `target` (which moves at `target_velocity`) reckoning with the velocity; the way there takes
 // as long as the control lasts, save for the settings' limits and the draw's stretch.
 Control steered_control(const Sample&, const Settings&, const System&, const NodeMotion&, const Vec3& target,
                         const Vec3& target_velocity);
+
+// Both carriers push, each on half of the robot with the force that is drawn: it bears its part of the
+// weight, and what is left of the force drives it, the first towards targets[0]. They push as long as the
+// longer way takes, save for the settings' limits and the draw's stretch.
+Control carriers_control(const Sample&, const Settings&, const System&, const NodeMotion&,
+                         const std::array<Vec3, 2>& targets, const Vec3& target_velocity);
 
 // The control of an expansion from a node whose robot has its centre of mass at `center`: body and control
 // point push along point − center, interpolation draws to the goal. largest_force() never exceeds

@@ -95,8 +95,10 @@ Control Follower::correct(const State& state, std::size_t piece) const {
     case Manipulation::none:
       control.manipulation = Manipulation::body;
       break;
-    case Manipulation::body:
     case Manipulation::control_point:
+      if (control.second_node >= 0) return shared_by_carriers(control, force);
+      [[fallthrough]];
+    case Manipulation::body:
       force += control.force_n.cast<double>();
       break;
     case Manipulation::interpolation:
@@ -107,10 +109,20 @@ Control Follower::correct(const State& state, std::size_t piece) const {
       control = {.manipulation = Manipulation::body, .steps = control.steps};
     }
   }
-  const double most = settings_.max_force_n * just_below_one, length = force.norm();
-  if (length > most) force *= most / length;
-  control.force_n = force.cast<float>();
+  control.force_n = limited(force);
   return control;
+}
+
+// Each carrier takes half of the correction.
+Control Follower::shared_by_carriers(Control control, const Vec3& correction) const {
+  control.force_n = limited(control.force_n.cast<double>() + 0.5 * correction);
+  control.second_force_n = limited(control.second_force_n.cast<double>() + 0.5 * correction);
+  return control;
+}
+
+Vec3f Follower::limited(const Vec3& force) const {
+  const double most = settings_.max_force_n * just_below_one, length = force.norm();
+  return (length > most ? Vec3(force * (most / length)) : force).cast<float>();
 }
 
 }  // namespace limber::plan

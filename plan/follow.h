@@ -40,6 +40,8 @@ class Follower {
 
  private:
   Control correct(const State&, std::size_t piece) const;
+  Control shared_by_carriers(Control, const Vec3& correction) const;
+  Vec3f limited(const Vec3& force) const;  // to the largest that is allowed
   bool in_goal(const State&) const;
 
   const System& system_;

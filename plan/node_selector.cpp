@@ -23,10 +23,19 @@ constexpr int raises_a_renewal = 4;
 NodeSelector::NodeSelector(const System& system, const Settings& settings, const Guidance* guidance, int root)
     : system_(system), settings_(settings), root_(root) {
   if (guidance) guidance_ = *guidance;
+  const Carriers* carriers = system.carriers();
+  if (!carriers) return;
+  carriers_apart_m_ = (carriers->goals[1] - carriers->goals[0]).norm();
+  if (!guidance) return;
+  for (const Vec3& goal : carriers->goals)
+    carrier_guidance_.emplace_back(guidance->workspace(), settings.goal.center_of_mass_m + goal,
+                                   settings.search_options.soft_price);
 }
 
 double NodeSelector::strongest() const {
-  return std::max(1e-9, settings_.max_force_n * settings_.max_force_share / system_.robot_mass_kg());
+  const double carriers = system_.carriers() ? 2 : 1;
+  return std::max(1e-9,
+                  carriers * settings_.max_force_n * settings_.max_force_share / system_.robot_mass_kg());
 }
 
 void NodeSelector::add(const Tree& tree, int of_tree) {
@@ -37,6 +46,9 @@ void NodeSelector::add(const Tree& tree, int of_tree) {
   const Vec3 shift = system_.goal_shift(state);
   motions_.push_back(
       {center.cast<double>(), system_.robot_velocity(state), shift, system_.goal_velocity(state)});
+  if (const Carriers* carriers = system_.carriers())
+    for (std::size_t i = 0; i < 2; ++i)
+      motions_.back().carried[i] = system_.node_place(state, carriers->nodes[i]);
   centers_.push_back(center);
   centers_from_goal_.push_back(center - shift.cast<float>());
   times_s_.push_back(double(state.step) * system_.dt_s());
@@ -78,16 +90,25 @@ void NodeSelector::rank_all() {
   std::sort(ranking_.begin(), ranking_.end());
 }
 
-double NodeSelector::heuristic(int node) const {
-  const NodeMotion& at = motions_[std::size_t(node)];
-  const Vec3 place = at.center - at.goal_shift, velocity = at.velocity - at.goal_velocity;
-  const double radius = guidance_->workspace().robot_radius_m, a = strongest();
-  const Vec3 way = guidance_->ahead(place, 2 * radius) - place;
+double NodeSelector::seconds_to_go(const Guidance& guidance, const Vec3& place, const Vec3& velocity) const {
+  const double radius = guidance.workspace().robot_radius_m, a = strongest();
+  const Vec3 way = guidance.ahead(place, 2 * radius) - place;
   const Vec3 direction = way.norm() > 0 ? Vec3(way.normalized()) : Vec3::Zero();
   const double along = velocity.dot(direction), across = (velocity - along * direction).norm();
-  return min_time_to_go(guidance_->to_go(place), along, a) + across / a +
-         settings_.search_options.time_weight * times_s_[std::size_t(node)] +
-         child_price * std::sqrt(2 * radius / a) * children_[std::size_t(node)];
+  return min_time_to_go(guidance.to_go(place), along, a) + across / a;
+}
+
+double NodeSelector::heuristic(int node) const {
+  const NodeMotion& at = motions_[std::size_t(node)];
+  double to_go = 0;
+  for (std::size_t i = 0; i < carrier_guidance_.size(); ++i)
+    to_go += 0.5 * seconds_to_go(carrier_guidance_[i], at.carried[i].place - at.goal_shift,
+                                 at.carried[i].velocity - at.goal_velocity);
+  if (carrier_guidance_.empty())
+    to_go = seconds_to_go(*guidance_, at.center - at.goal_shift, at.velocity - at.goal_velocity);
+  return to_go + settings_.search_options.time_weight * times_s_[std::size_t(node)] +
+         child_price * std::sqrt(2 * guidance_->workspace().robot_radius_m / strongest()) *
+             children_[std::size_t(node)];
 }
 
 // Where a strong push from parent to node got less far than it should have, going on that way gets dearer.
@@ -116,20 +137,28 @@ double NodeSelector::cost_of(const Sample& d, int node) const {
     return double(
         squared_distance(d.towards_goal ? centers_from_goal_[node] : centers_[node], d.point.cast<float>()));
   const NodeMotion& at = motions_[std::size_t(node)];
+  const Vec3 frame = d.towards_goal ? at.goal_velocity : Vec3::Zero();
+  double seconds = settings_.search_options.time_weight * times_s_[std::size_t(node)];
+  if (system_.carriers()) {
+    const std::array<Vec3, 2> targets = carrier_targets(d, node);
+    for (std::size_t i = 0; i < 2; ++i)
+      seconds +=
+          0.5 * time_to_go(targets[i] - at.carried[i].place, at.carried[i].velocity - frame, strongest());
+    return seconds;
+  }
   const Vec3 way = d.point + (d.towards_goal ? at.goal_shift : Vec3::Zero()) - at.center;
-  const Vec3 velocity = at.velocity - (d.towards_goal ? at.goal_velocity : Vec3::Zero());
-  return time_to_go(way, velocity, strongest()) +
-         settings_.search_options.time_weight * times_s_[std::size_t(node)];
+  return seconds + time_to_go(way, at.velocity - frame, strongest());
 }
 
 int NodeSelector::nearest_in_time(const Sample& d) const {
   int best = 0;
   double least = cost_of(d, 0);
+  const bool carried = system_.carriers();
   for (int node = 1; node < centers_.size(); ++node) {
     const NodeMotion& at = motions_[std::size_t(node)];
     const Vec3 way = d.point + (d.towards_goal ? at.goal_shift : Vec3::Zero()) - at.center;
     const Vec3 velocity = at.velocity - (d.towards_goal ? at.goal_velocity : Vec3::Zero());
-    if (min_time_to_go(way.norm(), velocity.norm(), strongest()) >= least) continue;
+    if (!carried && min_time_to_go(way.norm(), velocity.norm(), strongest()) >= least) continue;
     if (const double c = cost_of(d, node); c < least) best = node, least = c;
   }
   return best;
@@ -153,8 +182,29 @@ Selection NodeSelector::aim(const Sample& d, int of_tree) const {
   return {of_tree, cost(d, of_tree), control(d, of_tree - root_)};
 }
 
+std::array<Vec3, 2> NodeSelector::carrier_targets(const Sample& d, int node) const {
+  const NodeMotion& at = motions_[std::size_t(node)];
+  std::array<Vec3, 2> targets;
+  if (d.guided) {
+    const double radius = guidance_->workspace().robot_radius_m;
+    const double way = radius * (nearest_ahead + (farthest_ahead - nearest_ahead) * d.ahead);
+    const Vec3 asides[] = {d.aside, {d.aside.y(), d.aside.z(), d.aside.x()}};
+    for (std::size_t i = 0; i < 2; ++i)
+      targets[i] = carrier_guidance_[i].ahead(at.carried[i].place - at.goal_shift, way) + at.goal_shift +
+                   aside_share * way * asides[i];
+    return targets;
+  }
+  for (std::size_t i = 0; i < 2; ++i)
+    targets[i] = d.towards_goal ? Vec3(d.point + at.goal_shift + system_.carriers()->goals[i])
+                                : Vec3(d.point + (i == 0 ? -0.5 : 0.5) * carriers_apart_m_ * d.aside);
+  return targets;
+}
+
 Control NodeSelector::control(const Sample& d, int node) const {
   const NodeMotion& at = motions_[std::size_t(node)];
+  if (d.manipulation == Manipulation::control_point && system_.carriers())
+    return carriers_control(d, settings_, system_, at, carrier_targets(d, node),
+                            d.guided || d.towards_goal ? at.goal_velocity : Vec3::Zero());
   if (d.guided) {
     const double radius = guidance_->workspace().robot_radius_m;
     const double way = radius * (nearest_ahead + (farthest_ahead - nearest_ahead) * d.ahead);

@@ -34,7 +34,10 @@ class NodeSelector {
   double cost_of(const Sample&, int node) const;
   int nearest_in_time(const Sample&) const;
   Control control(const Sample&, int node) const;
+  // Where the carriers are to go from a node: that pose of the robot, of which the draw says centre and turn.
+  std::array<Vec3, 2> carrier_targets(const Sample&, int node) const;
   double heuristic(int node) const;  // seconds to the goal; less is better
+  double seconds_to_go(const Guidance&, const Vec3& place, const Vec3& velocity) const;
   void rank(int node);
   void unrank(int node);
   void rank_all();
@@ -45,6 +48,8 @@ class NodeSelector {
   const Settings& settings_;
   const int root_;
   std::optional<Guidance> guidance_;
+  std::vector<Guidance> carrier_guidance_;  // of each carrier, to its own place in the goal
+  double carriers_apart_m_ = 0;             // at rest
   Centers centers_, centers_from_goal_;
   std::vector<NodeMotion> motions_;
   std::vector<double> times_s_;                  // of the nodes

@@ -48,8 +48,8 @@ void put_shared_states(Npz& file, const States& states) {
 }
 
 void put_controls(Npz& file, const std::string& name, const std::vector<Control>& controls) {
-  std::vector<std::int32_t> manipulation, node, steps;
-  std::vector<float> force, radius, target, max_force;
+  std::vector<std::int32_t> manipulation, node, steps, second_node;
+  std::vector<float> force, radius, target, max_force, second_force;
   for (const Control& c : controls) {
     manipulation.push_back(std::int32_t(c.manipulation));
     node.push_back(c.node);
@@ -58,6 +58,8 @@ void put_controls(Npz& file, const std::string& name, const std::vector<Control>
     radius.push_back(c.radius_m);
     target.insert(target.end(), c.target_m.begin(), c.target_m.end());
     max_force.push_back(c.max_force_n);
+    second_node.push_back(c.second_node);
+    second_force.insert(second_force.end(), c.second_force_n.begin(), c.second_force_n.end());
   }
   const std::int64_t n = std::int64_t(controls.size());
   file.arrays[name + "_manipulation"] = NpyArray::of<std::int32_t>(manipulation, {n});
@@ -67,6 +69,9 @@ void put_controls(Npz& file, const std::string& name, const std::vector<Control>
   file.arrays[name + "_target_m"] = NpyArray::of<float>(target, {n, 3});
   file.arrays[name + "_max_force_n"] = NpyArray::of<float>(max_force, {n});
   file.arrays[name + "_steps"] = NpyArray::of<std::int32_t>(steps, {n});
+  if (std::all_of(second_node.begin(), second_node.end(), [](int node) { return node < 0; })) return;
+  file.arrays[name + "_second_node"] = NpyArray::of<std::int32_t>(second_node, {n});
+  file.arrays[name + "_second_force_n"] = NpyArray::of<float>(second_force, {n, 3});
 }
 
 const char* name_of(Ending ending) {
@@ -145,6 +150,13 @@ class Reader {
     const auto node = array<std::int32_t>(name + "_node", n, 1),
                steps = array<std::int32_t>(name + "_steps", n, 1);
     const auto radius = numbers(name + "_radius_m", n, 1), max_force = numbers(name + "_max_force_n", n, 1);
+    // Where nobody has a second carrier, nothing is told of it.
+    std::span<const std::int32_t> second_node;
+    std::span<const float> second_force;
+    if (const std::string key = name + "_second_node"; file_.arrays.contains(key)) {
+      second_node = array<std::int32_t>(key, n, 1);
+      second_force = numbers(name + "_second_force_n", n, 3);
+    }
     std::vector<Control> controls(manipulation.size());
     for (std::size_t i = 0; i < controls.size(); ++i) {
       require(manipulation[i] >= 0 && manipulation[i] <= std::int32_t(Manipulation::hold),
@@ -160,6 +172,11 @@ class Reader {
                      Vec3f(target.data() + 3 * i),
                      max_force[i],
                      steps[i]};
+      if (second_node.empty()) continue;
+      require(second_node[i] >= -1 && (at_a_node || second_node[i] == -1),
+              fmt::format("{}_second_node[{}] is {}, which is none", name, i, second_node[i]));
+      controls[i].second_node = second_node[i];
+      controls[i].second_force_n = Vec3f(second_force.data() + 3 * i);
     }
     return controls;
   }

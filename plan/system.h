@@ -1,6 +1,7 @@
 // What a planner may ask of dynamics. It deals in numbers and never names a mesh.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <limits>
 #include <memory>
@@ -61,6 +62,18 @@ class Propagator {
   virtual void run(RolloutSource&, int look_every) = 0;
 };
 
+// Of a node of the robot: metres, metres a second.
+struct NodePlace {
+  Vec3 place = Vec3::Zero(), velocity = Vec3::Zero();
+};
+
+// Two carriers have hold of the robot, each at a node, and push it both at once, each by a force of its own.
+struct Carriers {
+  std::array<int, 2> nodes{};
+  std::array<Vec3, 2> goals;     // where those nodes are in the goal's shape, less its centre of mass; metres
+  Vec3 weight_n = Vec3::Zero();  // of the robot
+};
+
 // A coarse picture of what stands where at the start, for guidance.
 struct Workspace {
   enum Cell : std::uint8_t { open, soft, rigid };
@@ -92,6 +105,12 @@ class System {
   virtual int robot_nodes() const = 0;                // Control::node is below it
   // The node that a control point is at, of one drawn below robot_nodes().
   virtual int control_node(int drawn) const { return drawn; }
+  virtual const Carriers* carriers() const {
+    return nullptr;
+  }  // nullptr: control points are pushed one by one
+  virtual NodePlace node_place(const State&, int /*robot_node*/) const {
+    return {};
+  }                                        // asked of carriers' alone
   virtual Box sample_bounds() const = 0;   // where random points are drawn, metres
   virtual double dt_s() const = 0;         // length of a step
   virtual std::uint64_t hash() const = 0;  // of all that a rollout's result depends on

@@ -228,13 +228,16 @@ py::dtype push_dtype() {
     return std::tuple(name, format, offset);
   };
   py::list names, formats, offsets;
-  for (const auto& [name, format, offset] : {field("kind", "<i4", offsetof(limber::Push, kind)),
-                                             field("force_n", "(3,)<f4", offsetof(limber::Push, force_n)),
-                                             field("node", "<i4", offsetof(limber::Push, node)),
-                                             field("radius_m", "<f4", offsetof(limber::Push, radius_m)),
-                                             field("target_m", "(3,)<f4", offsetof(limber::Push, target_m)),
-                                             field("max_force_n", "<f4", offsetof(limber::Push, max_force_n)),
-                                             field("steps", "<i4", offsetof(limber::Push, steps))}) {
+  for (const auto& [name, format, offset] :
+       {field("kind", "<i4", offsetof(limber::Push, kind)),
+        field("force_n", "(3,)<f4", offsetof(limber::Push, force_n)),
+        field("node", "<i4", offsetof(limber::Push, node)),
+        field("radius_m", "<f4", offsetof(limber::Push, radius_m)),
+        field("target_m", "(3,)<f4", offsetof(limber::Push, target_m)),
+        field("max_force_n", "<f4", offsetof(limber::Push, max_force_n)),
+        field("steps", "<i4", offsetof(limber::Push, steps)),
+        field("second_node", "<i4", offsetof(limber::Push, second_node)),
+        field("second_force_n", "(3,)<f4", offsetof(limber::Push, second_force_n))}) {
     names.append(name), formats.append(format), offsets.append(offset);
   }
   return py::dtype::from_args(py::dict("names"_a = names, "formats"_a = formats, "offsets"_a = offsets,

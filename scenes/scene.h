@@ -222,6 +222,7 @@ struct PlannerSpec {
   // where the robot is taken to be.
   std::vector<Box> patches_m;
   bool lead = false;
+  bool carry = false;             // the first two are carriers, which push both at once
   std::string patches_where;      // their place in the text, for complaints
   double settle_time_s = 0;       // the robot gets at most so long to come to rest at the goal,
   double settle_speed_m_s = 0;    // which it does when its mean speed is below this

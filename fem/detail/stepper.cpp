@@ -39,25 +39,22 @@ constexpr double goal_frequency = 6;  // rad/s
 // A control point pushes at least so much of its robot, or a strong push would tear out a single node.
 constexpr double min_share = 0.1;
 
-// Mass that a control pushes, kg, by node of the robot; 0: not pushed. Round a control point that is all
-// within its radius and, where that is less than min_share, what is nearest to it at rest. Equal distances
-// go by node number.
-std::vector<double> pushed_masses_kg(const World& world, const Control& control) {
+// Mass that is pushed round a control point, kg, by node of the robot; 0: not pushed. That is all within its
+// radius and, where that is less than min_share, what is nearest to it at rest. Equal distances go by node
+// number. At node −1: all of the robot.
+std::vector<double> pushed_masses_kg(const World& world, int node, double radius_m) {
   const Body& robot = world.bodies[world.robot];
   std::vector<double> masses(std::size_t(robot.node_count()), 0);
-  if (control.manipulation != Manipulation::body && control.manipulation != Manipulation::control_point)
-    return masses;
   std::vector<std::pair<double, int>> free;  // distance from the control point, node
-  const bool all = control.manipulation == Manipulation::body;
-  LIMBER_CHECK(all || (control.node >= 0 && control.node < robot.node_count()), control.node);
+  const bool all = node < 0;
+  LIMBER_CHECK(node < robot.node_count(), node);
   for (int n = 0; n < robot.node_count(); ++n)
     if (!robot.fixed[n])
-      free.emplace_back(
-          all ? 0 : (robot.cage.positions.row(n) - robot.cage.positions.row(control.node)).norm(), n);
+      free.emplace_back(all ? 0 : (robot.cage.positions.row(n) - robot.cage.positions.row(node)).norm(), n);
   std::sort(free.begin(), free.end());
   double pushed = 0;
   for (const auto& [distance, n] : free) {
-    if (!all && distance > control.radius_m && pushed >= min_share * robot.mass_kg) break;
+    if (!all && distance > radius_m && pushed >= min_share * robot.mass_kg) break;
     pushed += masses[std::size_t(n)] = robot.node_mass_kg[n];
   }
   return masses;
@@ -180,14 +177,20 @@ void Stepper<Real>::load(int lane, std::int64_t step, const Real* positions, con
     for (std::size_t k = 0; k < forced.size(); k += std::size_t(lanes_)) forced[k + lane] = 0;
 
   const Body& robot = world_.bodies[world_.robot];
-  const std::vector<double> pushed = pushed_masses_kg(world_, control);
-  const double mass = control.manipulation == Manipulation::body
-                          ? robot.mass_kg
-                          : std::accumulate(pushed.begin(), pushed.end(), 0.);
-  for (int n = 0; n < robot.node_count(); ++n)
-    for (int c = 0; c < 3; ++c)
-      push_[(3 * n + c) * lanes_ + lane] =
-          pushed[std::size_t(n)] > 0 ? Real(control.force_n[c]) / Real(mass) : Real(0);
+  for (std::size_t k = lane; k < push_.size(); k += std::size_t(lanes_)) push_[k] = 0;
+  const auto push = [&](int node, const Vec3f& force_n) {
+    const std::vector<double> pushed = pushed_masses_kg(world_, node, control.radius_m);
+    const double mass = node < 0 ? robot.mass_kg : std::accumulate(pushed.begin(), pushed.end(), 0.);
+    for (int n = 0; n < robot.node_count(); ++n)
+      for (int c = 0; c < 3 && pushed[std::size_t(n)] > 0; ++c)
+        push_[(3 * n + c) * lanes_ + lane] += Real(force_n[c]) / Real(mass);
+  };
+  if (control.manipulation == Manipulation::body) push(-1, control.force_n);
+  if (control.manipulation == Manipulation::control_point) {
+    LIMBER_CHECK(control.node >= 0, control.node);
+    push(control.node, control.force_n);
+    if (control.second_node >= 0) push(control.second_node, control.second_force_n);
+  }
 }
 
 // Whether the lane is where these positions are, so that its lists hold for them, and has not come so far

@@ -12,6 +12,7 @@ inline void hash_control(Hasher& hasher, const Control& c) {
       .value(c.max_force_n)
       .value(c.steps);
   hasher.matrix(c.force_n).matrix(c.target_m);
+  if (c.second_node >= 0) hasher.value(c.second_node).matrix(c.second_force_n);
 }
 
 }  // namespace limber::plan::detail

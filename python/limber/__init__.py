@@ -362,24 +362,25 @@ _kinds = ("none", "body", "control_point", "interpolation", "hold")
 
 @_checked
 def pushes(count: int, kind: str = "body", *, steps: Any, force_n: Any = 0, node: Any = -1, radius_m: Any = 0,
-           target_m: Any = 0, max_force_n: Any = 0) -> Array:
+           target_m: Any = 0, max_force_n: Any = 0, second_node: Any = -1, second_force_n: Any = 0) -> Array:
     """`count` pushes of the robot, as rows of push_dtype; each argument is one for all, or one a push.
 
-    "body": force_n on the whole robot. "control_point": the same near `node` alone, within radius_m.
+    "body": force_n on the whole robot. "control_point": the same near `node` alone, within radius_m,
+    and, where second_node is none of -1, at the same time second_force_n near that.
     "interpolation", "hold": towards target_m with at most max_force_n. Held for `steps` time steps.
     """
     if kind not in _kinds:
         raise InputError(f"kind is {kind!r}; it must be one of {', '.join(_kinds)}")
     if count < 0:
         raise InputError(f"count is {count}; it must not be negative")
-    for name, value in (("steps", steps), ("node", node)):
+    for name, value in (("steps", steps), ("node", node), ("second_node", second_node)):
         whole = np.asarray(value)
         if whole.dtype.kind not in "iu" or (whole.size and not -2**31 <= int(whole.min()) <= int(whole.max()) < 2**31):
             raise InputError(f"{name} must be whole numbers below 2**31, not {value!r:.60}")
     if np.size(steps) and np.min(steps) < 1:
         raise InputError(f"steps is {np.min(steps)}; it must be above 0")
     for name, value in (("force_n", force_n), ("radius_m", radius_m), ("target_m", target_m),
-                        ("max_force_n", max_force_n)):
+                        ("max_force_n", max_force_n), ("second_force_n", second_force_n)):
         try:
             finite = bool(np.isfinite(np.asarray(value, dtype=np.float32)).all())
         except (TypeError, ValueError):
@@ -390,6 +391,7 @@ def pushes(count: int, kind: str = "body", *, steps: Any, force_n: Any = 0, node
     made["kind"] = _kinds.index(kind)
     made["steps"], made["force_n"], made["node"] = steps, force_n, node
     made["radius_m"], made["target_m"], made["max_force_n"] = radius_m, target_m, max_force_n
+    made["second_node"], made["second_force_n"] = second_node, second_force_n
     return made
 
 

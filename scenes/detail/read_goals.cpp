@@ -140,6 +140,19 @@ void require_of_lead(const PlannerSpec& planner, const Node& table) {
              "planner.settle_time_s = 0");
 }
 
+void require_of_carry(const PlannerSpec& planner, const Node& table) {
+  const Node& carry = child(table, "carry");
+  if (planner.patches_m.size() != 2)
+    complain(carry,
+             fmt::format(
+                 "planner.carry needs two patches, and planner.patches_m has {}; write one for each carrier",
+                 planner.patches_m.size()));
+  if (planner.lead)
+    complain(carry, "a patch that leads, and two that carry, exclude one another; leave lead or carry out");
+  if (planner.weight_control_point == 0)
+    complain(carry, "carriers push at control points, and planner.weights.control_point is 0; make it > 0");
+}
+
 }  // namespace
 
 PlannerSpec read_planner(const Node& table) {
@@ -163,7 +176,7 @@ PlannerSpec read_planner(const Node& table) {
   planner.min_duration_s = duration[0], planner.max_duration_s = duration[1];
   planner.control_point_radius_m = number(table, "control_point_radius_m");
   planner.patches_m = read_boxes(table, "patches_m");
-  planner.lead = flag(table, "lead");
+  planner.lead = flag(table, "lead"), planner.carry = flag(table, "carry");
   if (const Node* patches = table.find("patches_m")) planner.patches_where = patches->where.text();
   planner.settle_time_s = number(table, "settle_time_s");
   planner.settle_speed_m_s = number(table, "settle_speed_m_s");
@@ -188,6 +201,7 @@ PlannerSpec read_planner(const Node& table) {
              "stop_in_goal and end_hopeless need pushes that are looked at; write planner.look_s = 0.1");
   planner.shortcut_rounds = integer(table, "shortcut_rounds");
   if (planner.lead) require_of_lead(planner, table);
+  if (planner.carry) require_of_carry(planner, table);
   return planner;
 }
 

@@ -339,6 +339,8 @@ const std::vector<Row> rows{
     {"planner.patches_m", "planner.patches_m=[[[0, 0, 0], [4, 2, 2]]]", world},
     {"planner.lead", "planner.lead=true", world,
      "planner.patches_m=[[[0, 0, 0], [4, 2, 2]]]|planner.settle_time_s=0|planner.weights.interpolation=0"},
+    {"planner.carry", "planner.carry=true", world,
+     "planner.patches_m=[[[0, 0, 0], [4, 2, 2]], [[0, 0, 0], [2, 2, 2]]]"},
     {"planner.settle_time_s", "planner.settle_time_s=2", search},
     {"planner.settle_speed_m_s", "planner.settle_speed_m_s=0.03", search},
     {"planner.settle_force_share", "planner.settle_force_share=0.5", search},

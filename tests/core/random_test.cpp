@@ -112,6 +112,8 @@ TEST(Control, LargestForceIsWhatTheManipulationMayExert) {
   EXPECT_EQ(largest_force(control), 5);
   control.manipulation = Manipulation::control_point;
   EXPECT_EQ(largest_force(control), 5);
+  control.second_node = 3, control.second_force_n = {0, 6, 0};
+  EXPECT_EQ(largest_force(control), 6) << "of the stronger carrier";
   control.manipulation = Manipulation::interpolation;
   EXPECT_EQ(largest_force(control), 9);
 }

@@ -313,6 +313,47 @@ TEST(Observe, AControlPointGivesTheRobotAllOfItsForce) {
     }
 }
 
+// Two carriers give the robot both of their forces, and what these are as a couple: a pair of opposite ones
+// no momentum, but the turning r × F t.
+TEST(Observe, TwoCarriersGiveTheRobotBothForcesAndTheirCouple) {
+  const World world = build_world(alone({"robot", grid({-1, -0.1, -0.1}, {2, 0.2, 0.2}, 10, 1, 1), {}, {}}));
+  const Body& robot = world.bodies[0];
+  const auto at_end = [&](double x) {
+    int nearest = 0;
+    for (int n = 0; n < robot.node_count(); ++n)
+      if (std::abs(robot.cage.positions(n, 0) - x) < std::abs(robot.cage.positions(nearest, 0) - x))
+        nearest = n;
+    return nearest;
+  };
+  Control push;
+  push.manipulation = Manipulation::control_point;
+  push.node = at_end(-1), push.second_node = at_end(1), push.radius_m = 0.35f, push.steps = 50;
+  const double duration_s = push.steps * world.dt_s;
+  const auto gained = [&](const Vec3f& first, const Vec3f& second) {
+    push.force_n = first, push.second_force_n = second;
+    const State end = propagate(world, rest_state(world), push).end;
+    std::pair<Vec3, Vec3> sums(Vec3::Zero(), Vec3::Zero());  // momentum, turning about the origin
+    for (int n = 0; n < robot.node_count(); ++n) {
+      const Vec3 velocity = Eigen::Map<const Vec3f>(&end.velocities[std::size_t(3 * n)]).cast<double>();
+      const Vec3 place = Eigen::Map<const Vec3f>(&end.positions[std::size_t(3 * n)]).cast<double>();
+      sums.first += robot.node_mass_kg[n] * velocity;
+      sums.second += robot.node_mass_kg[n] * place.cross(velocity);
+    }
+    return sums;
+  };
+  const Vec3f along(3, -2, 1), other(-1, 4, 2), across(0, 2, 0);
+  const Vec3 both = duration_s * (along + other).cast<double>();
+  EXPECT_LT((gained(along, other).first - both).norm(), 1e-4 * both.norm());
+  const auto [momentum, turning] = gained(across, -across);
+  double arm = 0, pushed = 0;  // of the middle of what is pushed at one end
+  for (int n = 0; n < robot.node_count(); ++n)
+    if (robot.cage.positions(n, 0) < -0.7)
+      arm -= robot.node_mass_kg[n] * robot.cage.positions(n, 0), pushed += robot.node_mass_kg[n];
+  const double couple = 2 * arm / pushed * double(across.y()) * duration_s;
+  EXPECT_LT(momentum.norm(), 1e-4 * couple);
+  EXPECT_NEAR(turning.z(), -couple, 0.01 * couple) << "the rod has turned a little";
+}
+
 // The bodies' energies are those of the world, each that of the body alone.
 TEST(Observe, EnergiesOfBodiesSumToTheWorlds) {
   const World world = pile();

@@ -217,6 +217,48 @@ TEST(Goal, APatchThatLeadsIsWhatGoesToTheGoal) {
   EXPECT_NE(FemSystem(world, rules).hash(), system.hash());
 }
 
+// A rod in the hands of two carriers, one at each end, is turned to where its ends are to be: each push has
+// both hands in it, and neither is stronger than may be.
+TEST(Goal, TwoCarriersTurnARod) {
+  fem::WorldSpec spec =
+      alone({"robot", grid({-1, -0.1, -0.1}, {2, 0.2, 0.2}, 10, 1, 1), {}, {}, fem::BodyKind::deformable});
+  const Points rest = spec.bodies[0].cage.positions;
+  spec.goal_shape_m = rest;
+  spec.goal_shape_m.col(0) = -rest.col(1), spec.goal_shape_m.col(1) = rest.col(0);
+  const fem::World world = fem::build_world(spec);
+  GoalRules rules;
+  rules.patches_m = {Box{Vec3(-1.05, -1, -1), Vec3(-0.95, 1, 1)}, Box{Vec3(0.95, -1, -1), Vec3(1.05, 1, 1)}};
+  rules.carry = true, rules.turn_tolerance_deg = 30;
+  const FemSystem system(world, rules);
+  ASSERT_NE(system.carriers(), nullptr);
+  for (const int i : {0, 1}) {
+    const plan::NodePlace at = system.node_place(system.start(), system.carriers()->nodes[std::size_t(i)]);
+    EXPECT_NEAR(at.place.x(), i == 0 ? -1 : 1, 1e-6);
+    EXPECT_NEAR(system.carriers()->goals[std::size_t(i)].y(), i == 0 ? -1 : 1, 1e-6);
+  }
+  plan::Settings s;
+  s.goal.center_of_mass_m = Vec3(0.5, 0.5, 0), s.goal.radius_m = 0.3;
+  s.seed = 1, s.max_force_n = 20, s.max_iterations = 1000, s.settle.max_duration_s = 0;
+  s.goal_bias = 0.3;
+  s.weights = {.body = 0, .control_point = 1, .interpolation = 0};
+  s.search_options.metric = plan::Metric::time_to_go, s.search_options.steer = true;
+  const plan::Plan p = plan::plan(system, s);
+  ASSERT_TRUE(p.solved()) << plan::explain(p);
+  EXPECT_LE(fem::turn_from_goal_shape_deg(world, p.trajectory.end), 30);
+  int pushes = 0, differ = 0;
+  for (const Control& control : p.tree.controls) {
+    if (control.manipulation == Manipulation::none) continue;  // the root's
+    ++pushes, differ += (control.force_n - control.second_force_n).norm() > 1;
+    EXPECT_EQ(control.node, system.carriers()->nodes[0]);
+    EXPECT_EQ(control.second_node, system.carriers()->nodes[1]);
+    EXPECT_LE(largest_force(control), 20);
+  }
+  EXPECT_GT(pushes, 5);
+  EXPECT_GT(differ, pushes / 2);
+  rules.carry = false;
+  EXPECT_NE(FemSystem(world, rules).hash(), system.hash());
+}
+
 // Where no rest is asked for, what else the goal asks still counts.
 TEST(Goal, WithoutASettleTheGoalIsStillAsked) {
   const fem::World world = fem::build_world(brick_over_slab());

@@ -37,6 +37,27 @@ void expect_same(const Plan& a, const Plan& b) {
   EXPECT_EQ(without_timings(json_of(a.statistics)), without_timings(json_of(b.statistics)));
 }
 
+// The same with a second carrier.
+Control carried(Control control) {
+  control.manipulation = Manipulation::control_point;
+  control.node = 0, control.second_node = 1, control.second_force_n = {1, 2, -3};
+  return control;
+}
+
+// Of plans in which nobody carries nothing is told of it.
+TEST_F(PlanFileTest, SecondCarriersComeBack) {
+  Plan p = plan(Toy(5, true, true, 1.6f), toy_settings());
+  EXPECT_FALSE(npz_of(p, {}).arrays.contains("path_second_node"));
+  const std::uint64_t before = hash_of(p.trajectory);
+  p.trajectory.controls[1] = carried(p.trajectory.controls[1]);
+  p.tree.controls[2] = carried(p.tree.controls[2]);
+  EXPECT_NE(hash_of(p.trajectory), before);
+  write_plan(file(), p, {});
+  const PlanFile back = read_plan(file());
+  expect_same(back.plan, p);
+  EXPECT_EQ(back.plan.tree.controls, p.tree.controls);
+}
+
 TEST_F(PlanFileTest, RoundTrip) {
   const Json given = {{"scene", "name = \"toy\"\n"}, {"version", "0.1"}};
   Settings settings = toy_settings();
@@ -284,6 +305,16 @@ TEST_F(PlanFileTest, NumbersThatNoPlanHasAreInputErrors) {
          p.trajectory.controls[0].node = -7;
        }},
       {"path_node[0]", [](Plan& p) { p.trajectory.controls[0].node = -2; }},
+      {"path_second_node[0]",
+       [](Plan& p) {
+         p.trajectory.controls[0] = carried(p.trajectory.controls[0]);
+         p.trajectory.controls[0].manipulation = Manipulation::body;
+       }},
+      {"path_second_force_n[0]",
+       [=](Plan& p) {
+         p.trajectory.controls[0] = carried(p.trajectory.controls[0]);
+         p.trajectory.controls[0].second_force_n.x() = float(nan);
+       }},
       {"path_force_n[1]", [=](Plan& p) { p.trajectory.controls[1].force_n.y() = float(nan); }},
       {"tree_target_m[1]", [=](Plan& p) { p.tree.controls[1].target_m.z() = float(inf); }},
       {"tree_center_m[1]", [=](Plan& p) { p.tree.centers.x[1] = float(nan); }},

@@ -245,6 +245,11 @@ TEST(ReadScene, ComplainsWithLineAndColumn) {
        "model = { tube = { path_m = [[0, 0, 0], [1, 0, 0]], diameter_m = 0.2, wall_m = 0.02 } }", "[3, 3, 3]",
        "has 3 cells round the tube; write an even number"},
       {"[planner]", "[planner]\nlead = true", "true", "needs a patch that leads"},
+      {"[planner]", "[planner]\ncarry = true", "true", "needs two patches"},
+      {"[planner]",
+       "[planner]\ncarry = true\npatches_m = [[[0, 0, 0], [1, 2, 2]], [[1, 0, 0], [2, 2, 2]]]\n"
+       "weights = { body = 1, control_point = 0 }",
+       "true", "make it > 0"},
       {blocks_robot, "model = { blocks = { solids = [] } }", "[] }", "write one solid at least"},
       {blocks_robot, "model = { blocks = { solids = [[[0, 0, 0], [1, 0, 1]]] } }", "[1, 0", "upper y = 0"},
       {"cells = [3, 3, 3]", "cell_m = 0.5", "0.5 }\nmaterial", "goes with model.blocks only"},
@@ -749,6 +754,8 @@ TEST(Keys, EveryKeyChangesTheScene) {
     if (key.path.find(".tube") != key.path.npos)
       sets = {"bodies.robot.model={ tube = { path_m = [[0, 0, 0], [1, 0, 0]], diameter_m = 0.2 } }",
               tets_robot};
+    if (key.path == "planner.carry")
+      sets = {"planner.patches_m=[[[0, 0, 0], [1, 2, 2]], [[0, 0, 0], [2, 2, 2]]]"};
     if (key.path == "planner.lead")
       sets = {"planner.patches_m=[[[0, 0, 0], [1, 2, 2]]]", "planner.settle_time_s=0",
               "planner.weights.interpolation=0"};
@@ -993,7 +1000,7 @@ std::string all_of(const Scene& s) {
                    p.control_point_radius_m, p.settle_time_s, p.settle_speed_m_s, p.settle_force_share);
   t += fmt::format("{} {} {} {} {} {} {} {} {} {} {}\n", p.lag, p.metric, p.time_weight, p.guidance,
                    p.soft_price, p.look_s, p.learn_prices, p.steer, p.stop_in_goal, p.end_hopeless, p.hold);
-  t += fmt::format("{} {} {}\n", p.shortcut_rounds, p.settle_hold, p.lead);
+  t += fmt::format("{} {} {} {}\n", p.shortcut_rounds, p.settle_hold, p.lead, p.carry);
   for (const Box& patch : p.patches_m) t += b(patch);
   for (const CameraSpec& c : s.cameras) {
     t += fmt::format("{} {} {} {} {}", c.name, v(c.direction), c.fov_deg, c.turn_deg, c.follow);

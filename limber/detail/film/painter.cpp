@@ -134,7 +134,8 @@ struct Shot::Painter::View {
     if (shot.tree_m_.rows() > 0) renderer.add_lines(shot.tree_m_, tree_lines);
     for (const PaneOf& pane : shot.panes_) add_pane(pane);
     if (film.forces)
-      for (std::size_t i = 0; i <= shot.bodies_.size() + shot.world_.forces.size(); ++i) {
+      // The push, contact body by body, forces given, the second carrier's push.
+      for (std::size_t i = 0; i <= shot.bodies_.size() + shot.world_.forces.size() + 1; ++i) {
         const bool is_push = i == 0 || i > shot.bodies_.size();
         const Vec3 nowhere = shot.look_.stage.center();
         arrows.push_back(renderer.add_mesh(

@@ -135,7 +135,8 @@ Points Shot::arrows_at_stored(int frame) const {
         std::min(arrow_m_per_n_ * force_n.norm(), longest_arrow * arrow_m_per_n_ * strongest_push_n_);
     ends.row(row + 1) = (from + length * along).transpose();
   };
-  Points ends(2 * (1 + bodies + Eigen::Index(world_.forces.size())), 3);
+  const Eigen::Index of_second = 2 * (1 + bodies + Eigen::Index(world_.forces.size()));
+  Points ends(of_second + 2, 3);
   ends.rowwise() = robot.transpose();
   const Control control = control_at(frame);
   if (control.manipulation != Manipulation::none) {
@@ -144,6 +145,9 @@ Points Shot::arrows_at_stored(int frame) const {
     if (control.manipulation == Manipulation::interpolation || control.manipulation == Manipulation::hold)
       for (const Vec3& on_node : fem::control_forces_n(world_, state, control)) force_n += on_node;
     put(ends, 0, nodes, at_point ? Vec3(nodes.row(control.node).transpose()) : robot, force_n);
+    if (at_point && control.second_node >= 0)
+      put(ends, of_second, nodes, nodes.row(control.second_node).transpose(),
+          control.second_force_n.cast<double>());
   }
   // Each at the middle of its contacts, by their forces.
   std::vector<Vec3> force(std::size_t(bodies), Vec3::Zero()), place = force;

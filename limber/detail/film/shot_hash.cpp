@@ -45,6 +45,7 @@ std::uint64_t Shot::hash_of_look() const {
         .value(control.radius_m)
         .matrix(control.target_m)
         .value(control.max_force_n);
+    if (control.second_node >= 0) hasher.value(control.second_node).matrix(control.second_force_n);
   }
   for (const fem::Force& force : world_.forces) {
     if (!film.forces) break;

@@ -86,7 +86,7 @@ Start loaded_start(const scenes::Scene& scene, const std::vector<LoadedModel>& m
   apart.walls = false;
   apart.goal.shape.reset();
   apart.forces.clear(), apart.ligaments.clear();
-  apart.planner.patches_m.clear(), apart.planner.lead = false;
+  apart.planner.patches_m.clear(), apart.planner.lead = apart.planner.carry = false;
   apart.contact_offset_m = 0;
   for (std::size_t b = 0; b < models.size(); ++b) {
     scenes::BodySpec& body = apart.bodies[b];

@@ -227,10 +227,12 @@ void require_of_world(const plan::Plan& plan, const fem::World& world, const fs:
   for (const auto& [name, controls] :
        {std::pair("path", &plan.trajectory.controls), {"tree", &plan.tree.controls}})
     for (std::size_t i = 0; i < controls->size(); ++i)
-      if (const int node = (*controls)[i].node; node >= nodes)
-        throw InputError(fmt::format(
-            "{}: {}_node[{}] is {}, and the robot has the nodes 0 … {}; plan anew with limber plan", file,
-            name, i, node, nodes - 1));
+      for (const auto& [key, node] :
+           {std::pair("node", (*controls)[i].node), {"second_node", (*controls)[i].second_node}})
+        if (node >= nodes)
+          throw InputError(fmt::format(
+              "{}: {}_{}[{}] is {}, and the robot has the nodes 0 … {}; plan anew with limber plan", file,
+              name, key, i, node, nodes - 1));
   plan::require_frame_times(plan.trajectory, world.dt_s, file);
 }
 

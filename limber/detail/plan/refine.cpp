@@ -76,7 +76,8 @@ KeptPlan refine(const RefineOptions& options) {
   const auto robot = std::size_t(scene.robot);
   for (Control& control : reference.controls)
     if (control.manipulation == Manipulation::control_point)
-      control.node = same_node(coarse_bodies[robot].cage, control.node, bodies[robot].cage);
+      for (std::int32_t* node : {&control.node, &control.second_node})
+        if (*node >= 0) *node = same_node(coarse_bodies[robot].cage, *node, bodies[robot].cage);
 
   plan::Settings settings = settings_of(scene, {});
   settings.seed = planned.plan.settings.seed;

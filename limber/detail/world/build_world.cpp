@@ -228,6 +228,7 @@ GoalRules goal_rules_of(const scenes::Scene& scene) {
   GoalRules rules = rules_of(scene.goal);
   for (const scenes::Via& via : scene.via) rules.via.push_back(rules_of(via.goal));
   rules.patches_m = scene.planner.patches_m, rules.lead = scene.planner.lead;
+  rules.carry = scene.planner.carry;
   return rules;
 }
 

@@ -252,9 +252,10 @@ FemSystem::FemSystem(const fem::World& world, const GoalRules& goal, std::option
   for (const auto& rule : {goal.lost_below_m, goal.turn_tolerance_deg, goal.shape_tolerance_m})
     hasher.value(int(rule.has_value())).value(rule.value_or(0));
   if (!goal.patches_m.empty()) find_patches(), hasher.text("patches").value(int(goal.lead));
+  if (goal.carry) hasher.text("carry");
   for (const Box& patch : goal.patches_m) hasher.matrix(patch.lower).matrix(patch.upper);
   for (GoalRules rules : goal.via) {
-    rules.patches_m = goal.patches_m, rules.lead = goal.lead;
+    rules.patches_m = goal.patches_m, rules.lead = goal.lead, rules.carry = goal.carry;
     via_.push_back(std::unique_ptr<FemSystem>(new FemSystem(world, rules, given_start_, hash_of_world)));
     via_.back()->last_ = this;
     hasher.value(via_.back()->hash());
@@ -288,6 +289,14 @@ void FemSystem::find_patches() {
     patch_nodes_.push_back(*std::min_element(nodes.begin(), nodes.end(),
                                              [&](int a, int b) { return to_middle(a) < to_middle(b); }));
   }
+  if (goal_.carry) {
+    carriers_.emplace();
+    carriers_->weight_n = robot.mass_kg * robot.gravity_m_s2;
+    for (std::size_t i = 0; i < 2; ++i) {
+      carriers_->nodes[i] = patch_nodes_[i];
+      carriers_->goals[i] = world_.goal_shape_m.row(patch_nodes_[i]).transpose();
+    }
+  }
   if (!goal_.lead) return;
   lead_nodes_ = free_in(goal_.patches_m[0]);
   for (const int n : lead_nodes_) lead_mass_kg_ += robot.node_mass_kg[std::size_t(n)];
@@ -316,6 +325,11 @@ double FemSystem::mean_speed(const State& state) const {
 int FemSystem::robot_nodes() const { return world_.bodies[std::size_t(world_.robot)].node_count(); }
 int FemSystem::control_node(int drawn) const {
   return patch_nodes_.empty() ? drawn : patch_nodes_[std::size_t(drawn) % patch_nodes_.size()];
+}
+plan::NodePlace FemSystem::node_place(const State& state, int robot_node) const {
+  const std::size_t at = 3 * std::size_t(world_.bodies[std::size_t(world_.robot)].first_node + robot_node);
+  return {Eigen::Map<const Vec3f>(&state.positions[at]).cast<double>(),
+          Eigen::Map<const Vec3f>(&state.velocities[at]).cast<double>()};
 }
 Box FemSystem::sample_bounds() const { return world_.bounds_m; }
 double FemSystem::dt_s() const { return world_.dt_s; }

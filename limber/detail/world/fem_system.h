@@ -27,6 +27,7 @@ struct GoalRules {
   // last's.
   std::vector<Box> patches_m = {};
   bool lead = false;
+  bool carry = false;               // the first two are carriers, which push both at once
   std::vector<GoalRules> via = {};  // of the goals before it, likewise; lost_below_m is of the last
 };
 
@@ -48,6 +49,8 @@ class FemSystem final : public plan::System {
   double mean_speed(const State&) const override;
   int robot_nodes() const override;
   int control_node(int drawn) const override;
+  const plan::Carriers* carriers() const override { return carriers_ ? &*carriers_ : nullptr; }
+  plan::NodePlace node_place(const State&, int robot_node) const override;
   Box sample_bounds() const override;
   double dt_s() const override;
   std::uint64_t hash() const override;
@@ -75,6 +78,7 @@ class FemSystem final : public plan::System {
   std::vector<int> patch_nodes_;  // of the robot: of each patch's, the nearest to its middle
   std::vector<int> lead_nodes_;   // of the robot; empty: no patch leads
   double lead_mass_kg_ = 0;
+  std::optional<plan::Carriers> carriers_;
   const FemSystem* last_ = this;  // on the leg to the last goal: what is lost to it is lost
   void find_patches();
   Vec3 mean_of_lead(const std::vector<float>& of_nodes) const;
