@@ -194,6 +194,51 @@ double distance_from_goal_shape_m(const World& world, const State& state) {
   return (robot_from_center(world, state) - world.goal_shape_m).rowwise().norm().maxCoeff();
 }
 
+Hole hole_of(const World& world, const State& state, int ring) {
+  const Points nodes = body_positions(world, state, ring);
+  const Vec3 middle = nodes.colwise().mean().transpose();
+  const Points from_middle = nodes.rowwise() - middle.transpose();
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> spread(from_middle.transpose() * from_middle);
+  const Vec3 normal = spread.eigenvectors().col(0);  // along which they spread least
+  const Points in_plane = from_middle - (from_middle * normal) * normal.transpose();
+  return {middle, normal, in_plane.rowwise().norm().minCoeff()};
+}
+
+// Neighbours that the plane cuts share an edge that it cuts.
+int pieces_through(const World& world, const State& state, int ring) {
+  const Hole hole = hole_of(world, state, ring);
+  const Points nodes = body_positions(world, state, world.robot);
+  const Eigen::VectorXd height = (nodes.rowwise() - hole.middle_m.transpose()) * hole.normal;
+  const Tets& tets = world.bodies[std::size_t(world.robot)].cage.tets;
+  std::map<std::pair<int, int>, int> piece_of_edge;
+  std::vector<int> parent;  // of each cut tet's piece
+  const auto root = [&](int piece) {
+    while (parent[std::size_t(piece)] != piece) piece = parent[std::size_t(piece)];
+    return piece;
+  };
+  for (Eigen::Index t = 0; t < tets.rows(); ++t) {
+    std::vector<std::pair<int, int>> edges;
+    Vec3 sum = Vec3::Zero();
+    for (int i = 0; i < 4; ++i)
+      for (int j = i + 1; j < 4; ++j) {
+        const auto [a, b] = std::minmax(tets(t, i), tets(t, j));
+        if ((height[a] < 0) == (height[b] < 0)) continue;
+        const double share = height[a] / (height[a] - height[b]);
+        sum += (1 - share) * nodes.row(a).transpose() + share * nodes.row(b).transpose();
+        edges.emplace_back(a, b);
+      }
+    if (edges.empty() || (sum / double(edges.size()) - hole.middle_m).norm() >= hole.radius_m) continue;
+    const int piece = int(parent.size());
+    parent.push_back(piece);
+    for (const auto& edge : edges)
+      if (const auto [found, is_new] = piece_of_edge.try_emplace(edge, piece); !is_new)
+        parent[std::size_t(root(piece))] = root(found->second);
+  }
+  int pieces = 0;
+  for (std::size_t p = 0; p < parent.size(); ++p) pieces += parent[p] == int(p);
+  return pieces;
+}
+
 int inverted_tets(const World& world, const State& state) {
   int count = 0;
   for (int b = 0; b < int(world.bodies.size()); ++b) {

@@ -44,6 +44,17 @@ std::vector<double> volume_changes(const World&, const State&, int body);  // (T
 double turn_from_goal_shape_deg(const World&, const State&);
 double distance_from_goal_shape_m(const World&, const State&);
 
+// The hole of a body that is a ring: the plane in which the nodes of its cage lie best, through their middle,
+// as far from there as the nearest of them.
+struct Hole {
+  Vec3 middle_m, normal;
+  double radius_m = 0;
+};
+Hole hole_of(const World&, const State&, int ring);
+// How many pieces of the robot are in that hole: of its tets that the hole cuts, those that hang together
+// there are one.
+int pieces_through(const World&, const State&, int ring);
+
 // Where a ligament's ends are, and what it pulls with; below 0 where it pushes.
 struct LigamentPull {
   Vec3 from_m, to_m;

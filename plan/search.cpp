@@ -650,7 +650,7 @@ std::string explain(const Plan& plan) {
   text += plan.best_distance_m <= s.goal.radius_m
               ? fmt::format(
                     "the robot got into {}, but did not come to rest there within {:g} s, or not as the "
-                    "goal asks (turn, shape, above, below or clear of a body): ",
+                    "goal asks (turn, shape, above, below, clear of or through a body): ",
                     goal, s.settle.max_duration_s) +
                     where + ". "
               : fmt::format("no node reached {}; the nearest is {}. ", goal, where);

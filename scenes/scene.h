@@ -3,6 +3,7 @@
 // reader's own table.
 #pragma once
 
+#include <map>
 #include <optional>
 #include <string>
 #include <variant>
@@ -201,6 +202,7 @@ struct Goal {
   };
   std::optional<Shape> shape;
   int above = -1, below = -1, clear_of = -1;  // indices of bodies; −1: none
+  std::map<int, int> through;                 // so many pieces of the robot are in the hole of this body
 };
 struct Via {
   Goal goal;          // without lost_below_m and shape

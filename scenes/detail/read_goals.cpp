@@ -53,6 +53,9 @@ Goal read_any_goal(const Node& table, const Scene& scene, const std::string& nam
                                    {"moves_with", &goal.moves_with}})
     if (const Node* body = table.find(key))
       *index = other_body(*body, scene, fmt::format("{}.{}", name, key));
+  if (table.find("through"))
+    for (const Node& ring : list(table, "through"))
+      ++goal.through[other_body(ring, scene, name + ".through")];
   for (int i = 0; i < 3; ++i)
     if (goal.center_of_mass_m[i] < bounds.lower[i] || goal.center_of_mass_m[i] > bounds.upper[i])
       complain(child(table, "center_of_mass_m"),

@@ -563,6 +563,16 @@ constexpr Key all_keys[] = {
     {"goal.above", Type::text, {}, 0, may_lack, "a body: the whole robot ends higher than all of it", "", ""},
     {"goal.below", Type::text, {}, 0, may_lack, "a body: the whole robot ends lower than all of it", "", ""},
     {"goal.clear_of", Type::text, {}, 0, may_lack, "a body that the robot does not touch at the end", "", ""},
+    {"goal.through",
+     Type::names,
+     {},
+     0,
+     may_lack,
+     "rings; so many pieces of the robot are in the hole of each, in the end, as it is named times: a cord "
+     "that "
+     "goes through and back has two there",
+     "",
+     ""},
     {"goal.shape",
      Type::table,
      {},
@@ -623,6 +633,7 @@ constexpr Key all_keys[] = {
     {"via[].above", Type::text, {}, 0, may_lack, "as goal.above, when it is reached", "", ""},
     {"via[].below", Type::text, {}, 0, may_lack, "as goal.below", "", ""},
     {"via[].clear_of", Type::text, {}, 0, may_lack, "as goal.clear_of", "", ""},
+    {"via[].through", Type::names, {}, 0, may_lack, "as goal.through", "", ""},
 
     {"planner",
      Type::table,

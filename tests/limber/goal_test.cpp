@@ -9,6 +9,7 @@
 #include "limber/detail/world/fem_system.h"
 #include "plan/control_rollout.h"
 #include "plan/search.h"
+#include "scenes/shapes.h"
 #include "tests/fem/worlds.h"
 
 namespace limber::detail {
@@ -79,6 +80,49 @@ TEST(Goal, PredicatesAreAboutAllOfABody) {
   EXPECT_TRUE(is_clear.goal_holds(at_height(0.6)));
   EXPECT_FALSE(is_clear.goal_holds(at_height(0.45)));
   EXPECT_NE(is_above.hash(), is_below.hash()) << "another goal is another search";
+}
+
+// A ring of radius 0.5 m in the plane x = 0, and a cord of 4 m beside it, in it, or bent so that it goes
+// there and back, through the hole or round it.
+TEST(Goal, PiecesInTheHoleOfARingAreCounted) {
+  scenes::TubeModel circle{{}, 0.1, 0, 0.05};
+  for (int i = 0; i <= 8; ++i) {
+    const double angle = std::numbers::pi / 4 * (i % 8);
+    circle.path_m.emplace_back(0, 0.5 * std::cos(angle), 0.5 * std::sin(angle));
+  }
+  fem::WorldSpec spec =
+      alone({"robot", grid({-2, 1.5, -0.05}, {4, 0.1, 0.1}, 40, 1, 1), {}, {}, fem::BodyKind::deformable});
+  spec.bodies.push_back(
+      {"ring", scenes::make_tube_cage(circle, {1, 1, 16}), {}, {}, fem::BodyKind::immovable});
+  const fem::World world = fem::build_world(spec);
+  const fem::Hole hole = fem::hole_of(world, fem::rest_state(world), 1);
+  EXPECT_NEAR(std::abs(hole.normal.x()), 1, 1e-6);
+  EXPECT_GT(hole.radius_m, 0.4);
+  EXPECT_LT(hole.radius_m, 0.46);
+  const Points rest = world.bodies[0].cage.positions;
+  const auto at = [&](double first_y, double second_y, bool bent) {
+    Points p = rest;
+    for (Eigen::Index n = 0; n < p.rows(); ++n) {
+      const double along = rest(n, 0);
+      if (bent) p(n, 0) = 1 - std::abs(along);
+      p(n, 1) += (bent && along > 0 ? second_y : first_y) - 1.55;
+    }
+    return with_robot_at(world, p);
+  };
+  const std::tuple<State, int, const char*> cases[] = {
+      {at(0.8, 0, false), 0, "beside it"},
+      {at(0, 0, false), 1, "through it"},
+      {at(-0.2, 0.2, true), 2, "through it and back"},
+      {at(-0.2, 0.8, true), 1, "through it and back round it"},
+      {at(0.8, 1.1, true), 0, "there and back beside it"}};
+  for (const auto& [state, pieces, what] : cases) {
+    EXPECT_EQ(fem::pieces_through(world, state, 1), pieces) << what;
+    for (const int asked : {1, 2}) {
+      GoalRules rules;
+      rules.through = {{1, asked}};
+      EXPECT_EQ(FemSystem(world, rules).goal_holds(state), pieces == asked) << what;
+    }
+  }
 }
 
 // A search whose robot would lean on a plate does not, where the plate may bear little: no node of its tree

@@ -682,6 +682,8 @@ std::string another_value(const Key& key) {
       {"goal.above", "\"gate\""},
       {"goal.below", "\"gate\""},
       {"goal.clear_of", "\"gate\""},
+      {"goal.through", "[\"gate\", \"gate\"]"},
+      {"via[].through", "[\"gate\"]"},
       {"goal.box_m", "[[8.5, 1, 1], [9.5, 2, 2]]"},
       {"camera.keyframes[].at", "0.5"},
       {"camera.keyframes[].eye_m", "[0, -8, 1]"},
@@ -985,6 +987,9 @@ std::string all_of(const Scene& s) {
   const PlannerSpec& p = s.planner;
   t += fmt::format("{} {} {} {} {}\n", s.robot, v(s.goal.center_of_mass_m), s.goal.radius_m,
                    s.goal.moves_with, s.goal.lost_below_m.value_or(-1));
+  for (const auto& [ring, pieces] : s.goal.through) t += fmt::format("{} {}\n", ring, pieces);
+  for (const Via& via : s.via)
+    for (const auto& [ring, pieces] : via.goal.through) t += fmt::format("{} {}\n", ring, pieces);
   t += fmt::format("{} {} {} {}\n", s.goal.above, s.goal.below, s.goal.clear_of,
                    s.goal.box_m ? s.goal.box_m->lower.x() : 0);
   for (const Via& via : s.via)

@@ -244,8 +244,8 @@ class Check {
     for (std::size_t v = 0; v < scene_.via.size(); ++v)
       look(fmt::format("via {}: ", v + 1), scene_.via[v].goal);
     const scenes::Goal& goal = scene_.goal;
-    const bool there = look("", goal),
-               more = goal.shape || goal.above >= 0 || goal.below >= 0 || goal.clear_of >= 0;
+    const bool there = look("", goal), more = goal.shape || goal.above >= 0 || goal.below >= 0 ||
+                                              goal.clear_of >= 0 || !goal.through.empty();
     if (there && !more && scene_.via.empty()) already_there();
   }
 

@@ -223,6 +223,7 @@ GoalRules goal_rules_of(const scenes::Scene& scene) {
       rules.turn_tolerance_deg = goal.shape->turn_tolerance_deg,
       rules.shape_tolerance_m = goal.shape->tolerance_m;
     rules.above = goal.above, rules.below = goal.below, rules.clear_of = goal.clear_of;
+    rules.through = goal.through;
     return rules;
   };
   GoalRules rules = rules_of(scene.goal);

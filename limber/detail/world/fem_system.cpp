@@ -251,6 +251,7 @@ FemSystem::FemSystem(const fem::World& world, const GoalRules& goal, std::option
   for (const int body : {goal.body, goal.above, goal.below, goal.clear_of}) hasher.value(body);
   for (const auto& rule : {goal.lost_below_m, goal.turn_tolerance_deg, goal.shape_tolerance_m})
     hasher.value(int(rule.has_value())).value(rule.value_or(0));
+  for (const auto& [ring, pieces] : goal.through) hasher.text("through").value(ring).value(pieces);
   if (!goal.patches_m.empty()) find_patches(), hasher.text("patches").value(int(goal.lead));
   if (goal.carry) hasher.text("carry");
   for (const Box& patch : goal.patches_m) hasher.matrix(patch.lower).matrix(patch.upper);
@@ -398,6 +399,8 @@ bool FemSystem::goal_holds(const State& state) const {
   };
   if (goal_.above >= 0 && height(world_.robot, false) <= height(goal_.above, true)) return false;
   if (goal_.below >= 0 && height(world_.robot, true) >= height(goal_.below, false)) return false;
+  for (const auto& [ring, pieces] : goal_.through)
+    if (fem::pieces_through(world_, state, ring) != pieces) return false;
   if (goal_.clear_of < 0) return true;
   for (const fem::ContactForce& c : fem::contact_forces(world_, state))
     if ((c.body == goal_.clear_of && c.other == world_.robot) ||

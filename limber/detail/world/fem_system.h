@@ -1,6 +1,7 @@
 // What the planner may ask of the soft bodies: the adapter from fem::World to plan::System.
 #pragma once
 
+#include <map>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -22,6 +23,7 @@ struct GoalRules {
   std::optional<double> shape_tolerance_m;   // no node is farther from its place in that shape
   int above = -1, below = -1;                // the whole robot is higher, lower than all of this body
   int clear_of = -1;                         // no contact with this body pushes the robot
+  std::map<int, int> through = {};           // so many pieces of the robot are in the hole of this body
   // Where control points are, in world coordinates at the start; empty: at any node. With `lead` the free
   // nodes in the first are where the robot is taken to be, not its centre of mass. Those of all goals are the
   // last's.

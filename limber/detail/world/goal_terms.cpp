@@ -73,6 +73,11 @@ std::vector<GoalTerm> terms_of(const scenes::Scene& scene, const scenes::Goal& g
     terms.push_back(
         {"no contact with " + name(goal.clear_of), contacts == 0, fmt::format("{} contacts", contacts)});
   }
+  for (const auto& [ring, asked] : goal.through) {
+    const int pieces = fem::pieces_through(world, state, ring);
+    terms.push_back({fmt::format("{} of the robot's pieces in the hole of {}", asked, name(ring)),
+                     pieces == asked, fmt::format("{}", pieces)});
+  }
   if (goal.shape && goal.shape->turn_tolerance_deg) {
     const double most = *goal.shape->turn_tolerance_deg, turn = fem::turn_from_goal_shape_deg(world, state);
     terms.push_back({fmt::format("turned within {:g} degrees of the shape asked for", most), turn <= most,
