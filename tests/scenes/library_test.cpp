@@ -226,7 +226,7 @@ TEST(Library, UnknownSceneNamesTheNearest) {
     EXPECT_THAT(
         error.what(),
         HasSubstr("did you mean \"barriers1\"? known scenes: barriers1, barriers2, "
-                  "body_parts, bunny_gate, colon, crowd, falling_objects, heart_and_lung, moving_door, "
+                  "body_parts, bunny_gate, colon, crowd, falling_objects, heart_and_lung, knot, mattress, moving_door, "
                   "squeeze, there_and_back, torso, windows"));
   }
 }
