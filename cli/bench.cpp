@@ -9,8 +9,8 @@ namespace limber::cli {
 
 Outcome bench(const detail::BenchOptions& options) {
   detail::Benchmark benchmark = detail::bench(options);
-  Json& report = benchmark.report;
-  std::string text = text_of_benchmark(report);
+  std::string text = text_of_benchmark(benchmark.report);
+  Json report = json_of_fields(benchmark.report);
   if (benchmark.records) {
     report["runs"] = benchmark.records->string();
     report["page"] = benchmark.page->string();

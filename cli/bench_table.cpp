@@ -30,57 +30,43 @@ std::string table(const std::vector<std::vector<std::string>>& rows, std::size_t
   return text;
 }
 
-std::string text_of_quartiles(const Json& q, const char* format) {
-  if (q.is_null()) return "-";
-  const auto one = [&](int i) {
-    const double value = q.at(std::size_t(i)).get<double>();
-    return fmt::format(fmt::runtime(format), value);
-  };
-  return fmt::format("{} {} {}", one(0), one(1), one(2));
+std::string text_of_quartiles(const std::optional<detail::Quartiles>& q, int digits) {
+  if (!q) return "-";
+  return fmt::format("{:.{}f} {:.{}f} {:.{}f}", (*q)[0], digits, (*q)[1], digits, (*q)[2], digits);
 }
 
 }  // namespace
 
-std::string text_of_benchmark(const Json& report) {
+std::string text_of_benchmark(const detail::BenchReport& report) {
   std::vector<std::vector<std::string>> runs{{"scene", "preset", "solved", "iterations", "CPU s", "wall s",
                                               "motion s", "penetration %", "overlap %", "in itself %",
                                               "gap %", "stretch", "inverted", "force N"}},
       volumes{{"scene", "preset", "body", "change at most %"}};
-  for (const double limit : detail::volume_limits_percent)
-    volumes[0].push_back(fmt::format("≤ {:g} %", limit));
+  for (const int limit : detail::volume_limits_percent) volumes[0].push_back(fmt::format("≤ {} %", limit));
   std::string notes;
-  for (const Json& g : report.at("groups")) {
-    const std::string scene = g.at("scene"), preset = g.at("preset");
-    runs.push_back({scene, preset, fmt::format("{}/{}", g.at("solved").get<int>(), g.at("runs").get<int>()),
-                    text_of_quartiles(g.at("iterations"), "{:.0f}"),
-                    text_of_quartiles(g.at("cpu_s"), "{:.2f}"), text_of_quartiles(g.at("wall_s"), "{:.2f}"),
-                    text_of_quartiles(g.at("motion_s"), "{:.1f}"),
-                    fmt::format("{:.2f}", g.at("largest_penetration_percent").get<double>()),
-                    fmt::format("{:.2f}", g.at("largest_overlap_percent").get<double>()),
-                    fmt::format("{:.2f}", g.at("largest_self_overlap_percent").get<double>()),
-                    g.at("median_gap_percent").is_null()
-                        ? std::string("-")
-                        : fmt::format("{:.2f} {:.2f}", g.at("median_gap_percent").get<double>(),
-                                      g.at("largest_gap_percent").get<double>()),
-                    fmt::format("{:.2f} {:.2f}", g.at("least_stretch").get<double>(),
-                                g.at("largest_stretch").get<double>()),
-                    fmt::format("{}", g.at("inverted_tets").get<std::int64_t>()),
-                    fmt::format("{:.1f}", g.at("largest_force_n").get<double>())});
-    for (const auto& [name, body] : g.at("volume").items()) {
-      volumes.push_back(
-          {scene, preset, name, fmt::format("{:.2f}", body.at("largest_percent").get<double>())});
-      for (const double limit : detail::volume_limits_percent)
-        volumes.back().push_back(fmt::format(
-            "{:.2f}",
-            100 * body.at(detail::within_key(limit)).get<double>() / body.at("frames").get<double>()));
+  for (const detail::BenchGroup& g : report.groups) {
+    runs.push_back(
+        {g.scene, g.preset, fmt::format("{}/{}", g.solved, g.runs), text_of_quartiles(g.iterations, 0),
+         text_of_quartiles(g.cpu_s, 2), text_of_quartiles(g.wall_s, 2), text_of_quartiles(g.motion_s, 1),
+         fmt::format("{:.2f}", g.largest_penetration_percent),
+         fmt::format("{:.2f}", g.largest_overlap_percent),
+         fmt::format("{:.2f}", g.largest_self_overlap_percent),
+         g.median_gap_percent ? fmt::format("{:.2f} {:.2f}", *g.median_gap_percent, g.largest_gap_percent)
+                              : "-",
+         fmt::format("{:.2f} {:.2f}", g.least_stretch, g.largest_stretch), fmt::format("{}", g.inverted_tets),
+         fmt::format("{:.1f}", g.largest_force_n)});
+    for (const auto& [name, body] : g.volume) {
+      volumes.push_back({g.scene, g.preset, name, fmt::format("{:.2f}", body.largest_percent)});
+      for (const std::int64_t within : body.within)
+        volumes.back().push_back(fmt::format("{:.2f}", 100 * double(within) / double(body.frames)));
     }
-    if (!g.at("unsolved_seeds").empty())
-      notes += fmt::format("{}, {}: not solved with seeds {}\n", scene, preset,
-                           fmt::join(g.at("unsolved_seeds").get<std::vector<std::uint64_t>>(), ", "));
-    if (g.at("programs").size() > 1)
+    if (!g.unsolved_seeds.empty())
+      notes += fmt::format("{}, {}: not solved with seeds {}\n", g.scene, g.preset,
+                           fmt::join(g.unsolved_seeds, ", "));
+    if (g.programs.size() > 1)
       notes +=
           fmt::format("{}, {}: the runs are of {} different builds of limber; their times do not compare\n",
-                      scene, preset, g.at("programs").size());
+                      g.scene, g.preset, g.programs.size());
   }
   std::string text = table(runs, 2);
   text +=

@@ -3,10 +3,10 @@
 
 #include <string>
 
-#include "core/json.h"
+#include "limber/detail/bench/bench.h"
 
 namespace limber::cli {
 
-std::string text_of_benchmark(const Json& report);
+std::string text_of_benchmark(const detail::BenchReport&);
 
 }  // namespace limber::cli

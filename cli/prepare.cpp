@@ -60,12 +60,12 @@ Outcome prepare(const detail::PrepareOptions& options, const std::string& format
   else if (!format.empty())
     throw InputError("--format is of a model on stdin; name the model - or leave it out");
   detail::PreparedModel prepared = detail::prepare(options, on_stdin ? on_stdin->file() : options.model);
-  std::string text = text_of_report(prepared.report);
+  std::string text = text_of_report(prepared.report.json);
   if (!prepared.also_written.empty()) {
-    prepared.report["also_written"] = prepared.also_written;
+    prepared.report.json["also_written"] = prepared.also_written;
     text += fmt::format("  also         {}\n", fmt::join(prepared.also_written, ", "));
   }
-  return {exit_done, prepared.report, text};
+  return {exit_done, prepared.report.json, text};
 }
 
 Outcome prepare_many(const detail::BatchOptions& options) {

@@ -50,7 +50,7 @@ int exit_code_of(const detail::RenderedFilm& film) {
 
 Outcome render(const detail::RenderOptions& options) {
   const detail::RenderedFilm film = detail::render(options);
-  return {exit_code_of(film), json_of(film), text_of(film)};
+  return {exit_code_of(film), json_of_fields(told_of(film)), text_of(film)};
 }
 
 Outcome run(const detail::PlanOptions& plan_options, const detail::RenderOptions& render_options) {
@@ -59,7 +59,7 @@ Outcome run(const detail::PlanOptions& plan_options, const detail::RenderOptions
   if (kept.up_to_date) both.text.clear();
   if (film.failed > 0) both.exit_code = exit_code_of(film);
   both.text += text_of(film);
-  both.json = {{"plan", both.json}, {"render", json_of(film)}};
+  both.json = {{"plan", both.json}, {"render", json_of_fields(told_of(film))}};
   return both;
 }
 

@@ -92,8 +92,7 @@ Body body_of(const detail::BodySource& source, const detail::PrepareSettings& se
   impl->certificate = certificate_of(whole.certificate);
   impl->binding = binding_of(whole.binding);
   impl->report = detail::report_of(whole, source, settings);
-  for (const Json& warning : impl->report.at("warnings"))
-    log::warn("{}: {}", source.model, warning.get<std::string>());
+  for (const std::string& warning : detail::warnings_of(whole)) log::warn("{}: {}", source.model, warning);
   impl->bound = whole.binding;
   impl->rest = whole.made.cage.mesh;
   impl->made = {std::move(whole), source, settings};
@@ -223,8 +222,7 @@ void Body::save(const std::filesystem::path& folder) const {
     return;
   }
   detail::clear_body(folder);
-  for (const auto& [name, any] : impl_->report.at("files").items())
-    write_file(folder / name, read_file(impl_->folder / name));
+  for (const auto& [name, hash] : impl_->files) write_file(folder / name, read_file(impl_->folder / name));
   write_file(folder / "report.json", read_file(impl_->folder / "report.json"));
 }
 
@@ -243,18 +241,15 @@ Body detail::body_of(const detail::PreparedBody& prepared, const std::filesystem
   for (const ConvexShell& shell : read_obj_shells(folder / "shells.obj"))
     impl->hulls.push_back(mesh_of(shell));
   impl->cage = cage_of(prepared.cage, prepared.shell_from_tet);
-  const Json &report = prepared.report, &certificate = report.at("certificate");
-  impl->cage.volume_ratio = report.at("cage").at("volume_ratio").get<double>();
-  impl->certificate = {certificate.at("holds").get<bool>(),
-                       certificate.at("vertices_outside").get<std::int64_t>(),
-                       certificate.at("triangles_crossing").get<std::int64_t>(),
-                       certificate.at("nonmanifold_edges").get<int>(),
-                       certificate.at("nonmanifold_vertices").get<int>(),
-                       0,
-                       report.at("cage").at("min_dihedral_deg").get<double>(),
-                       report.at("cage").at("max_dihedral_deg").get<double>()};
+  const detail::BodyReport& report = prepared.report;
+  const detail::BodyReport::Cage& told = report.cage.value();
+  const detail::BodyReport::Certificate& c = report.certificate.value();
+  impl->cage.volume_ratio = told.volume_ratio;
+  impl->certificate = {
+      c.holds, c.vertices_outside,    c.triangles_crossing, c.nonmanifold_edges, c.nonmanifold_vertices,
+      0,       told.min_dihedral_deg, told.max_dihedral_deg};
   impl->binding = binding_of(prepared.binding);
-  impl->report = report;
+  impl->report = report.json, impl->files = report.files;
   impl->folder = folder;
   impl->bound = prepared.binding;
   impl->rest = prepared.cage;

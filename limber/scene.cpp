@@ -205,9 +205,9 @@ States Problem::start(int copies) const {
 namespace {
 
 // Rollouts in the order of their numbers, to whichever thread asks.
-class InOrder final : public plan::RolloutSource {
+class RolloutsInOrder final : public plan::RolloutSource {
  public:
-  InOrder(std::vector<plan::Rollout>& rollouts, std::atomic<std::size_t>& next, int at_once)
+  RolloutsInOrder(std::vector<plan::Rollout>& rollouts, std::atomic<std::size_t>& next, int at_once)
       : rollouts_(rollouts), next_(next), at_once_(at_once) {}
   int at_once() const override { return at_once_; }
   plan::Rollout* next() override {
@@ -249,7 +249,7 @@ States Problem::rollout(const States& states, const std::vector<Push>& pushes, c
         if (!impl_->idle.empty()) propagator = std::move(impl_->idle.back()), impl_->idle.pop_back();
       }
       if (!propagator) propagator = impl_->system.make_propagator();
-      InOrder supply(rollouts, next, at_once);
+      RolloutsInOrder supply(rollouts, next, at_once);
       propagator->run(supply, INT_MAX);
       const std::lock_guard lock(impl_->mutex);
       impl_->idle.push_back(std::move(propagator));

@@ -336,7 +336,7 @@ TEST_F(Painted_slow, VerifyNamesWhatIsNotTheModels) {
   const auto write_body = [&](const PreparedBody& body, const std::function<void(Json&)>& change_report) {
     remove_appearance(at);
     write_appearance(at, body.appearance, body.surface);
-    Json made = good.report;
+    Json made = good.report.json;
     made.erase("appearance");
     if (!body.appearance.empty()) made["appearance"] = facts_of_appearance(body.appearance);
     made["files"] = Json::object();

@@ -95,14 +95,14 @@ struct Mutant {
     write_contact_shape(at / "contact.npz", body.contact, body.surface, body.cage);
     const Json facts = facts_of_body(body.surface, shells[b], body.cage, body.binding, body.contact,
                                      meshing::certify(body.surface, body.cage));
-    for (const auto& [table, figures] : facts.items()) body.report[table].update(figures);
+    for (const auto& [table, figures] : facts.items()) body.report.json[table].update(figures);
     write_report(b);
   }
   void write_report(std::size_t b) {
     const fs::path at = body_folder(folder, planned.scene.bodies[b]);
-    for (const auto& [name, hash] : bodies[b].report.at("files").items())
-      bodies[b].report["files"][name] = hex(hash_of(std::string_view(read_file(at / name))));
-    write_json(at / "report.json", bodies[b].report);
+    for (const auto& [name, hash] : bodies[b].report.json.at("files").items())
+      bodies[b].report.json["files"][name] = hex(hash_of(std::string_view(read_file(at / name))));
+    write_json(at / "report.json", bodies[b].report.json);
   }
   // plan.npz with the world's hash, its summary, manifest.json and the pictures.
   void write_plan() {
@@ -599,7 +599,7 @@ List of_reports(const Json& report) {
                        : value.is_number()         ? Json(value.get<double>() * 1.01 + 1e-6)
                                                    : Json(value.get<std::string>() + "0");
     list.push_back({"report.json" + pointer, name, [=](Mutant& m) {
-                      m.bodies[ball].report.at(Json::json_pointer(pointer)) = other;
+                      m.bodies[ball].report.json.at(Json::json_pointer(pointer)) = other;
                       m.write_report(ball);
                     }});
   };
@@ -759,12 +759,12 @@ List of_what_nobody_reads() {
   for (const char* key : {"/proof", "/shells/proof", "/contact/proof"})
     list.push_back({std::string("report.json with ") + key, "ball: report.json tells of these files",
                     [key = Json::json_pointer(key)](Mutant& m) {
-                      m.bodies[ball].report[key] = "0123456789abcdef";
+                      m.bodies[ball].report.json[key] = "0123456789abcdef";
                       m.write_report(ball);
                     }});
   list.push_back({"a file more in report.json", "ball: report.json tells of these files", [](Mutant& m) {
                     write_file(m.folder / "bodies" / "ball" / "proof", "proved");
-                    m.bodies[ball].report["files"]["proof"] = "";
+                    m.bodies[ball].report.json["files"]["proof"] = "";
                     m.write_report(ball);
                   }});
   return list;
@@ -852,10 +852,10 @@ List of_other_bodies() {
   };
   const auto tell_honestly = [](Mutant& m) {
     const meshing::ShellCheck c = meshing::check_shells(m.shells[block], m.bodies[block].surface);
-    m.bodies[block].report["shells"].update({{"mean_overshoot", c.mean_overshoot},
-                                             {"max_overshoot", c.max_overshoot},
-                                             {"vertices_uncovered", c.vertices_uncovered},
-                                             {"triangles_uncovered", c.triangles_uncovered}});
+    m.bodies[block].report.json["shells"].update({{"mean_overshoot", c.mean_overshoot},
+                                                  {"max_overshoot", c.max_overshoot},
+                                                  {"vertices_uncovered", c.vertices_uncovered},
+                                                  {"triangles_uncovered", c.triangles_uncovered}});
   };
   const auto scale = [](Mutant& m, double by) {
     for (ConvexShell& shell : m.shells[block]) {
@@ -865,7 +865,7 @@ List of_other_bodies() {
   };
   add(block, "shells too large, said to be inflated", "block: shells stand off", false, [=](Mutant& m) {
     scale(m, 1.3), label(m);
-    m.bodies[block].report["shells"]["inflation"] = 1e-9;
+    m.bodies[block].report.json["shells"]["inflation"] = 1e-9;
   });
   add(block, "small shells, and what they do not cover is told", shells_again, false,
       [=](Mutant& m) { scale(m, 0.1), label(m), tell_honestly(m); });
@@ -877,12 +877,12 @@ List of_other_bodies() {
       [](Mutant& m) {
         std::vector<int>& shells = m.bodies[block].shell_from_tet;
         std::fill(shells.begin(), shells.end(), 0);
-        m.bodies[block].report["cage"]["mode"] = "cells";
+        m.bodies[block].report.json["cage"]["mode"] = "cells";
       });
   add(block, "tets of the other shell, said to be of mode paper", "block: each tet of the cage", false,
       [](Mutant& m) {
         for (int& shell : m.bodies[block].shell_from_tet) shell = 1 - shell;
-        m.bodies[block].report["cage"]["mode"] = "paper";
+        m.bodies[block].report.json["cage"]["mode"] = "paper";
       });
   return list;
 }
@@ -1137,10 +1137,10 @@ TEST(BodyMutations_slow, OfACageThatNeedNotEnclose) {
     write_contact_shape(at / "contact.npz", other.contact, other.surface, other.cage);
     const Json facts = facts_of_body(other.surface, shells, other.cage, other.binding, other.contact,
                                      meshing::certify(other.surface, other.cage));
-    for (const auto& [table, figures] : facts.items()) other.report[table].update(figures);
-    for (const auto& [name, hash] : other.report.at("files").items())
-      other.report["files"][name] = hex(hash_of(std::string_view(read_file(at / name))));
-    write_json(at / "report.json", other.report);
+    for (const auto& [table, figures] : facts.items()) other.report.json[table].update(figures);
+    for (const auto& [name, hash] : other.report.json.at("files").items())
+      other.report.json["files"][name] = hex(hash_of(std::string_view(read_file(at / name))));
+    write_json(at / "report.json", other.report.json);
     const Result named = limber_program({"verify", body});
     EXPECT_EQ(named.code, exit_defect);
     EXPECT_NE(named.out.find("BROKEN  body: cage made again"), std::string::npos) << named.out;
@@ -1268,7 +1268,7 @@ TEST_F(FileMutations_slow, OfWhatAScenesFilesSay) {
   EXPECT_EQ(good_one.code, exit_done) << good_one.out << good_one.err;
   expect_named({{"a source that nobody has", "ball: surface is the scene's model",
                  [](Mutant& m) {
-                   m.bodies[ball].report["input"]["model"]["model"]["source"] = "0123456789abcdef";
+                   m.bodies[ball].report.json["input"]["model"]["model"]["source"] = "0123456789abcdef";
                    m.write_report(ball);
                    m.write_plan();
                  }},

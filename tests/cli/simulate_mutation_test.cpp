@@ -338,7 +338,7 @@ void follow_otherwise(Mutant& m, const std::function<void(Control&)>& change) {
                            if (++control == 3) change(next);
                            return next;
                          });
-  m.planned.summary["follows"] = followed.facts(p, m.folder);
+  m.planned.summary["follows"] = json_of_fields(followed.facts(p, m.folder));
   m.write();
 }
 

@@ -100,7 +100,7 @@ struct Good {
     write_msh(folder / "cage.msh", b.cage, b.shell_from_tet);
     ffd::write_binding(folder / "binding.npz", b.binding, b.surface, b.cage);
     write_contact_shape(folder / "contact.npz", b.contact, b.surface, b.cage);
-    write_report(folder, b.report);
+    write_report(folder, b.report.json);
     return folder;
   }
 
@@ -148,11 +148,11 @@ void change_body(Json& given, Script& script) {
   if (file == 0) edit(body.surface, script);
   if (file == 1) edit(body.cage, body.shell_from_tet, script);
   if (file == 2) one.shells = edited(one.shells, script);
-  if (file == 3) edit(body.report, script);
+  if (file == 3) edit(body.report.json, script);
   const fs::path folder = good().write_body(one);
   if (file == 4) change_npz(folder / "binding.npz", script);
   if (file == 5) change_npz(folder / "contact.npz", script);
-  if (file >= 4) good().write_report(folder, body.report);
+  if (file >= 4) good().write_report(folder, body.report.json);
   given["cage_hashes"][one.name] = hex(hash_of(body.cage));
 }
 

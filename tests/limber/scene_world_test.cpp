@@ -34,7 +34,7 @@ TEST(SceneWorld, EveryScenePreparesBuildsAndSteps) {
     bool by_budget = false;
     for (std::size_t b = 0; b < bodies.size(); ++b) {
       SCOPED_TRACE(scene.bodies[b].name);
-      EXPECT_TRUE(bodies[b].report.at("certificate").at("holds").get<bool>());
+      EXPECT_TRUE(bodies[b].report.certificate->holds);
       tets += int(bodies[b].cage.tets.rows());
       by_budget |= scene.bodies[b].cage.tets > 0;
     }

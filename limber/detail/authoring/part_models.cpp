@@ -86,7 +86,8 @@ std::map<std::int64_t, std::string> names_in(const fs::path& file) {
         file.string(), what));
   };
   if (!document.is_object()) throw wrong("is no object");
-  const Json& labels = document.contains("labels") ? document.at("labels") : document;
+  const auto under = document.find("labels");
+  const Json& labels = under == document.end() ? document : *under;
   if (!labels.is_object()) throw wrong("\"labels\" is no object");
   std::map<std::int64_t, std::string> names;
   for (const auto& [key, value] : labels.items()) {

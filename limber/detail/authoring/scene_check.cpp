@@ -273,8 +273,7 @@ class Check {
     throw_if_stopped();
     const Diagnosis diagnosis = diagnose(start.world, system, tried);
     found_.start->rigid_passage = diagnosis.json;
-    const double radius = diagnosis.json.at("robot_inner_radius_m"),
-                 passage = diagnosis.json.at("widest_rigid_passage_m");
+    const double radius = diagnosis.robot_radius_m, passage = diagnosis.widest_passage_m;
     if (passage < 0)
       found_.warnings.push_back(
           "rigid bodies and walls, where they stand at the start, leave no way to the goal even for a point; "

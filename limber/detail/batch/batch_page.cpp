@@ -21,28 +21,26 @@ std::string file_of_page(std::size_t page) {
 }
 
 // What can be said of a row in two lines.
-std::string figures_of(const Json& row) {
-  std::vector<std::string> words{fmt::format("{} triangles", row.at("triangles").get<int>())};
-  if (row.contains("shells"))
-    words.push_back(fmt::format("{} shell{}, overshoot {:.1f} %", row.at("shells").get<int>(),
-                                row.at("shells") == 1 ? "" : "s",
-                                100 * row.at("max_overshoot").get<double>()));
-  if (row.contains("tets")) {
-    const double ratio = row.at("volume_ratio").get<double>();
-    words.push_back(fmt::format("{} tets{}", row.at("tets").get<int>(),
+std::string figures_of(const BatchRow& row) {
+  std::vector<std::string> words{fmt::format("{} triangles", row.triangles.value())};
+  if (row.shells)
+    words.push_back(fmt::format("{} shell{}, overshoot {:.1f} %", *row.shells, *row.shells == 1 ? "" : "s",
+                                100 * row.max_overshoot.value()));
+  if (row.tets) {
+    const double ratio = row.volume_ratio.value();
+    words.push_back(fmt::format("{} tets{}", *row.tets,
                                 ratio > 0 ? fmt::format(", {:.2f} times the volume", ratio) : ""));
-    words.push_back(row.at("certificate_holds").get<bool>()
+    words.push_back(row.certificate_holds.value()
                         ? "<span class=\"kept\">certificate holds</span>"
                         : fmt::format("<span class=\"broken\">certificate: {} vertices outside, {} triangles "
                                       "cross</span>",
-                                      row.at("vertices_outside").get<int>(),
-                                      row.at("triangles_crossing").get<int>()));
+                                      row.vertices_outside.value(), row.triangles_crossing.value()));
   }
   return fmt::format("{}", fmt::join(words, "<br>"));
 }
 
 void add_card(Page& page, const fs::path& batch, const BatchModel& model) {
-  const Json row = row_of(batch, model);
+  const BatchRow row = row_of(batch, model);
   page.add(
       "<div class=\"card model\"><img loading=\"lazy\" decoding=\"async\" width=\"320\" height=\"240\" "
       "alt=\"\" src=\"data:image/png;base64,{}\">\n<h3>{}</h3>\n<p>{}</p></div>\n",

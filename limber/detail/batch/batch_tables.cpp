@@ -17,30 +17,6 @@ namespace limber::detail {
 
 namespace {
 
-// Of a report: where a figure stands, and its column.
-struct Figure {
-  const char *table, *key, *column;
-};
-constexpr Figure figures[] = {{"surface", "vertices", "vertices"},
-                              {"surface", "triangles", "triangles"},
-                              {"surface", "volume_m3", "volume_m3"},
-                              {"shells", "count", "shells"},
-                              {"shells", "mean_overshoot", "mean_overshoot"},
-                              {"shells", "max_overshoot", "max_overshoot"},
-                              {"shells", "triangles_uncovered", "triangles_uncovered"},
-                              {"cage", "tets", "tets"},
-                              {"cage", "nodes", "nodes"},
-                              {"cage", "volume_m3", "cage_volume_m3"},
-                              {"cage", "volume_ratio", "volume_ratio"},
-                              {"certificate", "holds", "certificate_holds"},
-                              {"certificate", "vertices_outside", "vertices_outside"},
-                              {"certificate", "triangles_crossing", "triangles_crossing"},
-                              {"certificate", "nonmanifold_edges", "nonmanifold_edges"},
-                              {"certificate", "nonmanifold_vertices", "nonmanifold_vertices"},
-                              {"certificate", "min_dihedral_deg", "min_dihedral_deg"},
-                              {"certificate", "max_dihedral_deg", "max_dihedral_deg"}};
-constexpr const char *columns_before[] = {"name", "source", "key", "status", "reason", "message"},
-                     *columns_after[] = {"warnings", "folder", "picture"};
 constexpr const char* stages[] = {"import", "decompose", "cage", "certify", "bind", "contact", "write"};
 
 // RFC 4180.
@@ -59,20 +35,21 @@ std::string csv_line(const std::vector<std::string>& columns, const Json& row) {
   return fmt::format("{}\r\n", fmt::join(fields, ","));
 }
 
-std::vector<std::string> manifest_columns() {
-  std::vector<std::string> columns(std::begin(columns_before), std::end(columns_before));
-  for (const Figure& figure : figures) columns.push_back(figure.column);
-  columns.insert(columns.end(), std::begin(columns_after), std::end(columns_after));
-  return columns;
-}
+struct Columns {
+  std::vector<std::string> keys;
+  void operator()(const char* key, const std::string&) { keys.push_back(key); }
+  template <class T>
+  void if_there(const char* key, const std::optional<T>&) {
+    keys.push_back(key);
+  }
+};
 
-bool is_record(const Json& line) {
-  if (!line.is_object()) return false;
-  for (const char* key : {"name", "key", "reason", "message"})
-    if (!line.contains(key) || !line.at(key).is_string()) return false;
-  for (const char* key : {"clock_s", "cpu_s", "time_limit_s", "memory_mb"})
-    if (!line.contains(key) || !line.at(key).is_number()) return false;
-  return line.contains("also_written") && line.at("also_written").is_array();
+// Those of a row that has them all.
+std::vector<std::string> manifest_columns() {
+  Columns columns;
+  BatchRow row;
+  row.fields(columns);
+  return columns.keys;
 }
 
 }  // namespace
@@ -97,8 +74,8 @@ Journal::Journal(const fs::path& batch, const std::string& part) : file_(batch /
   for (const fs::path& file : files) {
     std::istringstream lines(read_file(file));
     for (std::string text; std::getline(lines, text); ++count) {
-      const Json line = Json::parse(text, nullptr, false);
-      if (is_record(line)) lines_[line.at("name").get<std::string>()] = line;
+      if (auto line = fields_or_nothing<Attempt>(Json::parse(text, nullptr, false)))
+        attempts_[line->name] = *std::move(line);
     }
   }
   if (!part.empty()) {
@@ -108,17 +85,17 @@ Journal::Journal(const fs::path& batch, const std::string& part) : file_(batch /
     if (fs::exists(file_) && !read_file(file_).ends_with('\n')) append("\n");
     return;
   }
-  if (count > lines_.size() || fs::is_directory(parts, none)) {
+  if (count > attempts_.size() || fs::is_directory(parts, none)) {
     FileWriter writer(file_);
-    for (const auto& [name, line] : lines_) writer.append(text_of(line) + "\n");
+    for (const auto& [name, line] : attempts_) writer.append(text_of(json_of_fields(line)) + "\n");
     writer.commit();
   }
   fs::remove_all(parts, none);
 }
 
-const Json* Journal::find(const std::string& name) const {
-  const auto found = lines_.find(name);
-  return found == lines_.end() ? nullptr : &found->second;
+const Attempt* Journal::find(const std::string& name) const {
+  const auto found = attempts_.find(name);
+  return found == attempts_.end() ? nullptr : &found->second;
 }
 
 void Journal::append(const std::string& text) {
@@ -130,29 +107,41 @@ void Journal::append(const std::string& text) {
     throw DiskError(fmt::format("{}: writing it failed: {}", file_.string(), std::strerror(error)));
 }
 
-void Journal::add(const Json& line) {
-  append(text_of(line) + "\n");
-  lines_[line.at("name").get<std::string>()] = line;
+void Journal::add(const Attempt& attempt) {
+  append(text_of(json_of_fields(attempt)) + "\n");
+  attempts_[attempt.name] = attempt;
 }
 
-Json row_of(const fs::path& batch, const BatchModel& model) {
+BatchRow row_of(const fs::path& batch, const BatchModel& model) {
   const bool done = model.reason.empty();
-  Json row{{"name", model.model.name},
-           {"source", model.model.file.string()},
-           {"key", model.key},
-           {"status", done ? "done" : "failed"}};
+  BatchRow row;
+  row.name = model.model.name, row.source = model.model.file.string();
+  row.key = model.key, row.status = done ? "done" : "failed";
   if (!done) {
-    row.update({{"reason", model.reason},
-                {"message", model.message},
-                {"folder", quarantine_file_of("", model).string()}});
+    row.reason = model.reason, row.message = model.message;
+    row.folder = quarantine_file_of("", model).string();
     return row;
   }
-  const Json report = read_json(folder_of(batch, model) / "report.json");
-  for (const auto& [table, key, column] : figures)
-    if (report.contains(table)) row[column] = report.at(table).at(key);
-  row["warnings"] = report.at("warnings").size();
-  row["folder"] = folder_of("", model).string();
-  row["picture"] = (folder_of("", model) / picture_file).string();
+  const BodyReport report = read_body_report(folder_of(batch, model));
+  row.vertices = report.surface.vertices, row.triangles = report.surface.triangles;
+  row.volume_m3 = report.surface.volume_m3;
+  if (const auto& shells = report.shells) {
+    row.shells = shells->count, row.triangles_uncovered = shells->triangles_uncovered;
+    row.mean_overshoot = shells->mean_overshoot, row.max_overshoot = shells->max_overshoot;
+  }
+  if (const auto& cage = report.cage) {
+    row.tets = cage->tets, row.nodes = cage->nodes;
+    row.cage_volume_m3 = cage->volume_m3, row.volume_ratio = cage->volume_ratio;
+  }
+  if (const auto& c = report.certificate) {
+    row.certificate_holds = c->holds;
+    row.vertices_outside = c->vertices_outside, row.triangles_crossing = c->triangles_crossing;
+    row.nonmanifold_edges = c->nonmanifold_edges, row.nonmanifold_vertices = c->nonmanifold_vertices;
+    row.min_dihedral_deg = c->min_dihedral_deg, row.max_dihedral_deg = c->max_dihedral_deg;
+  }
+  row.warnings = int(report.warnings.size());
+  row.folder = folder_of("", model).string();
+  row.picture = (folder_of("", model) / picture_file).string();
   return row;
 }
 
@@ -164,12 +153,12 @@ void write_tables(const fs::path& batch, const std::vector<BatchModel>& models, 
   table.append(fmt::format("{}\r\n", fmt::join(columns, ",")));
   seconds.append(fmt::format("{}\r\n", fmt::join(costs, ",")));
   for (const BatchModel& model : models) {
-    const Json row = row_of(batch, model);
+    const Json row = json_of_fields(row_of(batch, model));
     lines.append(text_of(row) + "\n"), table.append(csv_line(columns, row));
-    const Json* said = journal.find(model.model.name);
-    if (!said || said->at("key") != model.key) continue;
-    Json cost = *said;
-    if (said->contains("cpu_seconds")) cost.update(said->at("cpu_seconds"));
+    const Attempt* said = journal.find(model.model.name);
+    if (!said || said->key != model.key) continue;
+    Json cost = json_of_fields(*said);
+    for (const auto& [stage, cpu_s] : said->cpu_seconds.value_or(InOrder<double>{})) cost[stage] = cpu_s;
     seconds.append(csv_line(costs, cost));
   }
   lines.commit(), table.commit(), seconds.commit();

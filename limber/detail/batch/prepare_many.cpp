@@ -36,7 +36,8 @@ enum class Outcome { made, in_store, up_to_date, failed, failed_before };
 
 struct Work {
   BatchModel result;
-  std::string body_key, file_hash;
+  std::string body_key;
+  Json identity;  // of its source
   std::uintmax_t bytes = 0;
   Outcome found = Outcome::made;
   bool pending = false;
@@ -46,6 +47,19 @@ struct Work {
 double weight_of(const Work& work) { return 1 + double(work.bytes) / 2e6; }
 
 std::string text_of_number(double value) { return fmt::format("{}", value); }
+
+// By limber prepare --json: what went wrong, or the body's report.
+struct SaidByPrepare {
+  std::optional<std::string> error;
+  std::optional<BodyInput> input;
+  std::optional<InOrder<double>> cpu_seconds;
+  std::vector<std::string> also_written;
+  template <class Fields>
+  void fields(Fields& f) {
+    f("error", error), f("input", input), f("cpu_seconds", cpu_seconds);
+    f.if_there("also_written", also_written);
+  }
+};
 
 class Batch {
  public:
@@ -110,7 +124,7 @@ class Batch {
       const BodySource source = source_of(one, file);
       input = input_of(source.identity, settings_of(each));
       work.body_key = BodyStore::key_of(source, input);
-      work.file_hash = source.identity.at("file_hash");
+      work.identity = source.identity;
       std::error_code none;
       work.bytes = fs::file_size(file, none);
     } catch (const InputError& error) {
@@ -125,10 +139,10 @@ class Batch {
                    {"preview", each.preview}});
     work.result.key = content_hash(text_of(more));
 
-    const Json* said = journal_->find(work.result.model.name);
-    if (said && said->at("key") != work.result.key) said = nullptr;
+    const Attempt* said = journal_->find(work.result.model.name);
+    if (said && said->key != work.result.key) said = nullptr;
     if (said && would_fail_again(*said)) {
-      fail(work, said->at("reason"), said->at("message"), Outcome::failed_before);
+      fail(work, said->reason, said->message, Outcome::failed_before);
       return;
     }
     const fs::path folder = folder_of(out_, work.result);
@@ -145,24 +159,22 @@ class Batch {
   bool asks_for_more() const { return !options_.each.exports.empty() || options_.each.preview; }
 
   // A limit that was raised may let it through; what else it ended by, it would end by again.
-  bool would_fail_again(const Json& said) const {
-    const std::string reason = said.at("reason");
-    if (reason.empty() || options_.retry_failed) return false;
-    if (reason == "time") return limits_.cpu_s <= said.at("time_limit_s").get<double>();
-    if (reason == "memory") return limits_.memory_mb <= said.at("memory_mb").get<double>();
+  bool would_fail_again(const Attempt& said) const {
+    if (said.reason.empty() || options_.retry_failed) return false;
+    if (said.reason == "time") return limits_.cpu_s <= said.time_limit_s;
+    if (said.reason == "memory") return limits_.memory_mb <= said.memory_mb;
     return true;
   }
 
-  bool is_there(const fs::path& folder, const Json& input, const fs::path& file, const Json* said) const {
-    if (!body_is_up_to_date(folder, input) || !has_picture(folder)) return false;
+  bool is_there(const fs::path& folder, const Json& input, const fs::path& file, const Attempt* said) const {
+    const std::optional<BodyReport> report = up_to_date_report(folder, input);
+    if (!report || !has_picture(folder)) return false;
     // Another file may hold the same bytes, and lend its body another name.
-    if (read_json(folder / "report.json").at("model") != Json::parse(text_of(Json(file.string()))))
-      return false;
+    if (Json(report->model) != Json::parse(text_of(Json(file.string())))) return false;
     if (!asks_for_more()) return true;
     if (!said) return false;
-    for (const Json& also : said->at("also_written"))
-      if (!also.is_string() || !fs::exists(folder / also.get<std::string>())) return false;
-    return true;
+    return std::all_of(said->also_written.begin(), said->also_written.end(),
+                       [&](const std::string& also) { return fs::exists(folder / also); });
   }
 
   bool fetch(Work& work, const Json& input, const fs::path& folder) {
@@ -276,31 +288,32 @@ class Batch {
   }
 
   void settle(Work& work, const EndedProcess& end) {
-    const Json said = Json::parse(end.out, nullptr, false);
-    Json line{{"name", work.result.model.name},
-              {"key", work.result.key},
-              {"reason", ""},
-              {"message", ""},
-              {"clock_s", std::round(1e3 * end.clock_s) / 1e3},
-              {"cpu_s", std::round(1e3 * end.cpu_s) / 1e3},
-              {"peak_mb", std::round(end.peak_mb)},
-              {"time_limit_s", limits_.cpu_s},
-              {"memory_mb", limits_.memory_mb},
-              {"also_written", Json::array()}};
+    const SaidByPrepare said =
+        fields_or_nothing<SaidByPrepare>(Json::parse(end.out, nullptr, false)).value_or(SaidByPrepare{});
+    Attempt attempt{.name = work.result.model.name,
+                    .key = work.result.key,
+                    .reason = "",
+                    .message = "",
+                    .clock_s = std::round(1e3 * end.clock_s) / 1e3,
+                    .cpu_s = std::round(1e3 * end.cpu_s) / 1e3,
+                    .peak_mb = std::round(end.peak_mb),
+                    .time_limit_s = limits_.cpu_s,
+                    .memory_mb = limits_.memory_mb,
+                    .also_written = {},
+                    .cpu_seconds = {}};
     work.pending = false;
     judge(work, end, said);
     if (work.found == Outcome::failed) {
-      line["reason"] = work.result.reason, line["message"] = work.result.message;
+      attempt.reason = work.result.reason, attempt.message = work.result.message;
       log::warn("{}: {}: {}", work.result.model.name, work.result.reason, work.result.message);
     } else {
-      line["cpu_seconds"] = said.at("cpu_seconds"), line["also_written"] = said.at("also_written");
+      attempt.cpu_seconds = said.cpu_seconds, attempt.also_written = said.also_written;
     }
-    journal_->add(line);
+    journal_->add(attempt);
   }
 
-  void judge(Work& work, const EndedProcess& end, const Json& said) {
-    const bool told = said.is_object() && said.contains("error") && said.at("error").is_string();
-    const std::string error = told ? said.at("error").get<std::string>() : last_line(end.err);
+  void judge(Work& work, const EndedProcess& end, const SaidByPrepare& said) {
+    const std::string error = said.error.value_or(last_line(end.err));
     const auto failed = [&](const char* reason, const std::string& message) {
       fail(work, reason, message, Outcome::failed);
     };
@@ -319,10 +332,10 @@ class Batch {
                                 error.empty() ? "" : "; its last words: ", error));
     if (end.code == exit_disk) throw DiskError(error);
     if (end.code == exit_bad_input) return failed("refused", error);
-    if (end.code != exit_done || !said.is_object() || !said.contains("cpu_seconds"))
+    if (end.code != exit_done || !said.cpu_seconds)
       return failed("defect",
                     error.empty() ? fmt::format("limber ended with exit code {}", end.code) : error);
-    if (said.at("input").at("model").at("file_hash") != work.file_hash)
+    if (said.input ? said.input->model != work.identity : true)
       return failed("refused", "the file changed while it was read; start once more");
   }
 

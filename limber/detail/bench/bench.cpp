@@ -11,7 +11,6 @@
 #include "core/content_hash.h"
 #include "core/error.h"
 #include "core/hash.h"
-#include "core/json_shape.h"
 #include "core/json_text.h"
 #include "core/log.h"
 #include "core/progress.h"
@@ -55,23 +54,18 @@ struct BenchRuns::Setup {
 
 namespace {
 
-// All that a run's result depends on.
-Json identity_of_run(const BenchRuns::Setup& setup, const plan::Settings& settings,
-                     const std::string& program) {
+RunIdentity identity_of_run(const BenchRuns::Setup& setup, const plan::Settings& settings,
+                            const std::string& program) {
   Hasher scene;
   scene.text(setup.scene.text);
   for (const std::string& set : setup.scene.sets) scene.text(set);
   Json shaping = plan::json_of(settings);
   shaping.erase("in_flight");
-  return {{"version", version},
-          {"program", program},
-          {"scene_hash", hex(scene.digest())},
-          {"system_hash", hex(setup.system.hash())},
-          {"settings", shaping}};
+  return {version, program, hex(scene.digest()), hex(setup.system.hash()), shaping};
 }
 
-Json volume_figures(const fem::World& world, const MotionFigures& figures) {
-  Json bodies = Json::object();
+InOrder<VolumeFigures> volume_figures(const fem::World& world, const MotionFigures& figures) {
+  InOrder<VolumeFigures> bodies;
   for (std::size_t b = 0; b < world.bodies.size(); ++b) {
     if (!world.bodies[b].moving) continue;
     const auto within = [&](double percent) {
@@ -79,12 +73,10 @@ Json volume_figures(const fem::World& world, const MotionFigures& figures) {
         return std::abs(frame.bodies[b].volume_change) <= 0.01 * percent;
       });
     };
-    bodies[world.bodies[b].name] = {{"largest_percent", 100 * figures.largest_volume_change[b]},
-                                    {"frames", figures.frames.size()},
-                                    {"within_3_percent", within(3)},
-                                    {"within_5_percent", within(5)},
-                                    {"within_6_percent", within(6)},
-                                    {"within_10_percent", within(10)}};
+    VolumeFigures& of = bodies.emplace_back(world.bodies[b].name, VolumeFigures{}).second;
+    of.largest_percent = 100 * figures.largest_volume_change[b];
+    of.frames = std::ssize(figures.frames);
+    for (std::size_t i = 0; i < of.within.size(); ++i) of.within[i] = within(volume_limits_percent[i]);
   }
   return bodies;
 }
@@ -101,7 +93,7 @@ Json robot_path(const BenchRuns::Setup& setup, const plan::Trajectory& path) {
   return places;
 }
 
-Json record_of(const BenchRuns::Setup& setup, const plan::Plan& plan, const Json& identity) {
+Json record_of(const BenchRuns::Setup& setup, const plan::Plan& plan, const RunIdentity& identity) {
   const MotionFigures figures =
       measure_motion(setup.world, setup.bodies, plan.trajectory, setup.system.surfaces());
   std::string explanation = plan::explain(plan);
@@ -116,31 +108,35 @@ Json record_of(const BenchRuns::Setup& setup, const plan::Plan& plan, const Json
   record.update(
       {{"motion_s", double(plan.trajectory.end.step) * setup.world.dt_s},
        {"robot_path_m", robot_path(setup, plan.trajectory)},
-       {"volume", volume_figures(setup.world, figures)},
+       {"volume", json_of_fields(volume_figures(setup.world, figures))},
        {"deepest_penetration_percent", 100 * figures.deepest_penetration_m / figures.robot_size_m}});
   record.update(json_of(figures));
   record.update({{"tree_hash", hex(plan::hash_of(plan.tree))},
                  {"trajectory_hash", hex(plan::hash_of(plan.trajectory))},
                  {"threads", thread_count()},
                  {"host", host},
-                 {"identity", identity}});
+                 {"identity", json_of_fields(identity)}});
   return record;
 }
 
+struct IdentityTold {
+  RunIdentity identity;
+  template <class Fields>
+  void fields(Fields& f) {
+    f("identity", identity);
+  }
+};
+
 // Whether the run is done; throws InputError when the file is of another run.
-bool is_done(const fs::path& file, const Json& identity) {
+bool is_done(const fs::path& file, const RunIdentity& identity) {
   if (!fs::exists(file)) return false;
-  const Json record = read_json(file);
-  if (!record.is_object() || !record.contains("identity"))
-    throw InputError(fmt::format("{}: is not a record of limber bench; remove it", file.string()));
-  const Json& there = record.at("identity");
-  require_like(there, {{"program", ""}, {"scene_hash", ""}}, Keys::those_there, file.string() + ": identity",
-               "remove the file");
-  if (there == identity) return true;
+  const RunIdentity there =
+      read_fields<IdentityTold>(read_json(file), file.string(), "it is no record of limber bench: remove it")
+          .identity;
+  if (json_of_fields(there) == json_of_fields(identity)) return true;
   std::string what = "other settings";
-  if (there.value("program", "") != identity.at("program")) what = "another build of limber";
-  if (there.value("scene_hash", "") != identity.at("scene_hash"))
-    what = "another text of the scene, or other --set";
+  if (there.program != identity.program) what = "another build of limber";
+  if (there.scene_hash != identity.scene_hash) what = "another text of the scene, or other --set";
   throw InputError(fmt::format("{}: was made with {}; take another folder with -o, or remove {}",
                                file.string(), what, file.parent_path().string()));
 }
@@ -157,7 +153,7 @@ std::string date_now() {
 // One file a scene: OMPL's log knows one experiment each. Several get the scene's name before the extension.
 std::vector<fs::path> write_ompl_logs(const RunRecords& records, const fs::path& path) {
   std::map<std::string, RunRecords> scenes;
-  for (const Json& record : records) scenes[record.at("scene").get<std::string>()].push_back(record);
+  for (const RunRecord& record : records) scenes[record.scene].push_back(record);
   std::vector<fs::path> written;
   for (const auto& [name, of_scene] : scenes) {
     fs::path file = path;
@@ -210,7 +206,8 @@ std::string BenchRuns::run(std::size_t run) {
   const std::string& preset = setup.scene.planner.preset;
   const std::string label = fmt::format("{}.{}.{}", setup.scene.name, preset, settings.seed);
   const fs::path file = options_.out / "runs" / (label + ".json");
-  const Json identity = identity_of_run(setup, settings, program_hash());  // two builds make no one benchmark
+  const RunIdentity identity =
+      identity_of_run(setup, settings, program_hash());  // two builds make no one benchmark
   if (is_done(file, identity)) return label;
   try {
     const plan::Plan plan = plan::plan(setup.system, settings);
@@ -258,7 +255,7 @@ Benchmark bench(const BenchOptions& options) {
   if (!options.out.empty() && options.chunk.empty()) {
     make_folder(options.out);
     std::string lines;
-    for (const Json& record : records) lines += text_of(record) + "\n";
+    for (const RunRecord& record : records) lines += text_of(record.json) + "\n";
     benchmark.records = options.out / "runs.jsonl", benchmark.page = options.out / "bench.html";
     write_file(*benchmark.records, lines);
     write_file(*benchmark.page, page_of_bench(records, benchmark.report));

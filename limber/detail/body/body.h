@@ -9,9 +9,9 @@
 #include "core/appearance.h"
 #include "core/contact_shape.h"
 #include "core/file.h"
-#include "core/json.h"
 #include "core/mesh.h"
 #include "ffd/binding.h"
+#include "limber/detail/body/body_report.h"
 #include "meshing/cage.h"
 #include "meshing/certificate.h"
 #include "meshing/contact_shape.h"
@@ -20,20 +20,6 @@
 #include "scenes/scene.h"
 
 namespace limber::detail {
-
-struct PrepareSettings {
-  int shells = 32;
-  double concavity = 0;
-  double threshold = 0;  // as PrepareOptions::threshold
-  double inflate = 0;
-  bool exact = false;
-  int tets = 1000;
-  std::string mode = "lattice";  // "lattice", "fast", "paper", "conform"
-  int corners = 64;              // of a shell, at most
-  // "shells": no cage, binding and contact; "cage": no shells (but in mode paper, which makes it of them),
-  // binding and contact. Such a folder is no body to plan with.
-  std::string only;
-};
 
 // Where a body comes from. `identity` holds all that load() and made_cage() depend on: when it and the
 // settings are those of the folder's report, the folder is up to date.
@@ -51,9 +37,6 @@ struct BodySource {
 
 // What a body's report says it was made from: when that is the same, so is the body.
 Json input_of(const Json& identity, const PrepareSettings&);
-
-// The settings of such an input. Throws Json::exception where it is none.
-PrepareSettings settings_of_input(const Json& input);
 
 // A model as its body has it: its long edges cut so that it bends as the cage does, but for a body in cells;
 // images that cannot be shown left out, with a warning.
@@ -89,26 +72,25 @@ struct WholeBody {
 // InputError where the model is none.
 WholeBody make_body(const BodySource&, const PrepareSettings&,
                     const std::function<void(const char*)>& end_stage);
+std::vector<std::string> warnings_of(const WholeBody&);
 // What a report tells of it, but for costs and files.
 Json report_of(const WholeBody&, const BodySource&, const PrepareSettings&);
 
 // Its files, and last its report, which is returned: of no costs. Nobody else writes into the folder, which
 // is there.
-Json write_body(const WholeBody&, const BodySource&, const PrepareSettings&, const fs::path& folder);
+BodyReport write_body(const WholeBody&, const BodySource&, const PrepareSettings&, const fs::path& folder);
 
-// Whether the folder holds what `input` makes, whole.
-bool body_is_up_to_date(const fs::path& folder, const Json& input);
+// The report of a folder that holds what `input` makes, whole; else nothing.
+std::optional<BodyReport> up_to_date_report(const fs::path& folder, const Json& input);
 // Removes all that limber writes of a body, first its report.
 void clear_body(const fs::path& folder);
-// A report that tells nothing of this run.
-void take_costs_out(Json& report);
 
 class BodyStore;
 // Writes the files and returns the report; leaves a folder that is up to date as it is. What is in the store
 // is taken from there, what is not is kept there; reports of such folders tell no costs, the one that is
 // returned does.
-Json prepare_body(const BodySource&, const PrepareSettings&, const fs::path& folder,
-                  const BodyStore* store = nullptr);
+BodyReport prepare_body(const BodySource&, const PrepareSettings&, const fs::path& folder,
+                        const BodyStore* store = nullptr);
 
 struct PreparedBody {
   SurfaceMesh surface;
@@ -120,7 +102,7 @@ struct PreparedBody {
   NodeGradients gradients;  // of the cage
   scenes::Deformation deformation = scenes::Deformation::linear;
   Points goal_shape_m;  // of a robot whose scene has a goal.shape.cage: that cage's nodes; else empty
-  Json report;
+  BodyReport report;
 };
 // What a report tells of the files beside it, worked out from these alone: tables within "surface", "shells",
 // "cage", "certificate", "binding" and "contact".

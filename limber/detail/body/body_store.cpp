@@ -47,42 +47,46 @@ bool BodyStore::has(const std::string& key) const { return fs::exists(entry(key)
 
 bool BodyStore::has_picture(const std::string& key) const { return detail::has_picture(entry(key)); }
 
-std::optional<Json> BodyStore::fetch(const std::string& key, const Json& input, const std::string& model,
-                                     const fs::path& folder) const {
+std::optional<BodyReport> BodyStore::fetch(const std::string& key, const Json& input,
+                                           const std::string& model, const fs::path& folder) const {
   const fs::path from = entry(key);
   if (!has(key)) return std::nullopt;
-  if (!body_is_up_to_date(from, input)) {
+  std::optional<BodyReport> report = up_to_date_report(from, input);
+  if (!report) {
     log::warn("{}: is damaged, and made anew", from.string());
     std::error_code ignored;
     fs::remove(from / "report.json", ignored);
     return std::nullopt;
   }
-  Json report = read_json(from / "report.json");
   clear_body(folder);
-  for (const auto& [name, hash] : report.at("files").items()) place_file(from / name, folder / name);
+  for (const auto& [name, hash] : report->files) place_file(from / name, folder / name);
   place_picture(from, folder);
-  report["model"] = model;
-  write_json(folder / "report.json", report);
+  report->model = model, report->json["model"] = model;
+  write_json(folder / "report.json", report->json);
   return report;
 }
 
 void BodyStore::keep(const std::string& key, const fs::path& folder) const {
+  keep(key, folder, read_body_report(folder));
+}
+
+void BodyStore::keep(const std::string& key, const fs::path& folder, const BodyReport& report) const {
   const fs::path to = entry(key);
-  Json report = read_json(folder / "report.json");
   const bool there = has(key);
   if (!there) {
     make_folder(to);
     remove_abandoned(to);
-    for (const auto& [name, hash] : report.at("files").items()) {
+    for (const auto& [name, hash] : report.files) {
       place_file(folder / name, to / name);
       ::chmod((to / name).c_str(), 0444);
     }
   }
   if (!has_picture(key)) place_picture(folder, to);
   if (there) return;
-  report["model"] = "";
-  take_costs_out(report);
-  write_json(to / "report.json", report);
+  Json kept = report.json;
+  kept["model"] = "";
+  take_costs_out(kept);
+  write_json(to / "report.json", kept);
 }
 
 }  // namespace limber::detail

@@ -24,10 +24,11 @@ class BodyStore {
   bool has_picture(const std::string& key) const;
   // Makes `folder` the body of that key, and returns its report; nothing where there is no such entry, or a
   // damaged one. `folder` is there, and nobody else writes into it.
-  std::optional<Json> fetch(const std::string& key, const Json& input, const std::string& model,
-                            const fs::path& folder) const;
+  std::optional<BodyReport> fetch(const std::string& key, const Json& input, const std::string& model,
+                                  const fs::path& folder) const;
   // Keeps the body in `folder`, and its picture where there is one.
   void keep(const std::string& key, const fs::path& folder) const;
+  void keep(const std::string& key, const fs::path& folder, const BodyReport&) const;  // its report, read
 
  private:
   fs::path entry(const std::string& key) const { return folder_ / key.substr(0, 2) / key; }

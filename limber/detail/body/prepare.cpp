@@ -64,7 +64,8 @@ BodySource source_of(const PrepareOptions& options, const fs::path& file) {
   source.model = options.model.string();
   const ModelContent content = content_of_model(file);
   source.content = content.content, source.ending = content.ending;
-  source.identity = {{"file_hash", content.file_hash}, {"scale", options.scale}, {"y_up", options.y_up}};
+  FileIdentity identity{content.file_hash, options.scale, options.y_up, {}};
+  source.identity = json_of_fields(identity);
   source.load = [file, scale = options.scale, y_up = options.y_up] {
     return meshing::import_model(file, {.scale = scale, .y_up = y_up});
   };
@@ -81,10 +82,8 @@ BodySource source_of(const PrepareOptions& options, const fs::path& file) {
                     file.string(), file.string()));
   if (options.y_up)
     throw InputError(fmt::format("{}: a label map says where up is; leave --y-up out", file.string()));
-  source.identity["label"] = {{"name", options.label},
-                              {"gap", options.label_gap},
-                              {"rounds", options.label_rounds},
-                              {"least_island", options.min_island}};
+  identity.label = {options.label, options.label_gap, options.label_rounds, options.min_island};
+  source.identity = json_of_fields(identity);
   source.load = [options, file] { return import_label(options, file); };
   return source;
 }
@@ -100,7 +99,7 @@ PreparedModel prepare(const PrepareOptions& options, const fs::path& file) {
   std::vector<std::string>& written = prepared.also_written;
   if (options.picture) {
     if (!has_picture(options.out)) write_picture(options.out);
-    if (store) store->keep(BodyStore::key_of(source, prepared.report.at("input")), options.out);
+    if (store) store->keep(BodyStore::key_of(source, prepared.report.input.all), options.out);
     written.push_back(picture_file);
   }
   if (!options.exports.empty() || options.preview) {

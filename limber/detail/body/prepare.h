@@ -27,6 +27,38 @@ struct PrepareOptions {
   double label_gap = 0.2;            // as imaging::SurfaceNetOptions
   int label_rounds = 10;
   double min_island = 8;
+
+  // What shapes a body and what is written beside it, by the names of the command's options.
+  template <class Fields>
+  void fields(Fields& f) {
+    f("shells", shells), f("concavity", concavity), f("inflate", inflate), f("threshold", threshold);
+    f("exact", exact), f("shell_corners", corners), f("tets", tets), f("mode", mode), f("scale", scale);
+    f("y_up", y_up), f("preview", preview), f("export", exports), f("density", density_kg_m3);
+    f("only", only), f("label", label), f("label_gap", label_gap), f("label_smoothing", label_rounds);
+    f("least_island", min_island);
+  }
+};
+
+// What a model's file and how it is read make of BodySource::identity.
+struct FileIdentity {
+  struct Label {
+    std::string name;
+    double gap = 0;
+    int rounds = 0;
+    double least_island = 0;
+    template <class Fields>
+    void fields(Fields& f) {
+      f("name", name), f("gap", gap), f("rounds", rounds), f("least_island", least_island);
+    }
+  };
+  std::string file_hash;
+  double scale = 1;
+  bool y_up = false;
+  std::optional<Label> label;  // of a label map
+  template <class Fields>
+  void fields(Fields& f) {
+    f("file_hash", file_hash), f("scale", scale), f("y_up", y_up), f.if_there("label", label);
+  }
 };
 
 // Throws InputError where two of them exclude each other.
@@ -38,7 +70,7 @@ PrepareSettings settings_of(const PrepareOptions&);
 BodySource source_of(const PrepareOptions&, const fs::path& file);
 
 struct PreparedModel {
-  Json report;                            // report.json, with what this run cost
+  BodyReport report;                      // with what this run cost
   std::vector<std::string> also_written;  // names of pictures and exports
 };
 // As source_of. Throws InputError, DiskError.

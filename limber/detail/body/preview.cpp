@@ -83,26 +83,22 @@ Points lines_between(const std::set<std::pair<int, int>>& edges, const Points& p
   return ends;
 }
 
-std::string file_name_of(const PreparedBody& body) {
-  return fs::path(body.report.at("model").get<std::string>()).filename().string();
-}
+std::string file_name_of(const PreparedBody& body) { return fs::path(body.report.model).filename().string(); }
 
 std::string tets_caption(const PreparedBody& body) {
-  const Json& cage = body.report.at("cage");
-  return fmt::format("mode {}: {} tets, {} nodes, dihedrals {:.1f} to {:.1f} degrees",
-                     cage.at("mode").get<std::string>(), cage.at("tets").get<int>(),
-                     cage.at("nodes").get<int>(), cage.at("min_dihedral_deg").get<double>(),
-                     cage.at("max_dihedral_deg").get<double>());
+  const BodyReport::Cage& cage = body.report.cage.value();
+  return fmt::format("mode {}: {} tets, {} nodes, dihedrals {:.1f} to {:.1f} degrees", cage.mode, cage.tets,
+                     cage.nodes, cage.min_dihedral_deg, cage.max_dihedral_deg);
 }
 
 std::string fit_caption(const PreparedBody& body) {
-  const Json &cage = body.report.at("cage"), &c = body.report.at("certificate");
-  const double ratio = cage.at("volume_ratio").get<double>();
+  const BodyReport::Cage& cage = body.report.cage.value();
+  const BodyReport::Certificate& c = body.report.certificate.value();
+  const double ratio = cage.volume_ratio;
   return fmt::format("{}glued {:.1f} %; certificate {}: {} vertices outside, {} triangles cross",
                      ratio > 0 ? fmt::format("volume {:.3f} times the model's, ", ratio) : "",
-                     100 * cage.at("glued_share").get<double>(),
-                     c.at("holds").get<bool>() ? "holds" : "does NOT hold",
-                     c.at("vertices_outside").get<int>(), c.at("triangles_crossing").get<int>());
+                     100 * cage.glued_share, c.holds ? "holds" : "does NOT hold", c.vertices_outside,
+                     c.triangles_crossing);
 }
 
 // Apart, away from `middle`.
@@ -124,14 +120,14 @@ render::Image8 draw_shells(const std::vector<ConvexShell>& shells, const Vec3& m
 }
 
 render::Image8 picture_of_shells(const PreparedBody& body, const std::vector<ConvexShell>& shells) {
-  const Json& figures = body.report.at("shells");
+  const BodyReport::Shells& figures = body.report.shells.value();
   return render::with_caption(
       draw_shells(shells, bounding_box(body.surface.positions).center(), large),
       {fmt::format("{}: {} convex shells, drawn apart", file_name_of(body), shells.size()),
        fmt::format(
            "overshoot mean {:.3f} %, largest {:.3f} % of the diagonal; {} of {} triangles not covered",
-           100 * figures.at("mean_overshoot").get<double>(), 100 * figures.at("max_overshoot").get<double>(),
-           figures.at("triangles_uncovered").get<int>(), body.surface.triangles.rows())});
+           100 * figures.mean_overshoot, 100 * figures.max_overshoot, figures.triangles_uncovered,
+           body.surface.triangles.rows())});
 }
 
 // The cage's edges over the surface; those of faces turned away are faint.
@@ -236,13 +232,12 @@ render::Image8 picture_of_dihedrals(const PreparedBody& body) {
   for (int b = 0; b < bars; ++b)
     look.bar_srgb.push_back(
         grades[std::size_t(grade_of(std::min(b * bar_deg, 180 - (b + 1) * bar_deg)))].color_srgb);
-  const Json& cage = body.report.at("cage");
+  const BodyReport::Cage& cage = body.report.cage.value();
   return render::with_caption(
       render::histogram(angles, look),
       {fmt::format("{}: dihedral angles of {} tets", file_name_of(body), body.cage.tets.rows()),
        fmt::format("smallest {:.1f}, largest {:.1f}; median of the tets' smallest {:.1f} degrees",
-                   cage.at("min_dihedral_deg").get<double>(), cage.at("max_dihedral_deg").get<double>(),
-                   cage.at("median_min_dihedral_deg").get<double>())});
+                   cage.min_dihedral_deg, cage.max_dihedral_deg, cage.median_min_dihedral_deg)});
 }
 
 }  // namespace

@@ -14,7 +14,7 @@ std::string hull_file(int hull) { return fmt::format("hulls/hull_{:03}.obj", hul
 
 // The model's file without its ending, in letters that every reader of XML names takes.
 std::string name_of(const PreparedBody& body) {
-  std::string name = fs::path(body.report.at("model").get<std::string>()).stem().string();
+  std::string name = fs::path(body.report.model).stem().string();
   for (char& c : name)
     if (!std::isalnum(static_cast<unsigned char>(c))) c = '_';
   return name.empty() ? "body" : name;

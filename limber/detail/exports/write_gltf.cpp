@@ -108,7 +108,7 @@ class Gltf {
     view_begin_ = bytes_.size();
     Json view{{"buffer", 0}, {"byteOffset", view_begin_}, {"byteLength", 0}};
     if (target != none) view["target"] = int(target);
-    add("bufferViews", view);
+    view_ = add("bufferViews", view);
   }
   // `components` numbers an element: 1, 2, 3, 4 or 16.
   template <class T>
@@ -116,7 +116,7 @@ class Gltf {
     constexpr int type_of_number = std::is_same_v<T, float>           ? 5126
                                    : std::is_same_v<T, std::uint32_t> ? 5125
                                                                       : 5123;  // of unsigned 16 bit
-    Json entry{{"bufferView", document.at("bufferViews").size() - 1},
+    Json entry{{"bufferView", view_},
                {"byteOffset", bytes_.size() - view_begin_},
                {"componentType", type_of_number},
                {"count", values.size() / std::size_t(components)},
@@ -149,9 +149,7 @@ class Gltf {
     document["bufferViews"].back()["byteLength"] = image.bytes.size();
     bytes_.resize((bytes_.size() + 3) / 4 * 4);
     const char* type = extension_of_image(image.bytes) == ".png" ? "image/png" : "image/jpeg";
-    const int source = add(
-        "images",
-        {{"name", image.name}, {"bufferView", document.at("bufferViews").size() - 1}, {"mimeType", type}});
+    const int source = add("images", {{"name", image.name}, {"bufferView", view_}, {"mimeType", type}});
     constexpr int linear = 9729, linear_mipmap_linear = 9987;
     if (!document.contains("samplers"))
       add("samplers", {{"magFilter", linear}, {"minFilter", linear_mipmap_linear}});
@@ -182,6 +180,7 @@ class Gltf {
   std::string
       bytes_;  // of whole float32 and of 16 bit in fours, so that every view begins at a multiple of 4
   std::size_t view_begin_ = 0;
+  int view_ = 0;
 };
 
 class GltfWriter {
@@ -218,7 +217,7 @@ class GltfWriter {
   std::string binary() {
     gltf_.document["scene"] = 0;
     gltf_.document["scenes"] = {{{"name", motion_.scene.name}, {"nodes", roots_}}};
-    if (!animation_.at("channels").empty()) gltf_.add("animations", animation_);
+    if (!animation_["channels"].empty()) gltf_.add("animations", animation_);
     return gltf_.binary();
   }
 

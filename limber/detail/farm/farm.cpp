@@ -21,10 +21,6 @@ std::string with(const fs::path& work, const char* what) {
   return fmt::format("limber farm {} {}", what, work.string());
 }
 
-std::vector<std::string> jobs_of(const FarmFolder& farm) {
-  return farm.jobs().at("jobs").get<std::vector<std::string>>();
-}
-
 // Whether somebody is at work for what is in the folder already, of which is said who.
 std::string who_is_at_work(const fs::path& work) {
   for (const auto& [unit, lease] : Leases::look_once(work / "farm" / "leases"))
@@ -110,7 +106,7 @@ FarmStatus farm_status(const fs::path& work_folder) {
   const auto held = Leases::look_once(farm.leases());
   const auto engine = held.find(engine_lease);
   status.local_engine_runs = engine != held.end() && !engine->second.lost;
-  const Json plan = farm.told_of(farm.plan_unit());
+  const UnitDone plan = farm.told_of(farm.plan_unit());
   bool all_done = true;
   for (const Stage stage : farm.stages()) {
     FarmStatus::OfStage& of = status.stages.emplace_back(FarmStatus::OfStage{.stage = stage});
@@ -125,38 +121,32 @@ FarmStatus farm_status(const fs::path& work_folder) {
         status.running.push_back(fmt::format("{}: {}", unit.name, owner->second.owner));
       } else if (farm.is_done(unit)) {
         ++of.done;
-        const Json seconds = farm.told_of(unit).value("seconds", Json());
-        if (seconds.is_number()) of.seconds += seconds.get<double>();
+        of.seconds += farm.told_of(unit).seconds.value_or(0);
       } else if (const auto failure = farm.failure_of(unit)) {
         ++of.failed, all_done = false;
-        if (status.failed.empty()) status.exit_code = failure->at("exit_code");
-        status.failed.push_back(fmt::format("{}: {}: {}", unit.name, failure->at("reason").get<std::string>(),
-                                            failure->at("message").get<std::string>()));
+        if (status.failed.empty()) status.exit_code = failure->exit_code;
+        status.failed.push_back(fmt::format("{}: {}: {}", unit.name, failure->reason, failure->message));
       } else {
         ++of.waiting, all_done = false;
       }
     }
   }
-  if (plan.contains("solved")) status.solved = plan.at("solved") == true;
-  if (plan.contains("explanation") && plan.at("explanation").is_string())
-    status.explanation = plan.at("explanation");
+  status.solved = plan.solved.value_or(status.solved);
+  status.explanation = plan.explanation.value_or("");
   for (const Unit& unit : farm.units(Stage::film))
-    if (farm.is_done(unit)) status.film = farm.work() / farm.told_of(unit).at("film").get<std::string>();
+    if (farm.is_done(unit)) status.film = farm.work() / farm.told_of(unit).film.value_or("");
   for (const Unit& unit : farm.units(Stage::report))
     if (farm.is_done(unit)) status.report = farm.work() / "report.html";
   for (const Unit& unit : farm.units(Stage::table))
     if (farm.is_done(unit)) status.report = farm.work() / "bench.html";
   for (const Unit& unit : farm.units(Stage::page))
     if (farm.is_done(unit)) {
-      const Json told = farm.told_of(unit);
-      const auto number = [&](const char* key) {
-        return told.contains(key) && told.at(key).is_number_integer() ? told.at(key).get<int>() : 0;
-      };
+      const UnitDone told = farm.told_of(unit);
       status.report = farm.work() / "index.html";
-      status.models = number("models"), status.failed_models = number("failed_models");
+      status.models = told.models.value_or(0), status.failed_models = told.failed_models.value_or(0);
     }
   if (slurm_is_there()) try {
-      status.tasks = slurm_tasks(jobs_of(farm));
+      status.tasks = slurm_tasks(farm.jobs().jobs);
     } catch (const InputError& error) {
       status.engine_fails = error.what();
     }
@@ -199,7 +189,7 @@ Submitted submit(FarmOptions options) {
       log::warn("{}; it is made anew", error.what());
     }
     const FarmFolder jobs_before = FarmFolder::imagined(spec);
-    result.jobs = jobs_of(jobs_before);
+    result.jobs = jobs_before.jobs().jobs;
     // Where Slurm cannot be asked nothing is sent beside what may be there.
     if (slurm_is_there()) result.was_at_work = !slurm_tasks(result.jobs).empty();
     const std::string who = who_is_at_work(work);
@@ -214,7 +204,7 @@ Submitted submit(FarmOptions options) {
   }
   const FarmFolder farm = FarmFolder::begin(spec);
   result.jobs.clear();
-  farm.write_jobs({{"jobs", Json::array()}, {"rounds", 0}});
+  farm.write_jobs({});
   result.status = farm_status(work);
   if (result.status.state == FarmStatus::done) {
     result.was_done = true;
@@ -222,7 +212,7 @@ Submitted submit(FarmOptions options) {
   }
   if (result.engine == "slurm") {
     send_to_slurm(farm, 0);
-    result.jobs = jobs_of(farm);
+    result.jobs = farm.jobs().jobs;
   } else if (result.engine == "openjd") {
     result.file = farm.folder() / "template.yaml";
     write_file(result.file, openjd_template(farm));

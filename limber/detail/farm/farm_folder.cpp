@@ -7,7 +7,6 @@
 
 #include "core/content_hash.h"
 #include "core/error.h"
-#include "core/json_shape.h"
 #include "core/json_text.h"
 #include "core/threads.h"
 #include "core/version.h"
@@ -23,16 +22,13 @@ namespace limber::detail {
 namespace {
 
 // Files in farm/ may be damaged: what is none of ours is not there.
-std::string text_in(const Json& json, const char* key) {
-  return json.is_object() && json.contains(key) && json.at(key).is_string() ? json.at(key).get<std::string>()
-                                                                            : "";
-}
-std::vector<std::string> frame_hashes_in(const Json& plan) {
-  std::vector<std::string> hashes;
-  if (plan.contains("frame_hashes") && plan.at("frame_hashes").is_array())
-    for (const Json& hash : plan.at("frame_hashes"))
-      hashes.push_back(hash.is_string() ? hash.get<std::string>() : "");
-  return hashes;
+const std::vector<std::string> no_texts;
+Json json_in(const fs::path& file) {
+  try {
+    return read_json(file);
+  } catch (const InputError&) {
+    return {};
+  }
 }
 
 }  // namespace
@@ -139,22 +135,17 @@ fs::path FarmFolder::search_file(const Unit& unit) const {
   return folder() / "searches" / (unit.name + ".npz");
 }
 
-Json FarmFolder::told_of(const Unit& unit) const {
-  if (forgets_) return Json::object();
-  try {
-    Json told = read_json(done_file(unit));
-    return told.is_object() ? told : Json::object();
-  } catch (const InputError&) {
-    return Json::object();
-  }
+UnitDone FarmFolder::told_of(const Unit& unit) const {
+  if (forgets_) return {};
+  return fields_or_nothing<UnitDone>(json_in(done_file(unit))).value_or(UnitDone{});
 }
 
 const FarmFolder::Frames& FarmFolder::frames() const {
   std::error_code none;
   const fs::file_time_type written = fs::last_write_time(done_file(plan_unit()), none);
   if (none || written != frames_.first) {
-    const Json plan = told_of(plan_unit());
-    frames_ = {written, {work_ / text_in(plan, "frames_folder"), frame_hashes_in(plan)}};
+    const UnitDone plan = told_of(plan_unit());
+    frames_ = {written, {work_ / plan.frames_folder.value_or(""), plan.frame_hashes.value_or(no_texts)}};
   }
   return frames_.second;
 }
@@ -177,11 +168,10 @@ bool FarmFolder::is_done(const Unit& unit) const {
   if (!fs::exists(done_file(unit))) return false;
   switch (unit.stage) {
     case Stage::runs: {
-      const Json records = told_of(unit).value("records", Json::array());
+      const std::vector<std::string> records = told_of(unit).records.value_or(no_texts);
       return records.size() == unit.runs.size() &&
-             std::all_of(records.begin(), records.end(), [&](const Json& record) {
-               return record.is_string() &&
-                      fs::exists(work_ / "runs" / (record.get<std::string>() + ".json"));
+             std::all_of(records.begin(), records.end(), [&](const std::string& record) {
+               return fs::exists(work_ / "runs" / (record + ".json"));
              });
     }
     case Stage::table:
@@ -193,7 +183,7 @@ bool FarmFolder::is_done(const Unit& unit) const {
     case Stage::plan:
       return fs::exists(work_ / "plan.npz");
     case Stage::film:
-      return fs::is_regular_file(work_ / text_in(told_of(unit), "film"));
+      return fs::is_regular_file(work_ / told_of(unit).film.value_or(""));
     case Stage::report:
       return fs::exists(work_ / "report.html");
     default:
@@ -201,33 +191,20 @@ bool FarmFolder::is_done(const Unit& unit) const {
   }
 }
 
-std::optional<Json> FarmFolder::failure_of(const Unit& unit) const {
+std::optional<UnitFailed> FarmFolder::failure_of(const Unit& unit) const {
   if (!fs::exists(failed_file(unit))) return std::nullopt;
-  Json said;
-  try {
-    said = read_json(failed_file(unit));
-  } catch (const InputError&) {
-  }
-  const auto word = [&](const char* key, const char* otherwise) {
-    const std::string text = text_in(said, key);
-    return text.empty() ? otherwise : text;
-  };
-  const bool has_code =
-      said.is_object() && said.contains("exit_code") && said.at("exit_code").is_number_integer();
-  return Json{{"reason", word("reason", "defect")},
-              {"message", word("message", "its file in farm/failed is damaged")},
-              {"exit_code", has_code ? said.at("exit_code").get<int>() : 1}};
+  const UnitFailed damaged{"defect", "its file in farm/failed is damaged", 1};
+  return fields_or_nothing<UnitFailed>(json_in(failed_file(unit))).value_or(damaged);
 }
 
-void FarmFolder::mark_done(const Unit& unit, const Json& told) const {
-  write_json(done_file(unit), told);
+void FarmFolder::mark_done(const Unit& unit, const UnitDone& told) const {
+  write_json(done_file(unit), json_of_fields(told));
   std::error_code none;
   fs::remove(failed_file(unit), none);
 }
 
-void FarmFolder::mark_failed(const Unit& unit, const std::string& reason, const std::string& message,
-                             int exit_code) const {
-  write_json(failed_file(unit), {{"reason", reason}, {"message", message}, {"exit_code", exit_code}});
+void FarmFolder::mark_failed(const Unit& unit, const UnitFailed& failed) const {
+  write_json(failed_file(unit), json_of_fields(failed));
 }
 
 void FarmFolder::forget(const Unit& unit) const {
@@ -238,36 +215,25 @@ void FarmFolder::forget(const Unit& unit) const {
 void FarmFolder::cancel() const { write_file(folder() / "cancelled", "limber farm submit goes on\n"); }
 bool FarmFolder::is_cancelled() const { return fs::exists(folder() / "cancelled"); }
 
-Json FarmFolder::jobs() const {
-  Json said;
-  try {
-    said = read_json(folder() / "jobs.json");
-  } catch (const InputError&) {
-  }
-  Json jobs{{"jobs", Json::array()}, {"rounds", 0}};
-  if (!said.is_object()) return jobs;
-  if (said.contains("rounds") && said.at("rounds").is_number_integer()) jobs["rounds"] = said.at("rounds");
+SentJobs FarmFolder::jobs() const {
+  SentJobs sent = fields_or_nothing<SentJobs>(json_in(folder() / "jobs.json")).value_or(SentJobs{});
   // They become words of commands.
-  const auto is_id = [](const Json& id) {
-    return id.is_string() && !id.get<std::string>().empty() &&
-           id.get<std::string>().find_first_not_of("0123456789") == std::string::npos;
-  };
-  if (said.contains("jobs") && said.at("jobs").is_array())
-    for (const Json& id : said.at("jobs"))
-      if (is_id(id)) jobs["jobs"].push_back(id);
-  return jobs;
+  std::erase_if(sent.jobs, [](const std::string& id) {
+    return id.empty() || id.find_first_not_of("0123456789") != std::string::npos;
+  });
+  return sent;
 }
 
-void FarmFolder::write_jobs(const Json& jobs) const { write_json(folder() / "jobs.json", jobs); }
+void FarmFolder::write_jobs(const SentJobs& sent) const {
+  write_json(folder() / "jobs.json", json_of_fields(sent));
+}
 
 std::optional<Best> best_search(const FarmFolder& farm) {
   std::optional<Best> best;
   for (const Unit& unit : farm.units(Stage::search)) {
-    const Json told = farm.told_of(unit);
-    if (!told.contains("solved") || told.at("solved") != true || !told.contains("iterations") ||
-        !told.at("iterations").is_number_integer())
-      continue;
-    const Best one{told.at("iterations").get<std::int64_t>(), unit.seed};
+    const UnitDone told = farm.told_of(unit);
+    if (!told.solved.value_or(false) || !told.iterations) continue;
+    const Best one{*told.iterations, unit.seed};
     if (!best || one.iterations < best->iterations) best = one;
   }
   return best;

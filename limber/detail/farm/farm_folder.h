@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "core/json.h"
+#include "core/json_fields.h"
 #include "limber/detail/batch/prepare_many.h"
 #include "limber/detail/bench/bench.h"
 #include "limber/detail/film/render.h"
@@ -73,9 +73,62 @@ FarmSpec spec_of(FarmOptions);
 // InputError.
 std::string hash_of_scenes(const FarmOptions&);
 
-Json json_of(const FarmSpec&);
+Json json_of(FarmSpec);
 // That of a work folder, which may have been moved. Throws InputError where there is none, or it is damaged.
 FarmSpec read_spec(const fs::path& work);
+
+// What is told of a unit that was done; each key by units of some stages.
+struct UnitDone {
+  std::optional<std::string> ended;  // of search: "goal", "iterations", "beaten"
+  std::optional<std::int64_t> iterations;
+  std::optional<bool> solved;
+  std::optional<std::string> explanation;  // of plan, as all to frame_hashes
+  std::optional<std::uint64_t> seed;
+  std::optional<std::string> tree_hash, trajectory_hash, plan_file, frames_folder;
+  std::optional<std::vector<std::string>> frame_hashes;
+  std::optional<int> leg;  // of search: where it got to
+  std::optional<double> distance_m;
+  std::optional<std::string> film, sheet;  // within the work folder
+  std::optional<int> frames, painted;
+  std::optional<bool> all_kept;                     // of report
+  std::optional<std::vector<std::string>> records;  // of runs
+  std::optional<int> runs, models, failed_models;   // of table, of models and page
+  std::optional<std::map<std::string, int>> reasons;
+  std::optional<double> seconds, cpu_s;
+  std::optional<std::string> worker;
+  template <class Fields>
+  void fields(Fields& f) {
+    f.if_there("ended", ended), f.if_there("iterations", iterations), f.if_there("solved", solved);
+    f.if_there("explanation", explanation), f.if_there("seed", seed), f.if_there("tree_hash", tree_hash);
+    f.if_there("trajectory_hash", trajectory_hash), f.if_there("plan_file", plan_file);
+    f.if_there("frames_folder", frames_folder), f.if_there("frame_hashes", frame_hashes);
+    f.if_there("leg", leg), f.if_there("distance_m", distance_m), f.if_there("film", film);
+    f.if_there("sheet", sheet), f.if_there("frames", frames), f.if_there("painted", painted);
+    f.if_there("all_kept", all_kept), f.if_there("records", records), f.if_there("runs", runs);
+    f.if_there("models", models), f.if_there("failed_models", failed_models);
+    f.if_there("reasons", reasons), f.if_there("seconds", seconds), f.if_there("cpu_s", cpu_s);
+    f.if_there("worker", worker);
+  }
+};
+
+struct UnitFailed {
+  std::string reason, message;
+  int exit_code = 1;
+  template <class Fields>
+  void fields(Fields& f) {
+    f("reason", reason), f("message", message), f("exit_code", exit_code);
+  }
+};
+
+// The jobs of the engine that were sent, and how often.
+struct SentJobs {
+  std::vector<std::string> jobs;
+  int rounds = 0;
+  template <class Fields>
+  void fields(Fields& f) {
+    f("jobs", jobs), f("rounds", rounds);
+  }
+};
 
 class FarmFolder {
  public:
@@ -98,11 +151,11 @@ class FarmFolder {
   // Frames are known once there is a plan: empty before.
   std::vector<Unit> units(Stage) const;
   bool is_done(const Unit&) const;
-  // What was told when it was done; null: nothing.
-  Json told_of(const Unit&) const;
-  std::optional<Json> failure_of(const Unit&) const;  // "reason", "message", "exit_code"
-  void mark_done(const Unit&, const Json& told) const;
-  void mark_failed(const Unit&, const std::string& reason, const std::string& message, int exit_code) const;
+  // What was told when it was done; nothing of a damaged file.
+  UnitDone told_of(const Unit&) const;
+  std::optional<UnitFailed> failure_of(const Unit&) const;
+  void mark_done(const Unit&, const UnitDone&) const;
+  void mark_failed(const Unit&, const UnitFailed&) const;
   void forget(const Unit&) const;
   Unit plan_unit() const {
     return {.stage = Stage::plan, .name = "plan", .body = {}, .frames = {}, .runs = {}, .models = {}};
@@ -111,9 +164,8 @@ class FarmFolder {
   void cancel() const;
   bool is_cancelled() const;
 
-  // The jobs of the engine that were sent, and how often: "jobs": [ids], "rounds".
-  Json jobs() const;
-  void write_jobs(const Json&) const;
+  SentJobs jobs() const;
+  void write_jobs(const SentJobs&) const;
 
  private:
   FarmFolder(fs::path work, FarmSpec spec);

@@ -8,7 +8,7 @@
 
 #include "core/content_hash.h"
 #include "core/error.h"
-#include "core/json_shape.h"
+#include "core/json_fields.h"
 #include "core/json_text.h"
 #include "core/threads.h"
 #include "core/version.h"
@@ -28,271 +28,140 @@ constexpr const char* remedy =
     "prepare "
     "MODEL…, with -o DIR";
 
-template <class T>
-Json or_null(const std::optional<T>& value) {
-  return value ? Json(*value) : Json();
-}
-
-// By the names of the command's options.
-Json json_of(const PrepareOptions& o) {
-  return {{"shells", o.shells},
-          {"concavity", o.concavity},
-          {"inflate", o.inflate},
-          {"threshold", o.threshold},
-          {"exact", o.exact},
-          {"shell_corners", o.corners},
-          {"tets", o.tets},
-          {"mode", o.mode},
-          {"scale", o.scale},
-          {"y_up", o.y_up},
-          {"preview", o.preview},
-          {"export", o.exports},
-          {"density", o.density_kg_m3},
-          {"only", o.only},
-          {"label", o.label},
-          {"label_gap", o.label_gap},
-          {"label_smoothing", o.label_rounds},
-          {"least_island", o.min_island}};
-}
-
-void read_prepare(const Json& json, PrepareOptions& o) {
-  json.at("shells").get_to(o.shells), json.at("concavity").get_to(o.concavity);
-  json.at("inflate").get_to(o.inflate), json.at("threshold").get_to(o.threshold);
-  json.at("exact").get_to(o.exact), json.at("shell_corners").get_to(o.corners);
-  json.at("tets").get_to(o.tets), json.at("mode").get_to(o.mode);
-  json.at("scale").get_to(o.scale), json.at("y_up").get_to(o.y_up);
-  json.at("preview").get_to(o.preview), json.at("export").get_to(o.exports);
-  json.at("density").get_to(o.density_kg_m3), json.at("only").get_to(o.only);
-  json.at("label").get_to(o.label), json.at("label_gap").get_to(o.label_gap);
-  json.at("label_smoothing").get_to(o.label_rounds), json.at("least_island").get_to(o.min_island);
-}
-
-Json result_of_batch(const FarmSpec& spec) {
-  const BatchOptions& batch = *spec.options.batch;
-  std::vector<std::string> files, names;
-  for (const ListedModel& model : batch.listed)
-    files.push_back(model.file.string()), names.push_back(model.name);
-  return {{"models", files},
-          {"names", names},
-          {"scene_hash", spec.scene_hash},
-          {"prepare", json_of(batch.each)},
-          {"time_limit", batch.time_limit_s},
-          {"memory_limit", batch.memory_mb},
-          {"retry_failed", batch.retry_failed},
-          {"program", spec.program}};
-}
-
 // What the result depends on, by the names of the command's options.
-Json result_of(const FarmSpec& spec) {
-  if (spec.options.batch) return result_of_batch(spec);
-  if (const std::optional<BenchOptions>& bench = spec.options.bench)
-    return {{"scenes", bench->scenes},
-            {"scene_hash", spec.scene_hash},
-            {"set", bench->sets},
-            {"seeds", bench->seeds},
-            {"presets", bench->presets},
-            {"iterations", or_null(bench->iterations)},
-            {"time_limit", std::isfinite(bench->time_limit_s) ? Json(bench->time_limit_s) : Json()},
-            {"program", spec.program}};
-  const PlanOptions& plan = spec.options.plan;
-  const RenderOptions& film = spec.options.film;
-  return {{"scene", plan.scene.scene},
-          {"scene_hash", spec.scene_hash},
-          {"set", plan.scene.sets},
-          {"preset", plan.preset},
-          {"seed", spec.first_seed},
-          {"portfolio", plan.portfolio},
-          {"iterations", or_null(plan.iterations)},
-          {"shortcut", or_null(plan.shortcut_rounds)},
-          {"cost", plan.cost},
-          {"size", film.size},
-          {"camera", film.camera},
-          {"passes", film.passes},
-          {"bits", film.bits},
-          {"program", spec.program}};
+struct ResultOfScene {
+  FarmSpec& spec;
+  template <class Fields>
+  void fields(Fields& f) {
+    PlanOptions& plan = spec.options.plan;
+    RenderOptions& film = spec.options.film;
+    f("scene", plan.scene.scene), f("scene_hash", spec.scene_hash), f("set", plan.scene.sets);
+    f("preset", plan.preset), f("seed", spec.first_seed), f.within("portfolio", plan.portfolio, 1, 1000);
+    f("iterations", plan.iterations), f("shortcut", plan.shortcut_rounds), f("cost", plan.cost);
+    f("size", film.size), f("camera", film.camera), f("passes", film.passes), f("bits", film.bits);
+    f("program", spec.program);
+  }
+};
+
+struct ResultOfBench {
+  FarmSpec& spec;
+  template <class Fields>
+  void fields(Fields& f) {
+    BenchOptions& bench = *spec.options.bench;
+    std::optional<double> limit_s;
+    if (std::isfinite(bench.time_limit_s)) limit_s = bench.time_limit_s;
+    f("scenes", bench.scenes), f("scene_hash", spec.scene_hash), f("set", bench.sets);
+    f("seeds", bench.seeds), f("presets", bench.presets), f("iterations", bench.iterations);
+    f("time_limit", limit_s), f("program", spec.program);
+    bench.time_limit_s = limit_s.value_or(std::numeric_limits<double>::infinity());
+  }
+};
+
+struct ResultOfBatch {
+  FarmSpec& spec;
+  template <class Fields>
+  void fields(Fields& f) {
+    BatchOptions& batch = *spec.options.batch;
+    std::vector<std::string> files, names;
+    for (const ListedModel& model : batch.listed)
+      files.push_back(model.file.string()), names.push_back(model.name);
+    f("models", files), f("names", names), f("scene_hash", spec.scene_hash), f("prepare", batch.each);
+    f("time_limit", batch.time_limit_s), f("memory_limit", batch.memory_mb);
+    f("retry_failed", batch.retry_failed), f("program", spec.program);
+    batch.listed.clear();
+    for (std::size_t m = 0; m < files.size() && files.size() == names.size(); ++m)
+      batch.listed.push_back({files[m], names[m]});
+  }
+};
+
+// Calls `f` with that of the spec's kind.
+template <class F>
+auto with_result(FarmSpec& spec, const F& f) {
+  if (spec.options.bench) return f(ResultOfBench{spec});
+  if (spec.options.batch) return f(ResultOfBatch{spec});
+  return f(ResultOfScene{spec});
+}
+
+struct FarmFile {
+  FarmSpec& spec;
+  std::string written_by = version;
+
+  template <class Fields>
+  void fields(Fields& f) {
+    FarmOptions& options = spec.options;
+    f("version", written_by), f("key", spec.key);
+    with_result(spec, [&](auto result) { f("result", result); });
+    SceneOptions& scene = options.plan.scene;
+    f("data", options.bench ? options.bench->data : scene.data);
+    f("store", options.bench   ? options.bench->store
+               : options.batch ? options.batch->each.store
+                               : scene.store);
+    if (options.bench) {
+      f.within("runs_per_task", options.runs_per_task, 1, 1000000);
+      f("in_flight", options.bench->in_flight);
+    }
+    if (options.batch) f.within("models_per_task", options.models_per_task, 1, 1000000);
+    f("bodies", spec.bodies), f("engine", options.engine);
+    f.within("workers", options.workers, 1, 1000), f.within("threads", options.threads, 1, 256);
+    f.within("frames_per_task", options.frames_per_task, 1, 1000000);
+    f.within("chunks", options.chunks, 0, 1000000), f("sbatch", options.sbatch);
+    std::string until = name_of(options.until);
+    f("until", until);
+    options.until = stage_named(until);
+  }
+};
+
+Json result_of(FarmSpec spec) {
+  return with_result(spec, [](const auto& result) { return json_of_fields(result); });
 }
 
 }  // namespace
 
-Json json_of(const FarmSpec& spec) {
-  Json json{{"version", version}, {"key", spec.key}, {"result", result_of(spec)}};
-  std::vector<std::string> data;
-  const SceneOptions& scene = spec.options.plan.scene;
-  const std::optional<BenchOptions>& bench = spec.options.bench;
-  const std::optional<BatchOptions>& batch = spec.options.batch;
-  for (const fs::path& folder : bench ? bench->data : scene.data) data.push_back(folder.string());
-  json["data"] = data;
-  json["store"] = (bench ? bench->store : batch ? batch->each.store : scene.store).string();
-  if (bench) json["runs_per_task"] = spec.options.runs_per_task, json["in_flight"] = bench->in_flight;
-  if (batch) json["models_per_task"] = spec.options.models_per_task;
-  json["bodies"] = spec.bodies;
-  json["engine"] = spec.options.engine;
-  json["workers"] = spec.options.workers;
-  json["threads"] = spec.options.threads;
-  json["frames_per_task"] = spec.options.frames_per_task;
-  json["chunks"] = spec.options.chunks;
-  json["sbatch"] = spec.options.sbatch;
-  json["until"] = name_of(spec.options.until);
-  return json;
-}
+Json json_of(FarmSpec spec) { return json_of_fields(FarmFile{spec}); }
 
 namespace {
 
-// Whether it is there and not null, of which is asked that it is a number.
-bool has_number(const Json& result, const char* key, const fs::path& file) {
-  const Json value = result.value(key, Json());
-  if (value.is_null()) return false;
-  if (!value.is_number())
-    throw InputError(fmt::format("{}: result.{} is no number; {}", file.string(), key, remedy));
-  return true;
-}
-std::optional<std::int64_t> whole_or_nothing(const Json& result, const char* key, const fs::path& file) {
-  if (!has_number(result, key, file)) return std::nullopt;
-  if (!result.at(key).is_number_integer())
-    throw InputError(fmt::format("{}: result.{} is no whole number; {}", file.string(), key, remedy));
-  return result.at(key).get<std::int64_t>();
-}
-
-std::vector<fs::path> folders_in(const Json& list) {
-  std::vector<fs::path> folders;
-  for (const Json& folder : list) folders.emplace_back(folder.get<std::string>());
-  return folders;
-}
-
-void read_scene_farm(const Json& json, const fs::path& file, FarmSpec& spec) {
-  const Json& result = json.at("result");
-  require_like(result,
-               {{"scene", ""},
-                {"set", {""}},
-                {"preset", ""},
-                {"seed", 1},
-                {"portfolio", -1},
-                {"cost", ""},
-                {"size", ""},
-                {"camera", ""},
-                {"passes", {""}},
-                {"bits", -1}},
-               Keys::all, file.string() + ": result", remedy);
-  PlanOptions& plan = spec.options.plan;
-  RenderOptions& film = spec.options.film;
-  result.at("scene").get_to(plan.scene.scene);
-  result.at("set").get_to(plan.scene.sets);
-  plan.scene.data = folders_in(json.at("data"));
-  plan.scene.store = json.at("store").get<std::string>();
-  result.at("preset").get_to(plan.preset);
-  result.at("portfolio").get_to(plan.portfolio);
-  plan.iterations = whole_or_nothing(result, "iterations", file);
-  if (const auto rounds = whole_or_nothing(result, "shortcut", file)) plan.shortcut_rounds = int(*rounds);
-  result.at("cost").get_to(plan.cost);
-  result.at("size").get_to(film.size);
-  result.at("camera").get_to(film.camera);
-  result.at("passes").get_to(film.passes);
-  result.at("bits").get_to(film.bits);
-  film.resume = true;
-  result.at("seed").get_to(spec.first_seed);
-  plan.seed = std::int64_t(spec.first_seed);
-}
-
-void read_bench_farm(const Json& json, const fs::path& file, FarmSpec& spec) {
-  const Json& result = json.at("result");
-  require_like(result, {{"scenes", {""}}, {"set", {""}}, {"seeds", ""}, {"presets", {""}}}, Keys::all,
-               file.string() + ": result", remedy);
-  require_like(json, {{"runs_per_task", -1}, {"in_flight", -1}}, Keys::all, file.string(), remedy);
-  BenchOptions& bench = spec.options.bench.emplace();
-  result.at("scenes").get_to(bench.scenes);
-  result.at("set").get_to(bench.sets);
-  result.at("seeds").get_to(bench.seeds);
-  result.at("presets").get_to(bench.presets);
-  bench.data = folders_in(json.at("data"));
-  bench.store = json.at("store").get<std::string>();
-  bench.iterations = whole_or_nothing(result, "iterations", file);
-  if (has_number(result, "time_limit", file)) bench.time_limit_s = result.at("time_limit").get<double>();
-  json.at("in_flight").get_to(bench.in_flight);
-  json.at("runs_per_task").get_to(spec.options.runs_per_task);
-}
-
-void read_batch_farm(const Json& json, const fs::path& file, FarmSpec& spec) {
-  const Json& result = json.at("result");
-  require_like(result,
-               {{"models", {""}},
-                {"names", {""}},
-                {"prepare", json_of(PrepareOptions{})},
-                {"time_limit", 1.5},
-                {"memory_limit", 1.5},
-                {"retry_failed", true}},
-               Keys::all, file.string() + ": result", remedy);
-  require_like(json, {{"models_per_task", -1}}, Keys::all, file.string(), remedy);
-  BatchOptions& batch = spec.options.batch.emplace();
-  const auto files = result.at("models").get<std::vector<std::string>>(),
-             names = result.at("names").get<std::vector<std::string>>();
-  if (files.empty() || files.size() != names.size())
-    throw InputError(fmt::format("{}: it has {} models and {} names of models; {}", file.string(),
-                                 files.size(), names.size(), remedy));
-  for (std::size_t m = 0; m < files.size(); ++m) batch.listed.push_back({files[m], names[m]});
-  read_prepare(result.at("prepare"), batch.each);
-  batch.each.store = json.at("store").get<std::string>();
-  result.at("time_limit").get_to(batch.time_limit_s);
-  result.at("memory_limit").get_to(batch.memory_mb);
-  result.at("retry_failed").get_to(batch.retry_failed);
-  json.at("models_per_task").get_to(spec.options.models_per_task);
-}
+// By what its result depends on: a benchmark has scenes, a batch how to prepare.
+struct Kind {
+  struct Result {
+    std::optional<Json> scenes, prepare;
+    template <class Fields>
+    void fields(Fields& f) {
+      f("scenes", scenes), f("prepare", prepare);
+    }
+  };
+  Result result;
+  template <class Fields>
+  void fields(Fields& f) {
+    f("result", result);
+  }
+};
 
 FarmSpec spec_from(const Json& json, const fs::path& file) {
-  require_like(json,
-               {{"version", ""},
-                {"key", ""},
-                {"result", {{"scene_hash", ""}, {"program", ""}}},
-                {"data", {""}},
-                {"store", ""},
-                {"bodies", {""}},
-                {"engine", ""},
-                {"workers", -1},
-                {"threads", -1},
-                {"frames_per_task", -1},
-                {"chunks", -1},
-                {"sbatch", {""}},
-                {"until", ""}},
-               Keys::all, file.string(), remedy);
+  const Kind::Result kind = read_fields<Kind>(json, file.string(), remedy).result;
   FarmSpec spec;
-  const Json& result = json.at("result");
-  const bool is_bench = result.contains("scenes"), is_batch = result.contains("prepare");
-  is_bench   ? read_bench_farm(json, file, spec)
-  : is_batch ? read_batch_farm(json, file, spec)
-             : read_scene_farm(json, file, spec);
-  result.at("scene_hash").get_to(spec.scene_hash);
-  result.at("program").get_to(spec.program);
-  json.at("key").get_to(spec.key);
-  json.at("bodies").get_to(spec.bodies);
-  json.at("engine").get_to(spec.options.engine);
-  json.at("workers").get_to(spec.options.workers);
-  json.at("threads").get_to(spec.options.threads);
-  json.at("frames_per_task").get_to(spec.options.frames_per_task);
-  json.at("chunks").get_to(spec.options.chunks);
-  json.at("sbatch").get_to(spec.options.sbatch);
-  spec.options.until = stage_named(json.at("until").get<std::string>());
+  if (kind.scenes)
+    spec.options.bench.emplace();
+  else if (kind.prepare)
+    spec.options.batch.emplace();
+  FarmFile read{spec};
+  FieldReader::read(json, read, JsonPlace{file.string(), "", remedy});
+  if (spec.options.batch && spec.options.batch->listed.empty())
+    throw InputError(
+        fmt::format("{}: it has no models, or not as many names of models; {}", file.string(), remedy));
   const Stage until = spec.options.until;
-  const bool fits = is_bench   ? until == Stage::table
-                    : is_batch ? until == Stage::page
-                               : until <= Stage::report;
+  const bool fits = kind.scenes    ? until == Stage::table
+                    : kind.prepare ? until == Stage::page
+                                   : until <= Stage::report;
   if (!fits)
     throw InputError(fmt::format("{}: until is {}, which is no last stage of {}; {}", file.string(),
                                  name_of(until),
-                                 is_bench   ? "a benchmark"
-                                 : is_batch ? "a batch of models"
-                                            : "a scene",
+                                 kind.scenes    ? "a benchmark"
+                                 : kind.prepare ? "a batch of models"
+                                                : "a scene",
                                  remedy));
-  const auto within = [&](const char* key, int value, int least, int most) {
-    if (value < least || value > most)
-      throw InputError(fmt::format("{}: {} is {}; it must be in [{}, {}]; {}", file.string(), key, value,
-                                   least, most, remedy));
-  };
-  within("result.portfolio", spec.options.plan.portfolio, 1, 1000);
-  within("workers", spec.options.workers, 1, 1000);
-  within("threads", spec.options.threads, 1, 256);
-  within("frames_per_task", spec.options.frames_per_task, 1, 1000000);
-  within("chunks", spec.options.chunks, 0, 1000000);
-  within("runs_per_task", spec.options.runs_per_task, 1, 1000000);
-  within("models_per_task", spec.options.models_per_task, 1, 1000000);
+  spec.options.film.resume = true;
+  spec.options.plan.seed = std::int64_t(spec.first_seed);
   return spec;
 }
 

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "core/error.h"
+#include "core/json_fields.h"
 #include "core/json_text.h"
 #include "core/temporary_files.h"
 
@@ -31,6 +32,17 @@ long long start_of(long long pid) {
     return 0;
   }
 }
+
+// A lease's file.
+struct Owner {
+  std::string owner, place;
+  std::int64_t pid = 0, began = 0;
+  std::string beat;
+  template <class Fields>
+  void fields(Fields& f) {
+    f("owner", owner), f("place", place), f("pid", pid), f("began", began), f.if_there("beat", beat);
+  }
+};
 
 struct Parts {
   std::string unit;
@@ -54,21 +66,15 @@ std::string text_in(const fs::path& file) {
 }
 
 // False, too, where that is not to be known from here.
-bool has_ended(const Json& owner) {
-  if (owner.value("place", "") != place_of_processes()) return false;
-  const long long pid = owner.value("pid", 0LL), began = owner.value("began", 0LL);
-  if (pid <= 0) return false;
-  if (::kill(pid_t(pid), 0) != 0 && errno == ESRCH) return true;
-  return began != 0 && start_of(pid) != began;
+bool has_ended(const Owner& owner) {
+  if (owner.place != place_of_processes() || owner.pid <= 0) return false;
+  if (::kill(pid_t(owner.pid), 0) != 0 && errno == ESRCH) return true;
+  return owner.began != 0 && start_of(owner.pid) != owner.began;
 }
 
-Json owner_in(const std::string& text) {
-  Json owner = Json::parse(text, nullptr, false);
-  const bool whole = owner.is_object() && owner.contains("owner") && owner.at("owner").is_string() &&
-                     owner.contains("place") && owner.at("place").is_string() && owner.contains("pid") &&
-                     owner.at("pid").is_number_integer() && owner.contains("began") &&
-                     owner.at("began").is_number_integer();
-  return whole ? owner : Json::object();
+// Nobody where it is damaged.
+Owner owner_in(const std::string& text) {
+  return fields_or_nothing<Owner>(Json::parse(text, nullptr, false)).value_or(Owner{});
 }
 
 }  // namespace
@@ -108,12 +114,9 @@ Lease::Lease(fs::path folder, std::string unit, int taken, std::string owner)
 // Opened and closed each time, so that other machines see it (NFS). One that is not there any more was taken
 // for lost.
 void Lease::write_beat() {
-  const std::string text = text_of(Json{{"owner", owner_},
-                                        {"place", place_of_processes()},
-                                        {"pid", ::getpid()},
-                                        {"began", start_of(::getpid())},
-                                        {"beat", fmt::format("{:>9}", beat_++)}}) +
-                           "\n";
+  const Owner owner{owner_, place_of_processes(), ::getpid(), start_of(::getpid()),
+                    fmt::format("{:>9}", beat_++)};
+  const std::string text = text_of(json_of_fields(owner)) + "\n";
   const int fd = ::open(file_.c_str(), O_WRONLY | O_CLOEXEC);
   if (fd < 0) return;
   if (::pwrite(fd, text.data(), text.size(), 0) < 0) {
@@ -149,8 +152,8 @@ std::map<std::string, Leases::Seen> Leases::look() {
     Content now{text_in(file), looked};
     const auto before = contents_.find(file);
     if (before != contents_.end() && before->second.text == now.text) now.since = before->second.since;
-    const Json owner = owner_in(now.text);
-    lease.owner = owner.value("owner", "");
+    const Owner owner = owner_in(now.text);
+    lease.owner = owner.owner;
     const std::chrono::duration<double> unchanged = looked - now.since;
     lease.lost = has_ended(owner) || unchanged.count() > patience_s_;
     contents.emplace(file, std::move(now));

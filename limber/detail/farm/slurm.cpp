@@ -116,8 +116,8 @@ std::vector<std::vector<std::string>> slurm_commands(const FarmFolder& farm) {
 
 void send_to_slurm(const FarmFolder& farm, int round) {
   write_file(farm.folder() / "worker.sh", slurm_script(farm));
-  Json jobs{{"jobs", Json::array()}, {"rounds", round}};
-  if (round > 0) jobs["jobs"] = farm.jobs().at("jobs");
+  SentJobs sent{.jobs = {}, .rounds = round};
+  if (round > 0) sent.jobs = farm.jobs().jobs;
   std::string before;
   try {
     for (std::vector<std::string> words : slurm_commands(farm)) {
@@ -127,11 +127,11 @@ void send_to_slurm(const FarmFolder& farm, int round) {
       id = id.substr(0, id.find_first_not_of("0123456789"));  // "17;CLUSTER\n"
       if (id.empty()) throw InputError("sending a job failed: sbatch told no number");
       before = id;
-      jobs["jobs"].push_back(id);
-      farm.write_jobs(jobs);  // one by one: what was sent is known, whatever comes
+      sent.jobs.push_back(id);
+      farm.write_jobs(sent);  // one by one: what was sent is known, whatever comes
     }
   } catch (...) {
-    if (!before.empty()) cancel_slurm(jobs["jobs"].get<std::vector<std::string>>());
+    if (!before.empty()) cancel_slurm(sent.jobs);
     throw;
   }
 }

@@ -6,10 +6,12 @@
 #include <atomic>
 #include <chrono>
 #include <cmath>
+#include <csignal>
 #include <mutex>
 #include <new>
 #include <set>
 
+#include "core/content_hash.h"
 #include "core/error.h"
 #include "core/events.h"
 #include "core/hash.h"
@@ -140,10 +142,8 @@ class Worker {
       for (Unit& unit : farm_.units(stage)) {
         if (known_done_.contains(unit.name)) continue;
         if (const auto failure = farm_.failure_of(unit)) {
-          if (result_.failed.empty()) result_.exit_code = failure->at("exit_code");
-          result_.failed.push_back(fmt::format("{}: {}: {}", unit.name,
-                                               failure->at("reason").get<std::string>(),
-                                               failure->at("message").get<std::string>()));
+          if (result_.failed.empty()) result_.exit_code = failure->exit_code;
+          result_.failed.push_back(fmt::format("{}: {}: {}", unit.name, failure->reason, failure->message));
         } else {
           remaining.push_back(std::move(unit));
         }
@@ -173,10 +173,10 @@ class Worker {
         continue;
       }
       if (owner && owner->taken >= most_taken) {
-        farm_.mark_failed(unit, "crash",
-                          fmt::format("{} processes that did it were killed or crashed; see {}", most_taken,
-                                      farm_.logs().string()),
-                          exit_defect);
+        farm_.mark_failed(unit, {"crash",
+                                 fmt::format("{} processes that did it were killed or crashed; see {}",
+                                             most_taken, farm_.logs().string()),
+                                 exit_defect});
         return Step::did_one;
       }
       if (sends_again_ && (stage <= Stage::frames || stage == Stage::runs || stage == Stage::models)) {
@@ -198,7 +198,7 @@ class Worker {
   // Those who were to do it ended before it was done: all of them are sent once more, for one alone would be
   // long at it.
   Step send_again() {
-    const int rounds = farm_.jobs().at("rounds").get<int>();
+    const int rounds = farm_.jobs().rounds;
     if (rounds < most_rounds && slurm_is_there()) {
       log::warn("some of it is missing; it is sent once more");
       send_to_slurm(farm_, rounds + 1);
@@ -219,19 +219,19 @@ class Worker {
     const double cpu_before = cpu_seconds();
     const auto fail = [&](const char* reason, const std::string& message, int exit_code) {
       log::warn("{}: {}", unit.name, message);
-      farm_.mark_failed(unit, reason, message, exit_code);
+      farm_.mark_failed(unit, {reason, message, exit_code});
     };
     try {
-      Json told = result_of(unit);
-      if (told.is_null()) return;
-      told["seconds"] = std::round(1e3 * elapsed_s(began)) / 1e3;
-      told["cpu_s"] = std::round(1e3 * (cpu_seconds() - cpu_before)) / 1e3;
-      told["worker"] = this_worker();
-      farm_.mark_done(unit, told);
+      std::optional<UnitDone> told = result_of(unit);
+      if (!told) return;
+      told->seconds = std::round(1e3 * elapsed_s(began)) / 1e3;
+      told->cpu_s = std::round(1e3 * (cpu_seconds() - cpu_before)) / 1e3;
+      told->worker = this_worker();
+      farm_.mark_done(unit, *told);
       if (unit.stage == Stage::plan) known_done_.clear();  // there are other frames now
       known_done_.insert(unit.name);
       ++result_.units;
-      log::info("{}: {:.2f} s", unit.name, told.at("seconds").get<double>());
+      log::info("{}: {:.2f} s", unit.name, *told->seconds);
     } catch (const FramesFailed& error) {
       fail("frames", error.what(), exit_frames_failed);
     } catch (const InputError& error) {
@@ -247,8 +247,8 @@ class Worker {
     using std::runtime_error::runtime_error;
   };
 
-  // What is told of it; null: something that it needs has gone, and is done again first.
-  Json result_of(const Unit& unit) {
+  // What is told of it; nothing: something that it needs has gone, and is done again first.
+  std::optional<UnitDone> result_of(const Unit& unit) {
     switch (unit.stage) {
       case Stage::bodies:
         return do_body(unit);
@@ -261,7 +261,7 @@ class Worker {
       case Stage::film:
         return do_film();
       case Stage::report:
-        return {{"all_kept", report(farm_.work()).all_kept}};
+        return do_report();
       case Stage::runs:
         return do_runs(unit);
       case Stage::table:
@@ -282,20 +282,29 @@ class Worker {
     return *bench_runs_;
   }
 
-  Json do_runs(const Unit& unit) {
-    std::vector<std::string> records;
-    for (const std::size_t run : unit.runs) records.push_back(bench_runs().run(run));
-    return {{"records", records}};
+  UnitDone do_runs(const Unit& unit) {
+    UnitDone told;
+    told.records.emplace();
+    for (const std::size_t run : unit.runs) told.records->push_back(bench_runs().run(run));
+    return told;
   }
 
-  Json do_table() {
+  UnitDone do_table() {
     BenchOptions options;
     options.merge = {farm_.work()}, options.out = farm_.work();
-    return {{"runs", bench(options).runs}};
+    UnitDone told;
+    told.runs = int(bench(options).runs);
+    return told;
+  }
+
+  UnitDone do_report() {
+    UnitDone told;
+    told.all_kept = report(farm_.work()).all_kept;
+    return told;
   }
 
   // As many at once as it has threads. What models fail does not fail it.
-  Json do_models(const Unit& unit) {
+  UnitDone do_models(const Unit& unit) {
     EndWatcher watcher(farm_);
     Job job({.watcher = &watcher, .threads = thread_count()});
     const WorkingFor working(&job);
@@ -309,27 +318,28 @@ class Worker {
   }
 
   // Looks at all of them once more, and makes what has gone or was changed meanwhile.
-  Json do_page() {
+  UnitDone do_page() {
     BatchOptions all = *farm_.spec().options.batch;
     all.retry_failed = false;
     return told_of(prepare_many(all));
   }
 
-  static Json told_of(const PreparedMany& prepared) {
-    return {{"models", prepared.models},
-            {"failed_models", prepared.failed + prepared.failed_before},
-            {"reasons", prepared.reasons}};
+  static UnitDone told_of(const PreparedMany& prepared) {
+    UnitDone told;
+    told.models = prepared.models, told.failed_models = prepared.failed + prepared.failed_before;
+    told.reasons = prepared.reasons;
+    return told;
   }
 
-  Json do_body(const Unit& unit) {
+  UnitDone do_body(const Unit& unit) {
     if (farm_.spec().options.bench) {
       bench_runs().prepare(unit.scene);
-      return Json::object();
+      return {};
     }
     const SceneOptions& options = plan_options().scene;
     if (unit.body.empty()) {
       prepare_beside(scene_, options.data, farm_.work());
-      return Json::object();
+      return {};
     }
     std::optional<BodyStore> store;
     if (!options.store.empty()) store.emplace(options.store);
@@ -338,7 +348,7 @@ class Worker {
         prepare_body_of(scene_, scene_.bodies[b], options.data, farm_.work(), store ? &*store : nullptr);
         keep_stiffness_share(scene_, b, farm_.work());  // else each search would find it
       }
-    return Json::object();
+    return {};
   }
 
   struct Setup {
@@ -356,14 +366,16 @@ class Worker {
   }
 
   // As `limber plan --seed` searches, but no farther than where another seed has won.
-  Json do_search(const Unit& unit) {
+  UnitDone do_search(const Unit& unit) {
     plan::Settings settings = settings_of(scene_, plan_options());
     settings.seed = unit.seed;
     const std::int64_t most = settings.max_iterations;
     const fs::path file = farm_.search_file(unit);
     std::error_code none;
     const auto told = [&](const char* how, std::int64_t iterations, bool solved) {
-      return Json{{"ended", how}, {"iterations", iterations}, {"solved", solved}};
+      UnitDone unit_done;
+      unit_done.ended = how, unit_done.iterations = iterations, unit_done.solved = solved;
+      return unit_done;
     };
     std::optional<plan::Plan> searched = search_to_go_on_with(unit, settings);
     while (true) {
@@ -389,9 +401,9 @@ class Worker {
       }
       plan::write_plan(file, *searched, Json::object());
       if (searched->solved() || at_end) {
-        Json json = told(at_end ? "iterations" : "goal", searched->statistics.iterations, !at_end);
-        json["leg"] = searched->leg(), json["distance_m"] = searched->best_distance_m;
-        return json;
+        UnitDone ended = told(at_end ? "iterations" : "goal", searched->statistics.iterations, !at_end);
+        ended.leg = searched->leg(), ended.distance_m = searched->best_distance_m;
+        return ended;
       }
       throw_if_ended();
     }
@@ -418,13 +430,11 @@ class Worker {
     double distance_m = 0;
     for (const Unit& unit : farm_.units(Stage::search)) {
       if (best && unit.seed != best->seed) continue;
-      const Json told = farm_.told_of(unit);
-      const auto number = [&](const char* key) {
-        return told.contains(key) && told.at(key).is_number() ? told.at(key).get<double>() : 0;
-      };
-      const int its_leg = int(number("leg"));
-      const bool farther = its_leg > leg || (its_leg == leg && number("distance_m") < distance_m);
-      if (!won || farther) won = unit, leg = its_leg, distance_m = number("distance_m");
+      const UnitDone told = farm_.told_of(unit);
+      const int its_leg = told.leg.value_or(0);
+      const double its_distance_m = told.distance_m.value_or(0);
+      const bool farther = its_leg > leg || (its_leg == leg && its_distance_m < distance_m);
+      if (!won || farther) won = unit, leg = its_leg, distance_m = its_distance_m;
     }
     return won;
   }
@@ -439,13 +449,12 @@ class Worker {
                                              : most;
       report.searches.push_back({unit.seed, iterations, won});
       report.iterations += iterations;
-      const Json cpu_s = farm_.told_of(unit).value("cpu_s", Json());
-      if (cpu_s.is_number()) report.cpu_s += cpu_s.get<double>();
+      report.cpu_s += farm_.told_of(unit).cpu_s.value_or(0);
     }
     return report;
   }
 
-  Json do_plan() {
+  std::optional<UnitDone> do_plan() {
     const FolderLock lock(farm_.work(), FolderLock::alone, FolderLock::waits);
     const std::optional<Best> best = best_search(farm_);
     const std::optional<Unit> won = unit_that_won(best);
@@ -456,7 +465,7 @@ class Worker {
       searched = plan::read_plan(farm_.search_file(*won)).plan;
     } catch (const InputError&) {
       farm_.forget(*won), known_done_.erase(won->name);
-      return {};
+      return std::nullopt;
     }
     searched.settings.max_iterations = settings.max_iterations;
     std::optional<plan::PortfolioReport> searches;
@@ -470,20 +479,20 @@ class Worker {
 
     drop_film();
     const Filming& shown = filming();
-    Json hashes = Json::array();
-    for (int f = 0; f < shown.shot->frames(); ++f) hashes.push_back(shown.shot->hash_of(f));
+    UnitDone told;
+    told.frame_hashes.emplace();
+    for (int f = 0; f < shown.shot->frames(); ++f) told.frame_hashes->push_back(shown.shot->hash_of(f));
     for (const Unit& unit : farm_.units(Stage::search)) {
       std::error_code none;
       fs::remove(farm_.search_file(unit), none);
     }
-    return {{"solved", kept.reached},
-            {"explanation", kept.summary.at("explanation")},
-            {"seed", kept.summary.at("seed")},
-            {"tree_hash", kept.summary.at("tree_hash")},
-            {"trajectory_hash", kept.summary.at("trajectory_hash")},
-            {"plan_file", hex(shown.planned.file_hash)},
-            {"frames_folder", shown.files.folder.filename().string()},
-            {"frame_hashes", hashes}};
+    const plan::Plan& plan = shown.planned.plan;
+    told.solved = kept.reached, told.explanation = shown.planned.told.explanation;
+    told.seed = plan.settings.seed, told.tree_hash = hex(plan::hash_of(plan.tree));
+    told.trajectory_hash = hex(plan::hash_of(plan.trajectory));
+    told.plan_file = hex(shown.planned.file_hash);
+    told.frames_folder = shown.files.folder.filename().string();
+    return told;
   }
 
   const Filming& filming() {
@@ -497,14 +506,13 @@ class Worker {
   }
   void drop_film() { painter_.reset(), filming_.reset(); }
 
-  Json do_frames(const Unit& unit) {
-    if (const Json plan = farm_.told_of(farm_.plan_unit());
-        plan.value("plan_file", Json()) != hex(filming().planned.file_hash)) {
+  std::optional<UnitDone> do_frames(const Unit& unit) {
+    if (farm_.told_of(farm_.plan_unit()).plan_file != hex(filming().planned.file_hash)) {
       log::warn("{}: is another plan than was made for these frames; it is made again",
                 (farm_.work() / "plan.npz").string());
       drop_film();
       farm_.forget(farm_.plan_unit()), known_done_.clear();
-      return {};
+      return std::nullopt;
     }
     std::vector<int> missing = unit.frames;
     std::erase_if(missing, [&](int frame) { return filming().is_good(frame); });
@@ -515,19 +523,22 @@ class Worker {
     if (!failures.empty())
       throw FramesFailed(fmt::format("{} of {} frames failed; frame {}: {}", failures.size(), missing.size(),
                                      failures[0].frame, failures[0].why));
-    return {{"painted", missing.size()}};
+    UnitDone told;
+    told.painted = int(missing.size());
+    return told;
   }
 
-  Json do_film() {
+  UnitDone do_film() {
     drop_film(), setup_.reset();
     const RenderedFilm film = render(film_options());
     if (!film.film)
       throw FramesFailed(
           fmt::format("{} frames are missing, {} failed", film.frames - int(film.wanted), film.failed));
-    return {{"film", film.film->lexically_relative(farm_.work()).string()},
-            {"sheet", film.sheet->lexically_relative(farm_.work()).string()},
-            {"frames", film.frames},
-            {"painted", film.painted}};
+    UnitDone told;
+    told.film = film.film->lexically_relative(farm_.work()).string();
+    told.sheet = film.sheet->lexically_relative(farm_.work()).string();
+    told.frames = film.frames, told.painted = int(film.painted);
+    return told;
   }
 
   const WorkOptions options_;

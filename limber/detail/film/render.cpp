@@ -206,10 +206,10 @@ constexpr const char* hash_of_film = "limber-film-hash";  // in the contact shee
 // The film and its sheet are as they were made from just these frames.
 bool film_is_there(const Filming& filming, const fs::path& video, const fs::path& sheet) {
   const auto info = render::inspect_png(sheet);
-  if (!info || !info->texts.contains("limber-hash") || !info->texts.contains(hash_of_film) ||
+  if (!info || !info->texts.contains(hash_of_frame) || !info->texts.contains(hash_of_film) ||
       !fs::is_regular_file(video))
     return false;
-  return info->texts.at("limber-hash") == filming.film_hash(video) &&
+  return info->texts.at(hash_of_frame) == filming.film_hash(video) &&
          info->texts.at(hash_of_film) == content_hash(read_file(video));
 }
 
@@ -278,31 +278,29 @@ RenderedFilm render(const RenderOptions& options) {
     if (const fs::path old = options.folder / ("film" + suffix + ".mp4"); fs::exists(old))
       result.old_film = old;
   }
-  update_manifest(options.folder, "render" + suffix, json_of(result));
+  update_manifest(options.folder, "render" + suffix, json_of_fields(told_of(result)));
   return result;
 }
 
-Json json_of(const RenderedFilm& film) {
-  Json json{{"frames", film.frames},
-            {"wanted", film.wanted},
-            {"painted", film.painted},
-            {"failed", film.failed},
-            {"size", {film.size_px.first, film.size_px.second}},
-            {"camera", film.camera},
-            {"sets", film.sets},
-            {"passes", film.passes},
-            {"bits", film.bits},
-            {"time",
-             {{"seconds", film.time.seconds},
-              {"motion_s", film.time.motion_s},
-              {"left_out_s", film.time.left_out_s},
-              {"speed", {film.time.slowest, film.time.quickest}}}},
-            {"trajectory_hash", film.trajectory_hash},
-            {"cpu_s", film.cpu_s},
-            {"folder", film.folder.string()}};
-  if (film.film) json["film"] = film.film->string();
-  if (film.sheet) json["sheet"] = film.sheet->string();
-  return json;
+FilmTold told_of(const RenderedFilm& film) {
+  return {.frames = film.frames,
+          .wanted = std::int64_t(film.wanted),
+          .painted = std::int64_t(film.painted),
+          .failed = std::int64_t(film.failed),
+          .size = {film.size_px.first, film.size_px.second},
+          .camera = film.camera,
+          .sets = film.sets,
+          .passes = film.passes,
+          .bits = film.bits,
+          .time = {film.time.seconds,
+                   film.time.motion_s,
+                   film.time.left_out_s,
+                   {film.time.slowest, film.time.quickest}},
+          .trajectory_hash = film.trajectory_hash,
+          .cpu_s = film.cpu_s,
+          .folder = film.folder,
+          .film = film.film,
+          .sheet = film.sheet};
 }
 
 namespace {

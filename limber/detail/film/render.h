@@ -3,6 +3,9 @@
 
 #include <fmt/format.h>
 
+#include <array>
+
+#include "core/json_fields.h"
 #include "limber/detail/film/shot.h"
 #include "limber/detail/plan/plan.h"
 
@@ -21,6 +24,35 @@ struct RenderOptions {
   // Names frames-NAME/, film-NAME.mp4 and sheet-NAME.png; empty: the camera's, and none for "main".
   std::string name;
   std::optional<fs::path> video;  // default film.mp4 in the folder, made when every frame is there
+};
+
+// What manifest.json tells of a film.
+struct FilmTold {
+  struct Time {
+    double seconds = 0, motion_s = 0, left_out_s = 0;
+    std::array<double, 2> speed{};  // slowest, quickest
+    template <class Fields>
+    void fields(Fields& f) {
+      f("seconds", seconds), f("motion_s", motion_s), f("left_out_s", left_out_s), f("speed", speed);
+    }
+  };
+  std::int64_t frames = 0, wanted = 0, painted = 0, failed = 0;
+  std::array<int, 2> size{};
+  std::string camera;
+  std::vector<std::string> sets, passes;
+  int bits = 8;
+  Time time;
+  std::string trajectory_hash;
+  double cpu_s = 0;
+  fs::path folder;
+  std::optional<fs::path> film, sheet;
+  template <class Fields>
+  void fields(Fields& f) {
+    f("frames", frames), f("wanted", wanted), f("painted", painted), f("failed", failed), f("size", size);
+    f("camera", camera), f("sets", sets), f("passes", passes), f("bits", bits), f("time", time);
+    f("trajectory_hash", trajectory_hash), f("cpu_s", cpu_s), f("folder", folder);
+    f.if_there("film", film), f.if_there("sheet", sheet);
+  }
 };
 
 struct RenderedFilm {
@@ -87,7 +119,7 @@ std::vector<FailedFrame> paint_frames(const Filming&, const std::vector<int>& fr
 // and where several that share the folder find all frames in place, one makes it. Throws InputError,
 // DiskError, and Interrupted with the frames that are finished kept.
 RenderedFilm render(const RenderOptions&);
-Json json_of(const RenderedFilm&);  // as manifest.json has it
+FilmTold told_of(const RenderedFilm&);
 
 // Plans and films, as far as that is not done.
 struct PlannedFilm {

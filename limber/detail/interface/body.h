@@ -23,6 +23,7 @@ struct Body::Impl {
   };
   std::optional<Made> made;
   std::filesystem::path folder;
+  std::map<std::string, std::string> files;  // of it, name → hash
   // What its cage moves; `rest` where it bends by Phong Deformation.
   ffd::Binding bound;
   TetMesh rest;

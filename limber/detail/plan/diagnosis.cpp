@@ -59,6 +59,7 @@ Diagnosis diagnose(const fem::World& world, const FemSystem& system, const plan:
   const plan::Workspace space = system.workspace();
   const State from = plan.tree.states[std::size_t(plan.legs.back().root)];
   const double passage = plan::widest_passage_m(space, system.robot_center(from), goal);
+  d.widest_passage_m = passage, d.robot_radius_m = space.robot_radius_m;
   d.json["widest_rigid_passage_m"] = passage;
   d.json["robot_inner_radius_m"] = space.robot_radius_m;
   if (passage < 0)

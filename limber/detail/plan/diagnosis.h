@@ -11,8 +11,10 @@
 namespace limber::detail {
 
 struct Diagnosis {
-  std::string text;  // sentences that follow plan::explain's
-  Json json;
+  std::string text;             // sentences that follow plan::explain's
+  double widest_passage_m = 0;  // between rigid bodies and walls to the goal, a ball's radius; −1: none
+  double robot_radius_m = 0;    // of the largest ball in the robot
+  Json json;                    // all of it
 };
 Diagnosis diagnose(const fem::World&, const FemSystem&, const plan::Plan&);
 

@@ -45,7 +45,7 @@ FollowedPlan::FollowedPlan(const fs::path& folder, const scenes::Scene& scene, c
                                                plan::guide_of(system, planned.plan.settings, path));
 }
 
-Json FollowedPlan::facts(const plan::Plan& simulation, const fs::path& from) const {
+FollowingTold FollowedPlan::facts(const plan::Plan& simulation, const fs::path& from) const {
   const plan::Guide& guide = follower_->guide();
   double farthest = 0, largest = 0;
   for (int node = 0; node < simulation.tree.size(); ++node)
@@ -59,13 +59,13 @@ Json FollowedPlan::facts(const plan::Plan& simulation, const fs::path& from) con
   const double speed = system_->mean_speed(end);
   const plan::Settle& settle = settings_.settle;
   const bool rests = settle.max_duration_s == 0 || speed < settle.mean_speed_m_s;
-  return {{"folder", fs::relative(folder_, from).generic_string()},
-          {"trajectory_hash", trajectory_hash_},
-          {"farthest_from_path_m", farthest},
-          {"largest_force_n", largest},
-          {"distance_m", (center - settings_.goal.center_of_mass_m).norm()},
-          {"speed_m_s", speed},
-          {"reaches", rests && plan::holds(settings_.goal, center) && system_->goal_holds(end)}};
+  return {.folder = fs::relative(folder_, from).generic_string(),
+          .trajectory_hash = trajectory_hash_,
+          .farthest_from_path_m = farthest,
+          .largest_force_n = largest,
+          .distance_m = (center - settings_.goal.center_of_mass_m).norm(),
+          .speed_m_s = speed,
+          .reaches = rests && plan::holds(settings_.goal, center) && system_->goal_holds(end)};
 }
 
 }  // namespace limber::detail

@@ -20,7 +20,7 @@ class FollowedPlan {
   double duration_s() const { return duration_s_; }  // of the plan, its settle included
   // What a summary tells of it: the plan, and how the simulation keeps to it and ends. `from` is the folder
   // to which the plan's is told.
-  Json facts(const plan::Plan& simulation, const fs::path& from) const;
+  FollowingTold facts(const plan::Plan& simulation, const fs::path& from) const;
 
  private:
   fs::path folder_;

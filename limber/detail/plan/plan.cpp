@@ -67,23 +67,20 @@ Json json_of(const fem::Parting& parting, const fem::World& world, const MotionF
   return json;
 }
 
-// `earlier` is the summary of the plan that this one goes on from, null for none: a solved one has its rounds
-// behind it.
+// `earlier` is told by the plan that this one goes on from: a solved one has its rounds behind it.
 plan::ShortcutSettings shortcuts_of(const scenes::Scene& scene, const PlanOptions& options,
-                                    const Json& earlier) {
+                                    const std::optional<ShortcutTold>& earlier) {
   plan::ShortcutSettings s;
   s.rounds = options.shortcut_rounds.value_or(scene.planner.shortcut_rounds);
   s.cost = plan::cost_kind_from(options.cost);
-  if (earlier.contains("shortcut") && earlier.at("shortcut").at("cost") == options.cost)
-    s.rounds_done = earlier.at("shortcut").at("rounds").get<int>();
+  if (earlier && earlier->cost == options.cost) s.rounds_done = earlier->rounds;
   return s;
 }
 
-// Whether nothing is left to do for a plan with that summary.
-bool shortened(const Json& summary, const plan::ShortcutSettings& wanted) {
-  return summary.contains("shortcut") ? summary.at("shortcut").at("cost") == plan::name_of(wanted.cost) &&
-                                            summary.at("shortcut").at("rounds") == wanted.rounds
-                                      : wanted.rounds == 0;
+// Whether nothing is left to do for a plan that tells this.
+bool shortened(const std::optional<ShortcutTold>& told, const plan::ShortcutSettings& wanted) {
+  return told ? told->cost == plan::name_of(wanted.cost) && told->rounds == wanted.rounds
+              : wanted.rounds == 0;
 }
 
 bool finished(const plan::Plan& plan) { return plan.solved() || plan.ending == plan::Ending::iterations; }
@@ -236,7 +233,10 @@ Found make_better(const scenes::Scene& scene, const FemSystem& system, const Pla
                   const Json& earlier_summary) {
   Found found{.plan = std::move(searched), .extra = {}, .how = {}};
   plan::Plan& plan = found.plan;
-  const plan::ShortcutSettings shortcuts = shortcuts_of(scene, options, earlier_summary);
+  const PlanTold told = earlier_summary.is_null()
+                            ? PlanTold{}
+                            : read_fields<PlanTold>(earlier_summary, "summary", "plan anew with limber plan");
+  const plan::ShortcutSettings shortcuts = shortcuts_of(scene, options, told.shortcut);
   for (const char* later : {"shortcut", "improve", "refine"})
     if (earlier_summary.contains(later)) found.extra[later] = earlier_summary.at(later);
   if (searches) {
@@ -286,7 +286,7 @@ KeptPlan plan(const PlanOptions& options, const scenes::Scene& scene) {
   }
   Found found = find_plan(scene, system, options, std::move(earlier), earlier_summary);
   plan::Plan& plan = found.plan;
-  if (beginning.start) found.extra["from"] = beginning.from;
+  if (beginning.from) found.extra["from"] = json_of_fields(*beginning.from);
   // Whatever comes of a search, of shortcuts or of better paths is in the tree.
   if (stop_signal() != 0 && plan.tree.size() == nodes_kept) {
     log::info("{}: is as it was; go on with --resume", file.string());
@@ -366,9 +366,9 @@ bool plan_is_up_to_date(const PlanOptions& options, const scenes::Scene& scene) 
     if (begins_elsewhere(folder)) return false;
     const fem::World world = build_world(scene, bodies, State(folder.plan.tree.states[0]).positions);
     plan::Settings settings = settings_of(scene, options);
-    const Json searches = folder.summary.value("portfolio", Json::object()).value("searches", Json::array());
+    const auto searches = folder.told.portfolio.value_or(PortfolioTold{}).searches;
     if (options.portfolio > 1
-            ? searches.size() != std::size_t(options.portfolio) || searches.at(0).at("seed") != settings.seed
+            ? searches.size() != std::size_t(options.portfolio) || searches[0].seed != settings.seed
             : !searches.empty())
       return false;
     if (!searches.empty()) settings.seed = folder.plan.settings.seed;
@@ -376,10 +376,10 @@ bool plan_is_up_to_date(const PlanOptions& options, const scenes::Scene& scene) 
            plan::first_difference(folder.plan.settings, settings).empty() && finished(folder.plan) &&
            (folder.plan.solved() || folder.plan.settings.max_iterations >= settings.max_iterations) &&
            folder.plan.measured && folder.plan.settings.frames_per_second == settings.frames_per_second &&
-           (!options.improve || folder.summary.contains("improve")) &&
+           (!options.improve || folder.told.improve) && folder.told.wrong.empty() &&
            // Written after the pictures, so that they are there.
            read_manifest(options.out).value("plan", Json()) == kept_summary(folder) &&
-           (!folder.plan.solved() || shortened(folder.summary, shortcuts_of(scene, options, {})));
+           (!folder.plan.solved() || shortened(folder.told.shortcut, shortcuts_of(scene, options, {})));
   } catch (const InputError& error) {
     log::info("planning anew: {}", error.what());
     return false;

@@ -15,40 +15,71 @@ namespace {
 
 constexpr const char* timings_file = "timings.json";
 const Json cpu_and_wall{{"cpu_s", 0.5}, {"wall_s", 0.5}};
-const Json timings_like{
-    {"statistics", {{"rollouts", 1}, {"rollouts_wrong", 1}, {"cpu_s", 0.5}, {"wall_s", 0.5}}},
-    {"dynamics",
-     {{"elastic_cpu_s", 0.5},
-      {"contact_cpu_s", 0.5},
-      {"controls_cpu_s", 0.5},
-      {"integration_cpu_s", 0.5},
-      {"parting_cpu_s", 0.5},
-      {"contact_of_force_step", 0.5},
-      {"load_us", 0.5},
-      {"store_us", 0.5}}},
-    {"shortcut", cpu_and_wall},
-    {"improve", cpu_and_wall},
-    {"portfolio", cpu_and_wall},
-    {"refine", {{"replay_cpu_s", 0.5}, {"track_cpu_s", 0.5}, {"search_cpu_s", 0.5}}}};
+const Json statistics_like{{"rollouts", 1}, {"rollouts_wrong", 1}, {"cpu_s", 0.5}, {"wall_s", 0.5}};
+const Json dynamics_like{{"elastic_cpu_s", 0.5},     {"contact_cpu_s", 0.5}, {"controls_cpu_s", 0.5},
+                         {"integration_cpu_s", 0.5}, {"parting_cpu_s", 0.5}, {"contact_of_force_step", 0.5},
+                         {"load_us", 0.5},           {"store_us", 0.5}};
+const Json timings_like{{"statistics", statistics_like},
+                        {"dynamics", dynamics_like},
+                        {"shortcut", cpu_and_wall},
+                        {"improve", cpu_and_wall},
+                        {"portfolio", cpu_and_wall},
+                        {"refine", {{"replay_cpu_s", 0.5}, {"track_cpu_s", 0.5}, {"search_cpu_s", 0.5}}}};
+
+// What plan.npz holds beside the plan.
+struct Given {
+  struct Script {
+    std::string text, name;
+    template <class Fields>
+    void fields(Fields& f) {
+      f("text", text), f("name", name);
+    }
+  };
+  std::string version, scene;
+  std::vector<std::string> sets;
+  InOrder<std::string> cage_hashes;  // by body, in the scene's order
+  Json summary;
+  std::optional<Script> script;
+  template <class Fields>
+  void fields(Fields& f) {
+    f("version", version), f("scene", scene), f("sets", sets), f("cage_hashes", cage_hashes);
+    f("summary", summary), f.if_there("script", script);
+  }
+};
 
 Json given_of(const std::string& by_version, const scenes::Scene& scene,
               const std::vector<PreparedBody>& bodies, const Json& summary) {
-  Json cages;
-  for (std::size_t b = 0; b < bodies.size(); ++b) cages[scene.bodies[b].name] = hex(hash_of(bodies[b].cage));
-  Json given{{"version", by_version},
-             {"scene", scene.text},
-             {"sets", scene.sets},
-             {"cage_hashes", cages},
-             {"summary", summary}};
-  if (!scene.script.text.empty())
-    given["script"] = {{"text", scene.script.text}, {"name", scene.script.name_for_messages}};
-  return given;
+  Given given{by_version, scene.text, scene.sets, {}, summary, {}};
+  for (std::size_t b = 0; b < bodies.size(); ++b)
+    given.cage_hashes.emplace_back(scene.bodies[b].name, hex(hash_of(bodies[b].cage)));
+  const scenes::ScriptText& script = scene.script;
+  if (!script.text.empty()) given.script = {script.text, script.name_for_messages};
+  return json_of_fields(given);
 }
 
 // Which motion the costs are of: a file that was left from another tells nothing of this one.
-Json motion_of(const plan::Plan& plan) {
+std::vector<std::string> motion_of(const plan::Plan& plan) {
   return {hex(plan::hash_of(plan.tree)), hex(plan::hash_of(plan.trajectory))};
 }
+
+struct Timings {
+  std::vector<std::string> of;  // motion_of
+  Json summary;                 // its costs
+  template <class Fields>
+  void fields(Fields& f) {
+    f("of", of), f("summary", summary);
+  }
+};
+
+// Of a summary's statistics.
+struct RolloutsTold {
+  plan::Statistics& of;
+  template <class Fields>
+  void fields(Fields& f) {
+    f.if_there("rollouts", of.rollouts), f.if_there("rollouts_wrong", of.rollouts_wrong);
+    f.if_there("cpu_s", of.cpu_s), f.if_there("wall_s", of.wall_s);
+  }
+};
 
 // Nothing depends on them: a damaged file is as none. Throws InputError where a text stands for a number and
 // the like.
@@ -63,63 +94,42 @@ void add_timings(const fs::path& folder, PlanFolder& planned) {
     return;
   }
   constexpr const char* remedy = "remove the file";
-  require_like(read, {{"of", Json::array({""})}, {"summary", Json::object()}}, Keys::all, file.string(),
-               remedy);
-  require_like(read.at("summary"), timings_like, Keys::those_there, file.string() + ": summary", remedy);
-  if (read.at("of") != motion_of(planned.plan)) return;
-  planned.summary = plan::with_timings(std::move(planned.summary), read.at("summary"));
-  const Json statistics = planned.summary.value("statistics", Json::object());
-  plan::Statistics& s = planned.plan.statistics;
-  s.rollouts = statistics.value("rollouts", s.rollouts);
-  s.rollouts_wrong = statistics.value("rollouts_wrong", s.rollouts_wrong);
-  s.cpu_s = statistics.value("cpu_s", s.cpu_s), s.wall_s = statistics.value("wall_s", s.wall_s);
+  const Timings timings = read_fields<Timings>(read, file.string(), remedy);
+  require_like(read, {{"summary", Json::object()}}, Keys::all, file.string(), remedy);
+  require_like(timings.summary, timings_like, Keys::those_there, file.string() + ": summary", remedy);
+  if (timings.of != motion_of(planned.plan)) return;
+  planned.summary = plan::with_timings(std::move(planned.summary), timings.summary);
+  RolloutsTold told{planned.plan.statistics};
+  if (planned.summary.contains("statistics"))
+    FieldReader::read(planned.summary["statistics"], told, {file.string(), "summary.statistics", remedy});
 }
 
-void require_summary(const PlanFolder& planned, const fs::path& file) {
-  constexpr const char* remedy = "plan anew with limber plan";
-  const auto kinds_of = [&](const Json& value, const Json& example, const char* name) {
-    require_like(value, example, Keys::those_there, fmt::format("{}: given.{}", file.string(), name), remedy);
-  };
-  const Json costs{
-      {"duration_s", 0.5}, {"effort_n_s", 0.5}, {"strain_energy_j", 0.5}, {"volume_change", 0.5}};
-  kinds_of(planned.summary,
-           {{"explanation", ""},
-            {"statistics", timings_like.at("statistics")},
-            {"dynamics", timings_like.at("dynamics")},
-            {"improve", Json::object()}},
-           "summary");
-  if (planned.summary.contains("shortcut"))
-    require_like(planned.summary.at("shortcut"),
-                 {{"cost", ""}, {"rounds", -1}, {"accepted", -1}, {"before", costs}, {"after", costs}},
-                 Keys::all, file.string() + ": given.summary.shortcut", remedy);
-  if (planned.summary.contains("stiffness_shares")) {
-    const Json& shares = planned.summary.at("stiffness_shares");
-    kinds_of(shares, Json::object(), "summary.stiffness_shares");
-    for (const auto& [body, share] : shares.items()) {
-      kinds_of(share, 0.5, "summary.stiffness_shares");
-      const double value = share.get<double>();
-      if (!(value >= fem::min_stiffness_share && value <= fem::max_stiffness_share))
-        throw InputError(fmt::format(
-            "{}: given.summary.stiffness_shares.{} is {}; it must be in [{}, {}]; {}", file.string(), body,
-            share.dump(), fem::min_stiffness_share, fem::max_stiffness_share, remedy));
+template <class T>
+void read_later(const Json& summary, const char* key, std::optional<T>& told, const JsonPlace& place,
+                std::string& wrong) {
+  if (summary.contains(key)) try {
+      FieldReader::read(summary[key], told.emplace(), place.under(key));
+    } catch (const InputError& error) {
+      told.reset(), wrong = error.what();
     }
-  }
-  if (begins_elsewhere(planned))
-    require_like(planned.summary.at("from"), {{"folder", ""}, {"frame", -1}, {"trajectory_hash", ""}},
-                 Keys::all, file.string() + ": given.summary.from",
-                 planned.plan.simulation ? "simulate anew with limber simulate" : remedy);
-  if (planned.summary.contains("follows"))
-    require_like(planned.summary.at("follows"),
-                 {{"folder", ""},
-                  {"trajectory_hash", ""},
-                  {"farthest_from_path_m", 0.5},
-                  {"largest_force_n", 0.5},
-                  {"distance_m", 0.5},
-                  {"speed_m_s", 0.5},
-                  {"reaches", true}},
-                 Keys::all, file.string() + ": given.summary.follows", "simulate anew with limber simulate");
-  kinds_of(planned.cage_hashes, Json::object(), "cage_hashes");
-  for (const auto& [body, hash] : planned.cage_hashes.items()) kinds_of(hash, "", "cage_hashes");
+}
+
+// Of the summary of a plan or a simulation what others go by, each number in its range.
+PlanTold told_in(const Json& summary, const JsonPlace& given) {
+  PlanTold told;
+  const JsonPlace place = given.under("summary");
+  FieldReader::read(summary, told, place);
+  read_later(summary, "improve", told.improve, place, told.wrong);
+  read_later(summary, "refine", told.refine, place, told.wrong);
+  read_later(summary, "portfolio", told.portfolio, place, told.wrong);
+  require_like(summary, {{"statistics", statistics_like}, {"dynamics", dynamics_like}}, Keys::those_there,
+               fmt::format("{}: {}", place.what, place.path), place.remedy);
+  for (const auto& [body, share] : told.stiffness_shares)
+    if (!(share >= fem::min_stiffness_share && share <= fem::max_stiffness_share))
+      place.under("stiffness_shares")
+          .under(body)
+          .refuse_range(share, fem::min_stiffness_share, fem::max_stiffness_share);
+  return told;
 }
 
 }  // namespace
@@ -132,7 +142,7 @@ void write_plan_folder(const fs::path& folder, const plan::Plan& plan, const sce
   if (std::error_code ignored; timings.is_null())
     fs::remove(folder / timings_file, ignored);
   else
-    write_json(folder / timings_file, {{"of", motion_of(plan)}, {"summary", std::move(timings)}});
+    write_json(folder / timings_file, json_of_fields(Timings{motion_of(plan), std::move(timings)}));
 }
 
 Json kept_summary(const PlanFolder& planned) {
@@ -164,24 +174,20 @@ PlanFolder read_plan_folder(const fs::path& folder) {
   plan::PlanFile read = plan::read_plan(file);
   result.plan = std::move(read.plan);
   result.edition = read.edition;
-  const Json& extra = read.given;
-  try {
-    scenes::ScriptText script;
-    if (extra.contains("script"))
-      extra.at("script").at("text").get_to(script.text),
-          extra.at("script").at("name").get_to(script.name_for_messages);
-    result.scene = scenes::read_scene(extra.at("scene").get<std::string>(), file.string() + " (scene)",
-                                      extra.at("sets").get<std::vector<std::string>>(), script);
-    if (!result.plan.simulation) scenes::require_plannable(result.scene);
-    result.summary = extra.at("summary");
-    result.cage_hashes = extra.at("cage_hashes");
-    result.version = extra.at("version").get<std::string>();
-    require_summary(result, file);
-    add_timings(folder, result);
-  } catch (const Json::exception& error) {
-    throw InputError(fmt::format("{}: its meta.json is not limber's ({}); plan anew with limber plan",
-                                 file.string(), error.what()));
-  }
+  const JsonPlace place{
+      file.string(), "given",
+      result.plan.simulation ? "simulate anew with limber simulate" : "plan anew with limber plan"};
+  Given given;
+  FieldReader::read(read.given, given, place);
+  scenes::ScriptText script;
+  if (given.script) script.text = given.script->text, script.name_for_messages = given.script->name;
+  result.scene = scenes::read_scene(given.scene, file.string() + " (scene)", given.sets, script);
+  if (!result.plan.simulation) scenes::require_plannable(result.scene);
+  result.told = told_in(given.summary, place);
+  result.summary = std::move(given.summary);
+  result.cage_hashes.insert(given.cage_hashes.begin(), given.cage_hashes.end());
+  result.version = given.version;
+  add_timings(folder, result);
   result.file_hash = hash_of(std::string_view(read_file(file)));
   return result;
 }
@@ -202,11 +208,11 @@ PlanFolder read_folder_from_the_start(const fs::path& folder, const std::string&
     throw InputError(
         fmt::format("{}: begins as frame {} of another motion, and {} takes plans from their scene's start "
                     "alone; name the folder of one",
-                    folder.string(), planned.summary.at("from").at("frame").get<int>(), what));
+                    folder.string(), planned.told.from->frame, what));
   return planned;
 }
 
-bool begins_elsewhere(const PlanFolder& planned) { return planned.summary.contains("from"); }
+bool begins_elsewhere(const PlanFolder& planned) { return planned.told.from.has_value(); }
 
 FemSystem system_of(const PlanFolder& planned, const fem::World& world,
                     const std::vector<PreparedBody>& bodies) {
@@ -239,8 +245,7 @@ void require_of_world(const plan::Plan& plan, const fem::World& world, const fs:
 fem::World world_of(const PlanFolder& planned, const std::vector<PreparedBody>& bodies,
                     StiffnessShares which) {
   std::map<std::string, double> shares;
-  if (which == StiffnessShares::told && planned.summary.contains("stiffness_shares"))
-    planned.summary.at("stiffness_shares").get_to(shares);
+  if (which == StiffnessShares::told) shares = planned.told.stiffness_shares;
   const State start = planned.plan.tree.states[0];
   return build_world(planned.scene, bodies,
                      begins_elsewhere(planned) ? std::vector<float>() : start.positions, shares);
@@ -250,7 +255,8 @@ std::vector<PreparedBody> read_caged_bodies_of(const PlanFolder& planned, const 
   std::vector<PreparedBody> bodies = read_bodies(planned.scene, folder);
   for (std::size_t b = 0; b < bodies.size(); ++b) {
     const std::string& name = planned.scene.bodies[b].name;
-    if (planned.cage_hashes.value(name, "") != hex(hash_of(bodies[b].cage)))
+    if (const auto told = planned.cage_hashes.find(name);
+        told == planned.cage_hashes.end() || told->second != hex(hash_of(bodies[b].cage)))
       throw InputError(
           fmt::format("{}: the cage has changed since the plan was made; plan anew with limber plan",
                       body_folder(folder, planned.scene.bodies[b]).string()));

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "limber/detail/body/body.h"
+#include "limber/detail/plan/plan_told.h"
 #include "limber/detail/world/analysis.h"
 #include "limber/detail/world/fem_system.h"
 #include "plan/plan_file.h"
@@ -19,10 +20,11 @@ struct PlanFolder {
   plan::Plan plan;
   scenes::Scene scene;
   Json summary;  // as `limber plan --json` printed it; without costs where timings.json is not there
-  std::uint64_t file_hash;  // of plan.npz
-  Json cage_hashes;         // by body name
-  std::string version;      // of the limber that wrote it
-  int edition;              // as plan::PlanFile
+  std::uint64_t file_hash;                         // of plan.npz
+  PlanTold told;                                   // of the summary
+  std::map<std::string, std::string> cage_hashes;  // by body name
+  std::string version;                             // of the limber that wrote it
+  int edition;                                     // as plan::PlanFile
   bool sealed() const { return edition >= plan::first_sealed; }
 };
 

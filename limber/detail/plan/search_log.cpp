@@ -3,6 +3,7 @@
 #include <sstream>
 
 #include "core/error.h"
+#include "core/json_fields.h"
 
 namespace limber::detail {
 
@@ -21,15 +22,22 @@ std::string line_of(const plan::SearchProgress& m) {
   return json.dump() + "\n";
 }
 
+struct LineTold {
+  double iteration = 0;
+  template <class Fields>
+  void fields(Fields& f) {
+    f("iteration", iteration);
+  }
+};
+
 }  // namespace
 
 SearchLog::SearchLog(fs::path path, std::int64_t keep_up_to) : path_(std::move(path)) {
   std::istringstream earlier(keep_up_to > 0 && fs::exists(path_) ? read_file(path_) : std::string());
   for (std::string line; std::getline(earlier, line);) {
-    const Json json = parse_json(line, path_.string());
-    if (!json.is_object() || !json.contains("iteration") || !json.at("iteration").is_number())
-      throw InputError(fmt::format("{}: is not a file of --stats; name another", path_.string()));
-    if (json.at("iteration").get<double>() <= double(keep_up_to)) lines_ += line + "\n";
+    const auto told = fields_or_nothing<LineTold>(parse_json(line, path_.string()));
+    if (!told) throw InputError(fmt::format("{}: is not a file of --stats; name another", path_.string()));
+    if (told->iteration <= double(keep_up_to)) lines_ += line + "\n";
   }
   write_file(path_, lines_);  // a place that cannot be written is told before the search
 }

@@ -69,9 +69,8 @@ Beginning beginning_of(const fs::path& from, std::optional<int> frame, const fs:
   const PlanFolder other = read_plan_folder(from);
   const int chosen = frame.value_or(int(other.plan.trajectory.frames.size()) - 1);
   return {start_from(from, other, chosen, scene, world),
-          {{"folder", fs::relative(from, out).generic_string()},
-           {"frame", chosen},
-           {"trajectory_hash", hex(plan::hash_of(other.plan.trajectory))}}};
+          BeginningTold{fs::relative(from, out).generic_string(), chosen,
+                        hex(plan::hash_of(other.plan.trajectory))}};
 }
 
 void require_other_folder(const fs::path& from, const fs::path& out) {
@@ -158,8 +157,8 @@ KeptPlan simulate(const SimulateOptions& options) {
     plan.simulation->ending = plan::Simulation::stopped;
   }
   Json extra;
-  if (!beginning.from.is_null()) extra["from"] = beginning.from;
-  if (followed) extra["follows"] = followed->facts(plan, options.out);
+  if (beginning.from) extra["from"] = json_of_fields(*beginning.from);
+  if (followed) extra["follows"] = json_of_fields(followed->facts(plan, options.out));
   KeptPlan kept = keep_measured_plan(options.out, scene, bodies, world, system, plan, figures, extra);
   if (stop_signal() != 0) {
     log::info("{}: what was simulated is kept; {}", file.string(),

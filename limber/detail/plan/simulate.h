@@ -27,8 +27,8 @@ State start_from(const fs::path& folder, const PlanFolder& other, int frame, con
                  const fem::World&);
 
 struct Beginning {
-  std::optional<State> start;  // nothing: the scene's
-  Json from;                   // what the summary tells of it; null likewise
+  std::optional<State> start;         // nothing: the scene's
+  std::optional<BeginningTold> from;  // what the summary tells of it; nothing likewise
 };
 // `from` may be empty, then there is no frame; the summary is of a motion in `out`. Throws as start_from.
 Beginning beginning_of(const fs::path& from, std::optional<int> frame, const fs::path& out,

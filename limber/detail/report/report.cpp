@@ -11,6 +11,7 @@
 #include "core/log.h"
 #include "core/version.h"
 #include "fem/observe.h"
+#include "limber/detail/film/render.h"
 #include "limber/detail/plan/manifest.h"
 #include "limber/detail/plan/plan_folder.h"
 #include "limber/detail/plan/tree_plot.h"
@@ -326,7 +327,7 @@ void tables(const Findings& f, Page& page) {
                     fmt::format("{:.4g}", body.material.youngs_modulus_pa),
                     fmt::format("{:.2f}", 100 * f.figures.largest_volume_change[b])});
     double sum = 0;
-    for (const auto& [stage, s] : prepared.report.at("cpu_seconds").items()) sum += s.get<double>();
+    for (const auto& [stage, s] : prepared.report.cpu_seconds) sum += s;
     times.push_back({"prepare " + body.name, seconds(sum)});
   }
   page.table({"body", "kind", "vertices", "triangles", "tets", "mass, kg", "Young's modulus, Pa",
@@ -342,8 +343,8 @@ void tables(const Findings& f, Page& page) {
     if (const auto key = std::string(part) + "_cpu_s"; dynamics.contains(key))
       times.push_back({std::string("of the dynamics, searching and replaying: ") + part,
                        seconds(dynamics.at(key).get<double>())});
-  if (const Json entries = read_manifest(f.folder); entries.contains("render"))
-    times.push_back({"render, last run", seconds(entries.at("render").value("cpu_s", 0.0))});
+  if (const auto film = fields_or_nothing<FilmTold>(read_manifest(f.folder).value("render", Json())))
+    times.push_back({"render, last run", seconds(film->cpu_s)});
   page.table({"stage", "CPU s"}, times);
   if (known)
     page.add(

@@ -53,16 +53,16 @@ void check_beginning(const fs::path& folder, const PlanFolder& planned, const fe
     table.row("it starts as the scene says", same_bits(start, fem::start_state(world)), "");
     return;
   }
-  const Json& from = planned.summary.at("from");
-  const fs::path other = folder / from.at("folder").get<std::string>();
-  const int frame = from.at("frame").get<int>();
+  const BeginningTold& from = planned.told.from.value();
+  const fs::path other = folder / from.folder;
+  const int frame = from.frame;
   const std::string promise = fmt::format("it starts as frame {} of another motion", frame),
                     name = other.lexically_normal().string();
   std::string why;
   try {
     const PlanFolder there = read_plan_folder(other);
     read_bodies_of(there, other);
-    if (hex(plan::hash_of(there.plan.trajectory)) == from.at("trajectory_hash")) {
+    if (hex(plan::hash_of(there.plan.trajectory)) == from.trajectory_hash) {
       table.row(promise, starts_from(other, there, frame, planned.scene, world, start),
                 fmt::format("{}, of which limber verify tells apart", name));
       return;

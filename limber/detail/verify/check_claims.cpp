@@ -5,7 +5,7 @@
 // not win): of those it is checked that they could be so, and that they end in what the path costs now. A key
 // that limber does not write there is a fault as well: so nobody can hide a claim beside those that are
 // checked. What the plan cost is no claim.
-#include <set>
+#include <optional>
 
 #include "core/error.h"
 #include "limber/detail/verify/plan_checks.h"
@@ -34,90 +34,91 @@ std::string first_difference(const Json& a, const Json& b) {
 
 namespace {
 
-bool has_just(const Json& table, const std::set<std::string>& keys) {
-  if (!table.is_object() || table.size() != keys.size()) return false;
-  return std::all_of(keys.begin(), keys.end(), [&](const std::string& key) { return table.contains(key); });
+// Whether the table holds what was read from it, and nothing else.
+template <class T>
+bool holds_just(const Json& table, const T& told) {
+  return first_difference(json_of_fields(told), table).empty();
 }
 
 // In the kind that the shortcuts were asked to make less of.
-double cost_of(const Json& costs, const std::string& kind) {
-  plan::Costs c;
-  costs.at("duration_s").get_to(c.duration_s), costs.at("effort_n_s").get_to(c.effort_n_s);
-  costs.at("strain_energy_j").get_to(c.strain_energy_j), costs.at("volume_change").get_to(c.volume_change);
-  return plan::cost_in(c, plan::cost_kind_from(kind));
+double cost_of(const CostsTold& told, const std::string& kind) {
+  return plan::cost_in(told.costs, plan::cost_kind_from(kind));
 }
 
-// Of a path in `tets`, that came after the search: whether what is told of it could be so, and ends with what
-// the path costs now. "" or the table that does not. Costs must fall from one improvement to the next, and
-// counts must not exceed those of which they are a part.
-std::string wrong_of_later(const Json& summary, const plan::Plan& plan, const Json& costs_now,
-                           std::int64_t tets) {
-  bool told = false, now = false;
-  if (summary.contains("shortcut")) {
-    const Json& s = summary.at("shortcut");
-    if (!has_just(s, {"rounds", "cost", "accepted", "before", "after"}) ||
-        cost_of(s.at("after"), s.at("cost")) > cost_of(s.at("before"), s.at("cost")))
-      return "shortcut";
-    told = true, now = now || s.at("after") == costs_now;
+bool same_costs(const CostsTold& a, const std::optional<plan::Costs>& b) {
+  return b && json_of_fields(a) == json_of_fields(CostsTold{*b});
+}
+
+// "" or what of it could not be so: costs must fall from one improvement to the next, and counts must not
+// exceed those of which they are a part.
+std::string wrong_in(const ImproveTold& s) {
+  CostsTold last = s.first;
+  for (const ImproveTold::Improvement& better : s.improvements) {
+    if (cost_of(better.costs, s.cost) >= cost_of(last, s.cost) || better.iterations > s.iterations ||
+        better.search > s.searches)
+      return "improve.improvements";
+    last = better.costs;
   }
-  if (summary.contains("improve")) {
-    const Json& s = summary.at("improve");
-    if (!has_just(s, {"cost", "first", "improvements", "searches", "solved", "iterations"})) return "improve";
-    Json last = s.at("first");
-    for (const Json& better : s.at("improvements")) {
-      if (!has_just(better, {"iterations", "search", "costs"}) ||
-          cost_of(better.at("costs"), s.at("cost")) >= cost_of(last, s.at("cost")) ||
-          better.at("iterations") > s.at("iterations") || better.at("search") > s.at("searches"))
-        return "improve.improvements";
-      last = better.at("costs");
-    }
-    if (s.at("solved") > s.at("searches") || s.at("solved") < s.at("improvements").size())
-      return "improve.solved";
-    told = true, now = now || last == costs_now;
-  }
-  if (told && plan.solved() && !now) return summary.contains("improve") ? "improve" : "shortcut.after";
-  if (!summary.contains("refine")) return "";
-  const Json& s = summary.at("refine");
-  std::set<std::string> keys{"how", "tracked_s", "largest_error_m", "iterations", "coarse_tets", "tets"};
-  if (s.contains("replay_distance_m")) keys.insert("replay_distance_m");  // not told by older limbers
-  if (!has_just(s, keys) || s.at("tets") != tets) return "refine";
-  const std::string how = s.at("how");
-  if (how == "replanned" || how == "failed") return "";
-  if (how != "replayed" && how != "tracked") return "refine.how";
-  // A chain of nodes, each an iteration of no search, before those that came later.
+  return s.solved > s.searches || s.solved < std::ssize(s.improvements) ? "improve.solved" : "";
+}
+
+// A chain of nodes, each an iteration of no search, before those that came later.
+bool is_carried_chain(const plan::Plan& plan, const RefineTold& told) {
   plan::Statistics none;
   none.iterations = plan.statistics.iterations;
   if (plan::without_timings(plan::json_of(none)) != plan::without_timings(plan::json_of(plan.statistics)) ||
-      s.at("iterations") != 0)
-    return "refine";
+      told.iterations != 0)
+    return false;
   const std::vector<std::int64_t>& of = plan.tree.iterations;
   for (std::size_t n = 1; n < of.size(); ++n)
-    if (of[n] != (std::int64_t(n) <= none.iterations ? std::int64_t(n) - 1 : -1)) return "refine";
-  return "";
+    if (of[n] != (std::int64_t(n) <= none.iterations ? std::int64_t(n) - 1 : -1)) return false;
+  return true;
+}
+
+// Of a path in `tets`, that came after the search: whether what is told of it could be so, and ends with what
+// the path costs now. "" or the table that does not.
+std::string wrong_of_later(const Json& summary, const PlanTold& told, const plan::Plan& plan,
+                           const std::optional<plan::Costs>& costs_now, std::int64_t tets) {
+  bool now = false;
+  if (const auto& s = told.shortcut) {
+    if (!holds_just(summary["shortcut"], *s) || cost_of(s->after, s->cost) > cost_of(s->before, s->cost))
+      return "shortcut";
+    now = same_costs(s->after, costs_now);
+  }
+  if (const auto& s = told.improve) {
+    if (!holds_just(summary["improve"], *s)) return "improve";
+    if (const std::string wrong = wrong_in(*s); !wrong.empty()) return wrong;
+    now = now || same_costs(s->improvements.empty() ? s->first : s->improvements.back().costs, costs_now);
+  }
+  if ((told.shortcut || told.improve) && plan.solved() && !now)
+    return told.improve ? "improve" : "shortcut.after";
+  if (!told.refine) return "";
+  const RefineTold& s = *told.refine;
+  if (!holds_just(summary["refine"], s) || s.tets != tets) return "refine";
+  if (s.how == "replanned" || s.how == "failed") return "";
+  if (s.how != "replayed" && s.how != "tracked") return "refine.how";
+  return is_carried_chain(plan, s) ? "" : "refine";
 }
 
 // That a portfolio tells of this plan, and of no search that would have won instead. The others are not done
 // again. Seeds follow one another; the fewest iterations win, of equals the first.
-bool is_quickest(const plan::Plan& plan, const Json& portfolio) try {
-  const Json& searches = portfolio.at("searches");
+bool is_quickest(const plan::Plan& plan, const PortfolioTold& portfolio) {
   bool own = false;
-  std::uint64_t seed = searches.at(0).at("seed").get<std::uint64_t>();
+  if (portfolio.searches.empty()) return false;
+  std::uint64_t seed = portfolio.searches[0].seed;
   std::int64_t sum = 0;
-  for (const Json& search : searches) {
-    const std::int64_t iterations = search.at("iterations").get<std::int64_t>();
-    const bool solved = search.at("solved").get<bool>(), earlier = seed < plan.settings.seed;
-    if (search.at("seed") != seed) return false;
+  for (const PortfolioTold::Search& search : portfolio.searches) {
+    const bool earlier = seed < plan.settings.seed;
+    if (search.seed != seed) return false;
     if (seed++ == plan.settings.seed) {
-      own = solved == plan.solved() && iterations == plan.statistics.iterations;
-    } else if (solved && (!plan.solved() || iterations < plan.statistics.iterations ||
-                          (earlier && iterations == plan.statistics.iterations))) {
+      own = search.solved == plan.solved() && search.iterations == plan.statistics.iterations;
+    } else if (search.solved && (!plan.solved() || search.iterations < plan.statistics.iterations ||
+                                 (earlier && search.iterations == plan.statistics.iterations))) {
       return false;
     }
-    sum += iterations;
+    sum += search.iterations;
   }
-  return own && portfolio.at("iterations") == sum;
-} catch (const Json::exception&) {
-  return false;
+  return own && portfolio.iterations == sum;
 }
 
 }  // namespace
@@ -146,21 +147,20 @@ void check_claims(const PlanFolder& planned, const fem::World& world, const FemS
     if (!facts.contains(key) && key != "shortcut" && key != "improve" && key != "refine" &&
         key != "portfolio" && key != "from")
       wrong = "summary." + key;
-  if (told.contains("portfolio") && !is_quickest(plan, told.at("portfolio"))) wrong = "summary.portfolio";
+  if (planned.told.portfolio && !is_quickest(plan, *planned.told.portfolio)) wrong = "summary.portfolio";
   std::vector<Control> controls = plan.trajectory.controls;
   if (plan.trajectory.settle_steps > 0) controls.pop_back();
   std::int64_t tets = 0;
   for (const fem::Body& body : world.bodies) tets += body.cage.tets.rows();
-  const bool came_later = told.contains("shortcut") || told.contains("improve");
-  const Json costs = came_later ? plan::json_of(plan::path_of(system, settings, controls).costs) : Json();
+  std::optional<plan::Costs> costs;
+  if (planned.told.shortcut || planned.told.improve) costs = plan::path_of(system, settings, controls).costs;
   try {
-    const std::string later = wrong_of_later(told, plan, costs, tets);
+    const std::string later = wrong_of_later(told, planned.told, plan, costs, tets);
     if (!later.empty()) wrong = "summary." + later;
-  } catch (const Json::exception& error) {
-    wrong = fmt::format("its summary ({})", error.what());
   } catch (const InputError& error) {
     wrong = fmt::format("its summary ({})", error.what());
   }
+  if (!planned.told.wrong.empty()) wrong = fmt::format("its summary ({})", planned.told.wrong);
   table.row("what the plan tells of itself is so", wrong.empty(), wrong.empty() ? "" : wrong + " is not");
 }
 

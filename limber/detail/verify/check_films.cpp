@@ -18,15 +18,13 @@ namespace limber::detail {
 
 namespace {
 
-// The options that a film's entry tells, of the kinds that they must be.
-RenderOptions options_of(const fs::path& folder, const std::string& suffix, const Json& entry) {
+// The options that a film's entry tells.
+RenderOptions options_of(const fs::path& folder, const std::string& suffix, const FilmTold& entry) {
   RenderOptions options;
   options.folder = folder;
-  options.camera = entry.at("camera").get<std::string>();
-  options.sets = entry.at("sets").get<std::vector<std::string>>();
-  options.passes = entry.at("passes").get<std::vector<std::string>>();
-  options.bits = entry.at("bits").get<int>();
-  options.size = fmt::format("{}x{}", entry.at("size").at(0).get<int>(), entry.at("size").at(1).get<int>());
+  options.camera = entry.camera;
+  options.sets = entry.sets, options.passes = entry.passes, options.bits = entry.bits;
+  options.size = fmt::format("{}x{}", entry.size[0], entry.size[1]);
   if (!suffix.empty() && suffix != "-" + options.camera) options.name = suffix.substr(1);
   for (const std::string& pass : options.passes)
     if (std::find(pass_names.begin(), pass_names.end(), pass) == pass_names.end())
@@ -36,24 +34,22 @@ RenderOptions options_of(const fs::path& folder, const std::string& suffix, cons
   return options;
 }
 
-// What the entry says otherwise than the film is, or could not be; empty: nothing.
-std::string false_word(const Json& entry, Json is) {
-  const auto count = [&](const char* key) { return entry.at(key).get<std::int64_t>(); };
-  if (count("failed") < 0 || count("painted") < 0 || count("painted") + count("failed") > count("wanted") ||
-      count("wanted") > count("frames"))
+// What the entry says otherwise than the film `is`, or could not be; empty: nothing.
+std::string false_word(const Json& entry, const FilmTold& told, FilmTold is) {
+  if (told.failed < 0 || told.painted < 0 || told.painted + told.failed > told.wanted ||
+      told.wanted > told.frames)
     return "it counts more frames than there are";
-  for (const char* key : {"wanted", "painted", "failed", "cpu_s"}) is[key] = entry.at(key);  // what was done
+  if (told.film.has_value() != told.sheet.has_value()) return "a film has a contact sheet";
+  // What was done, and where.
+  is.wanted = told.wanted, is.painted = told.painted, is.failed = told.failed, is.cpu_s = told.cpu_s;
+  is.film = told.film, is.sheet = told.sheet;
   // A work folder may have been moved; what its frames are called may not.
-  const fs::path folder = entry.at("folder").get<std::string>();
-  if (folder.filename() == fs::path(is.at("folder").get<std::string>()).filename())
-    is["folder"] = entry.at("folder");
-  if (entry.contains("film") != entry.contains("sheet")) return "a film has a contact sheet";
-  for (const char* key : {"film", "sheet"})
-    if (entry.contains(key)) is[key] = entry.at(key).get<std::string>();
-  for (const auto& [key, value] : is.items())
+  if (told.folder.filename() == is.folder.filename()) is.folder = told.folder;
+  const Json all = json_of_fields(is);
+  for (const auto& [key, value] : all.items())
     if (entry.at(key) != value)
       return fmt::format("{} is {}, and not {}", key, value.dump(), entry.at(key).dump());
-  return entry.size() == is.size() ? "" : "it holds more than limber writes there";
+  return entry.size() == all.size() ? "" : "it holds more than limber writes there";
 }
 
 // What a frame's file holds that limber did not write there; empty: nothing.
@@ -152,10 +148,9 @@ std::string other_picture(const Filming& filming, Shot::Painter& painter, int fr
 
 // What was written beside the frames' folder is here, wherever that was then, and so is what has such a name
 // here: another folder's film is no word for this one's.
-fs::path found(const fs::path& folder, const Json& entry, const char* key) {
-  const fs::path told = entry.at(key).get<std::string>(), frames = entry.at("folder").get<std::string>();
+fs::path found(const fs::path& folder, const FilmTold& entry, const fs::path& told) {
   const fs::path here = folder / told.filename();
-  return told.parent_path() == frames.parent_path() || fs::exists(here) ? here : told;
+  return told.parent_path() == entry.folder.parent_path() || fs::exists(here) ? here : told;
 }
 
 constexpr std::string_view stage = "render";
@@ -195,16 +190,19 @@ std::vector<std::string> untold_passes(const Filming& filming) {
   return untold;
 }
 
-void check_film(const fs::path& folder, const std::string& suffix, const Json& entry, int repaint,
+void check_film(const fs::path& folder, const std::string& suffix, const Json& written, int repaint,
                 Promises& table) {
+  const FilmTold entry = read_fields<FilmTold>(
+      written, "manifest.json",
+      "it does not tell what a film is made by; an older limber's did not: render it again");
   RenderOptions options = options_of(folder, suffix, entry);
   const Filming filming(options);
   const std::string name = "film" + suffix + ": ";
-  const std::string wrong = false_word(entry, json_of(filming.told(options)));
+  const std::string wrong = false_word(written, entry, told_of(filming.told(options)));
   table.row(name + "manifest.json tells of this film", wrong.empty(), wrong);
 
   const int count = filming.shot->frames();
-  const bool is_whole = entry.contains("film");
+  const bool is_whole = entry.film.has_value();
   std::vector<int> good, bad;
   for (int f = 0; f < count; ++f) {
     throw_if_stopped();
@@ -251,7 +249,7 @@ void check_film(const fs::path& folder, const std::string& suffix, const Json& e
                           : other + " has others (another OSMesa may paint otherwise)");
   if (!is_whole) return;
 
-  const fs::path told = found(folder, entry, "film");
+  const fs::path told = found(folder, entry, *entry.film);
   for (const fs::path& film : same_named(folder, suffix, told)) {
     const fs::path again = scratch.path() / ("again" + film.extension().string());
     render::make_film(filming.paths(), filming.planned.scene.film.frames_per_second, again);
@@ -260,7 +258,7 @@ void check_film(const fs::path& folder, const std::string& suffix, const Json& e
               film_is ? film.string()
                       : film.string() + " has others, or is not there (another ffmpeg makes others)");
   }
-  const fs::path sheet = found(folder, entry, "sheet");
+  const fs::path sheet = found(folder, entry, *entry.sheet);
   const bool sheet_is = fs::exists(sheet) && render::read_png(sheet) == filming.sheet();
   table.row(name + "contact sheet made again from its frames: the same pixels", sheet_is, sheet.string());
 }
@@ -302,9 +300,6 @@ void check_films(const fs::path& folder, int repaint, Promises& table) {
     const std::string suffix = key.substr(stage.size());
     try {
       check_film(folder, suffix, entry, repaint, table);
-    } catch (const Json::exception&) {
-      table.row("film" + suffix + ": manifest.json tells of this film", false,
-                "it does not tell what a film is made by; an older limber's did not: render it again");
     } catch (const InputError& error) {
       table.row("film" + suffix + ": manifest.json tells of this film", false, error.what());
     }

@@ -79,7 +79,7 @@ void check_search(const PlanFolder& planned, const FemSystem& system, const plan
                   Promises& table) {
   const plan::Plan& plan = planned.plan;
   const plan::Tree& tree = plan.tree;
-  const bool carried = planned.summary.contains("refine");
+  const bool carried = planned.told.refine.has_value();
   int searched = 1;  // the start is the world's
   bool same = same_bits(tree.states[0], system.start()) && tree.iterations[0] == -1 &&
               same_bits(tree.controls[0], Control{}) &&
@@ -95,7 +95,7 @@ void check_search(const PlanFolder& planned, const FemSystem& system, const plan
                          now.rejected == then.rejected && now.refused == then.refused &&
                          now.rollout_steps == then.rollout_steps;
     searched = found.tree.size();  // none where it went astray
-    const bool later = planned.summary.contains("shortcut") || planned.summary.contains("improve");
+    const bool later = planned.told.shortcut || planned.told.improve;
     same = searched > 0 && searched <= tree.size() && same_nodes(found.tree, tree, searched) &&
            found.legs.size() == plan.legs.size() && found.solved() == plan.solved();
     for (std::size_t leg = 0; same && leg < plan.legs.size(); ++leg)

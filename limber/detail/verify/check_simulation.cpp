@@ -21,8 +21,8 @@ namespace {
 void check_following(const fs::path& folder, const PlanFolder& planned, const fem::World& world,
                      Promises& table) {
   const plan::Plan& plan = planned.plan;
-  const Json told = planned.summary.value("follows", Json::object());
-  const fs::path other = folder / told.value("folder", "");
+  const FollowingTold told = planned.told.follows.value_or(FollowingTold{});
+  const fs::path other = folder / told.folder;
   const std::string promise = "each control is the follower's of another plan",
                     name = other.lexically_normal().string();
   double largest = 0;
@@ -35,8 +35,7 @@ void check_following(const fs::path& folder, const PlanFolder& planned, const fe
   std::string why;
   try {
     followed.emplace(other, planned.scene, world);
-    if (followed->facts(plan, folder).at("trajectory_hash") != told.value("trajectory_hash", ""))
-      why = "holds another plan";
+    if (followed->facts(plan, folder).trajectory_hash != told.trajectory_hash) why = "holds another plan";
   } catch (const InputError&) {
     why = "is not here";
   }
@@ -53,7 +52,8 @@ void check_following(const fs::path& folder, const PlanFolder& planned, const fe
     same = same_bits(control, there);
   }
   table.row(promise, same, fmt::format("{}, of which limber verify tells apart", name));
-  table.row("what it tells of following is so", followed->facts(plan, folder) == told, "");
+  table.row("what it tells of following is so",
+            json_of_fields(followed->facts(plan, folder)) == planned.summary.value("follows", Json()), "");
 }
 
 // Every figure of the summary worked out again. `from` and `follows` tell of other motions, and are checked

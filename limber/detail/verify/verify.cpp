@@ -33,8 +33,8 @@ void require_of_found_world(const PlanFolder& planned, const fem::World& world, 
   try {
     require_of_world(planned.plan, world, folder);
   } catch (const InputError& error) {
-    const Json told = planned.summary.value("stiffness_shares", Json()), found = stiffness_shares_of(world);
-    if (told.is_null() || told == found) throw;
+    const auto &told = planned.told.stiffness_shares, found = stiffness_shares_of(world);
+    if (told.empty() || told == found) throw;
     throw InputError(
         fmt::format("{}; it was planned with shares of stiffness {}, and those of its bodies are {}: remove "
                     "bodies/NAME/stiffness.json",

@@ -67,10 +67,10 @@ void check_cage(const std::string& name, const PreparedBody& body, const Prepare
       fmt::format("{} of {}", c.triangles_crossing, c.triangles));
   row(": boundary of the cage is a manifold", c.nonmanifold_edges + c.nonmanifold_vertices == 0,
       fmt::format("{} edges and {} vertices are not", c.nonmanifold_edges, c.nonmanifold_vertices));
-  const Json& written = body.report.at("certificate");
+  const BodyReport::Certificate& written = body.report.certificate.value();
   table.row(name + ": certificate is of these meshes",
-            written.at("surface_hash") == hex(c.surface_hash) &&
-                written.at("cage_hash") == hex(c.cage_hash) && written.at("holds") == c.holds(),
+            written.surface_hash == hex(c.surface_hash) && written.cage_hash == hex(c.cage_hash) &&
+                written.holds == c.holds(),
             fmt::format("dihedrals {:.1f} … {:.1f} degrees", c.min_dihedral_deg, c.max_dihedral_deg));
 }
 
@@ -79,19 +79,17 @@ void check_shells(const std::string& name, const PreparedBody& body, const Prepa
   const meshing::ShellCheck c = meshing::check_shells(shells, body.surface);
   table.row(name + ": shells are convex", c.not_convex == 0 && !shells.empty(),
             fmt::format("{} of {} are not", c.not_convex, shells.size()));
-  const Json& said = body.report.at("shells");
-  table.row(name + ": shells cover the surface",
-            c.vertices_uncovered <= said.value("vertices_uncovered", std::int64_t(0)) &&
-                c.triangles_uncovered <= said.at("triangles_uncovered").get<std::int64_t>(),
-            fmt::format("{} vertices and {} triangles not, {} by the report", c.vertices_uncovered,
-                        c.triangles_uncovered, said.at("triangles_uncovered").get<std::int64_t>()));
-  const auto is = [&](const char* key, double value) {
-    return std::abs(said.at(key).get<double>() - value) <= rounding * value;
-  };
+  const BodyReport::Shells& said = body.report.shells.value();
+  table.row(
+      name + ": shells cover the surface",
+      c.vertices_uncovered <= said.vertices_uncovered && c.triangles_uncovered <= said.triangles_uncovered,
+      fmt::format("{} vertices and {} triangles not, {} by the report", c.vertices_uncovered,
+                  c.triangles_uncovered, said.triangles_uncovered));
+  const auto is = [&](double told, double value) { return std::abs(told - value) <= rounding * value; };
   // Of inflated shells the report tells of those before.
   if (settings.inflate == 0)
     table.row(name + ": shells stand off the surface by what is said",
-              is("mean_overshoot", c.mean_overshoot) && is("max_overshoot", c.max_overshoot),
+              is(said.mean_overshoot, c.mean_overshoot) && is(said.max_overshoot, c.max_overshoot),
               fmt::format("mean {:.3f} %, largest {:.3f} % of the diagonal", 100 * c.mean_overshoot,
                           100 * c.max_overshoot));
   bool labelled = body.shell_from_tet.size() == std::size_t(body.cage.tets.rows());
@@ -152,12 +150,12 @@ void check_contact(const std::string& name, const PreparedBody& body, Promises& 
 }
 
 // A key of the report that limber does not write there, "" where there is none.
-std::string odd_key(const Json& report, const Json& facts, const Json& making, std::size_t files) {
+std::string odd_key(const BodyReport& report, const Json& facts, const Json& making, std::size_t files) {
   const std::set<std::string> known{
       "version",       "model",    "input", "found",       "left",
       "mended",        "warnings", "files", "cpu_seconds", "peak_memory_mb_after",
       "peak_memory_mb"};
-  for (const auto& [table, value] : report.items()) {
+  for (const auto& [table, value] : report.json.items()) {
     const bool of_facts = facts.contains(table), of_making = making.contains(table);
     if (!of_facts && !of_making && !known.contains(table)) return table;
     if (!of_facts && !of_making) continue;
@@ -165,7 +163,7 @@ std::string odd_key(const Json& report, const Json& facts, const Json& making, s
       if (!facts.value(table, Json()).contains(key) && !making.value(table, Json()).contains(key))
         return table + "." + key;
   }
-  return report.at("files").size() == files ? "" : "files";
+  return report.files.size() == files ? "" : "files";
 }
 
 void check_images(const std::string& name, const Appearance& appearance, Promises& table) {
@@ -211,32 +209,33 @@ bool same_contact(const ContactShape& a, const ContactShape& b, double size) {
 // Decomposing costs more than all else of a body, but of small ones.
 constexpr Eigen::Index small_triangles = 20'000;
 
-bool tells_of_bare_parts(const Json& shells) {
-  return shells.value("vertices_uncovered", 0) > 0 || shells.at("triangles_uncovered") > 0;
+bool tells_of_bare_parts(const BodyReport::Shells& shells) {
+  return shells.vertices_uncovered > 0 || shells.triangles_uncovered > 0;
 }
 
 // What a report tells of shells that are not made again: what follows from them and the settings, and what
-// only their making tells, as it is told. Throws InputError or Json::exception where it could not be so.
+// only their making tells, as it is told. Throws InputError where it could not be so.
 meshing::Decomposition decomposition_by_report(const std::vector<ConvexShell>& shells,
                                                const PrepareSettings& settings, double concavity,
-                                               const Json& said) {
+                                               const BodyReport::Shells& said) {
   meshing::Decomposition d;
   d.shells = shells;
   for (const ConvexShell& shell : shells)
     d.sum_of_hull_volumes += volume(SurfaceMesh{shell.vertices, shell.triangles});
-  d.mean_overshoot = said.at("mean_overshoot"), d.max_overshoot = said.at("max_overshoot");
-  d.vertices_uncovered = said.at("vertices_uncovered");
-  d.triangles_uncovered = said.at("triangles_uncovered");
+  d.mean_overshoot = said.mean_overshoot, d.max_overshoot = said.max_overshoot;
+  d.vertices_uncovered = said.vertices_uncovered;
+  d.triangles_uncovered = said.triangles_uncovered;
   const int count = int(shells.size());
   if (settings.exact)
     d.stopped_by = "exact";
   else if (concavity > 0 && d.max_overshoot <= concavity)
     d.stopped_by = "concavity";
-  else if (concavity > 0 && count == settings.shells && said.at("stopped_by") == "gain")
+  else if (concavity > 0 && count == settings.shells && said.stopped_by == "gain")
     d.stopped_by = "gain";  // the first cuts, made before the bound was looked at
   else
     d.stopped_by = count < settings.shells ? "gain" : "count";
-  d.neighbours = said.at("neighbours").get<std::vector<std::array<int, 2>>>();
+  if (!said.neighbours) throw InputError("its neighbours are not told");
+  d.neighbours = *said.neighbours;
   for (std::size_t i = 0; i < d.neighbours.size(); ++i)
     if (const auto& [one, other] = d.neighbours[i];
         one < 0 || one >= other || other >= count || (i > 0 && d.neighbours[i - 1] >= d.neighbours[i]))
@@ -279,7 +278,7 @@ Json check_making(const std::string& name, const PreparedBody& body, const Prepa
                   const std::vector<ConvexShell>& shells, const std::optional<TetMesh>& made_cage,
                   bool shells_too, Promises& table) try {
   const double size = bounding_box(body.surface.positions).diagonal();
-  const Json& said = body.report.at("shells");
+  const BodyReport::Shells& said = body.report.shells.value();
   MadeBody made;
   if (shells_too || body.surface.triangles.rows() <= small_triangles || tells_of_bare_parts(said)) {
     throw_if_stopped();
@@ -312,24 +311,17 @@ Json check_making(const std::string& name, const PreparedBody& body, const Prepa
 } catch (const InputError& error) {
   table.row(name + ": made again from the surface", false, error.what());
   return {};
-} catch (const Json::exception& error) {
-  table.row(name + ": made again from the surface", false, error.what());
-  return {};
 }
 
 // Those that prepare would take; nothing where the report's are none.
 std::optional<PrepareSettings> settings_told_of(const PreparedBody& body) {
-  try {
-    const PrepareSettings s = settings_of_input(body.report.at("input"));
-    const auto share = [](double x) { return x >= 0 && x <= 1; };
-    const std::set<std::string> modes{"lattice", "fast", "paper", "conform"};
-    const bool good = s.shells >= 1 && s.shells <= 1000 && share(s.concavity) && share(s.threshold) &&
-                      share(s.inflate) && s.corners >= 8 && s.corners <= 10'000 &&
-                      (s.tets == 0 || (s.tets >= 24 && s.tets <= 200'000)) && modes.contains(s.mode);
-    return good ? std::optional(s) : std::nullopt;
-  } catch (const Json::exception&) {
-    return std::nullopt;
-  }
+  const PrepareSettings& s = body.report.input.settings;
+  const auto share = [](double x) { return x >= 0 && x <= 1; };
+  const std::set<std::string> modes{"lattice", "fast", "paper", "conform"};
+  const bool good = s.shells >= 1 && s.shells <= 1000 && share(s.concavity) && share(s.threshold) &&
+                    share(s.inflate) && s.corners >= 8 && s.corners <= 10'000 &&
+                    (s.tets == 0 || (s.tets >= 24 && s.tets <= 200'000)) && modes.contains(s.mode);
+  return good ? std::optional(s) : std::nullopt;
 }
 
 }  // namespace
@@ -352,8 +344,8 @@ void check_body(const std::string& name, const PreparedBody& body, const fs::pat
     facts["appearance"] = facts_of_appearance(body.appearance);
     check_images(name, body.appearance, table);
   }
-  std::string wrong = first_wrong(facts, body.report);
-  if (wrong.empty() && !making.is_null()) wrong = first_wrong(making, body.report);
+  std::string wrong = first_wrong(facts, body.report.json);
+  if (wrong.empty() && !making.is_null()) wrong = first_wrong(making, body.report.json);
   if (wrong.empty() && !making.is_null())
     wrong = odd_key(body.report, facts, making, files_of_body(body.appearance).size());
   table.row(name + ": report.json tells of these files", wrong.empty(),

@@ -35,6 +35,30 @@ Json identity_of(const scenes::BodySpec& body, const std::string& model_hash) {
           {"anchor", body.pose.anchor}};
 }
 
+namespace {
+
+struct Placed {
+  struct Model {
+    std::string source;
+    template <class Fields>
+    void fields(Fields& f) {
+      f("source", source);
+    }
+  };
+  Model model;
+  template <class Fields>
+  void fields(Fields& f) {
+    f("model", model);
+  }
+};
+
+}  // namespace
+
+std::optional<std::string> model_hash_in(const Json& identity) {
+  const auto placed = fields_or_nothing<Placed>(identity);
+  return placed ? std::optional(placed->model.source) : std::nullopt;
+}
+
 std::string hash_of_made(const SurfaceMesh& made, const Appearance& appearance) {
   if (appearance.empty()) return hex(hash_of(made));
   Hasher hasher;
@@ -119,11 +143,10 @@ SurfaceMesh make_scenery(const scenes::BodySpec& body, const BodySource& source)
   return surface;
 }
 
-bool was_found(const Json& said) {
-  return !said.is_object() || !said.contains("input") || said.at("input").contains("model");
-}
-Json hash_of_scenery(const fs::path& mesh, const Json& said) {
-  return was_found(said) ? Json(hex(hash_of(std::string_view(read_file(mesh))))) : Json();
+bool was_found(const Json& identity) { return identity.contains("model"); }
+std::optional<std::string> hash_of_scenery(const fs::path& mesh, const Json& identity) {
+  if (!was_found(identity)) return std::nullopt;
+  return hex(hash_of(std::string_view(read_file(mesh))));
 }
 
 // ---- what is asked of prepare, and the goal's shape ----

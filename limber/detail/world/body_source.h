@@ -3,6 +3,7 @@
 // with their scene (origin.cpp).
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -14,6 +15,8 @@ namespace limber::detail {
 // The lines of the scene that shape a body's meshes, as the user's text has them once more: a change of any
 // makes them anew.
 Json identity_of(const scenes::BodySpec&, const std::string& model_hash);
+// The hash in such an identity; nothing where it is none.
+std::optional<std::string> model_hash_in(const Json& identity);
 // In place of a file's hash, of a model that limber makes.
 std::string hash_of_made(const SurfaceMesh& made, const Appearance&);
 
@@ -28,9 +31,18 @@ fs::path scenery_file(const fs::path& work_folder, const scenes::BodySpec&, cons
 BodySource source_of_scenery(const scenes::Scene&, const scenes::BodySpec&,
                              const std::vector<fs::path>& data);
 SurfaceMesh make_scenery(const scenes::BodySpec&, const BodySource&);
-// Of a scenery's NAME.json: whether its model was found.
-bool was_found(const Json& said);
-Json hash_of_scenery(const fs::path& mesh, const Json& said);  // of the file; null where there is none
+// NAME.json of scenery: where its mesh comes from.
+struct SceneryOrigin {
+  std::string version;              // of the limber that wrote it
+  Json input;                       // the identity of its source
+  std::optional<std::string> hash;  // of its mesh's file; null where no model was found
+  template <class Fields>
+  void fields(Fields& f) {
+    f("version", version), f("input", input), f("hash", hash);
+  }
+};
+bool was_found(const Json& identity);  // the model of scenery
+std::optional<std::string> hash_of_scenery(const fs::path& mesh, const Json& identity);
 
 // A copy of goal.shape.cage lies in the robot's folder: a scene that is read from a plan knows no folder.
 fs::path goal_cage_file(const scenes::Scene&, const fs::path& work_folder);

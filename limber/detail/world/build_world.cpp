@@ -85,7 +85,7 @@ double share_of_the_cage(const PreparedBody& prepared) {
 void set_parts(const scenes::BodySpec& body, const PreparedBody& prepared, double share, fem::BodySpec& out) {
   if (body.parts.empty()) return;
   const Tets& tets = prepared.cage.tets;
-  const int shells = prepared.report.at("shells").at("count").get<int>();
+  const int shells = prepared.report.shells.value().count;
   out.youngs_modulus_from_tet_pa.assign(std::size_t(tets.rows()), body.material.youngs_modulus_pa);
   out.density_from_tet_kg_m3.assign(std::size_t(tets.rows()), out.material.density_kg_m3);
   for (const scenes::PartSpec& part : body.parts) {

@@ -23,15 +23,8 @@ std::string key_of(const fem::BodySpec& body) {
   return content_hash(text_of(all));
 }
 
-Json entry_of(const std::string& key, double share) {
-  return {{"share", share}, {"hash", content_hash(key + text_of(Json(share)))}};
-}
-
-bool is_entry(const std::string& key, const Json& entry) {
-  if (!entry.is_object() || !entry.contains("share") || !entry.at("share").is_number()) return false;
-  const double share = entry.at("share");
-  return share >= fem::min_stiffness_share && share <= fem::max_stiffness_share &&
-         entry == entry_of(key, share);
+KeptShare::Entry entry_of(const std::string& key, double share) {
+  return {share, content_hash(key + text_of(Json(share)))};
 }
 
 }  // namespace
@@ -42,20 +35,20 @@ KeptShare::KeptShare(const fs::path& body_folder, const fem::BodySpec& body)
       is_of_use_(body.kind == fem::BodyKind::deformable && body.material.mesh_independent) {
   if (!is_of_use_ || !fs::exists(file_)) return;
   try {
-    const Json json = read_json(file_);
-    if (!json.is_object()) return;
-    for (const auto& [key, entry] : json.items())
-      if (is_entry(key, entry)) kept_[key] = entry;
+    for (const auto& [key, told] : read_fields<InOrder<Json>>(read_json(file_), "", ""))
+      if (const auto entry = fields_or_nothing<Entry>(told); entry && *entry == entry_of(key, entry->share))
+        kept_.emplace_back(key, *entry);
   } catch (const InputError&) {
   }
-  if (kept_.contains(key_)) share_ = kept_.at(key_).at("share");
+  for (const auto& [key, entry] : kept_)
+    if (key == key_) share_ = entry.share;
 }
 
 void KeptShare::keep(double found) {
   if (!is_of_use_ || share_ > 0) return;
   share_ = found;
-  kept_[key_] = entry_of(key_, found);
-  write_json(file_, kept_);
+  kept_.emplace_back(key_, entry_of(key_, found));
+  write_json(file_, json_of_fields(kept_));
 }
 
 }  // namespace limber::detail

@@ -5,7 +5,7 @@
 #include <string>
 
 #include "core/file.h"
-#include "core/json.h"
+#include "core/json_fields.h"
 #include "fem/world.h"
 
 namespace limber::detail {
@@ -20,10 +20,20 @@ class KeptShare {
   // Of fem::Body; does nothing where it is known, or of no use. Throws DiskError.
   void keep(double found);
 
+  struct Entry {
+    double share = 0;
+    std::string hash;
+    bool operator==(const Entry&) const = default;
+    template <class Fields>
+    void fields(Fields& f) {
+      f.within("share", share, fem::min_stiffness_share, fem::max_stiffness_share), f("hash", hash);
+    }
+  };
+
  private:
   fs::path file_;
   std::string key_;
-  Json kept_ = Json::object();
+  InOrder<Entry> kept_;
   double share_ = 0;
   bool is_of_use_;
 };

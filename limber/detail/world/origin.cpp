@@ -68,43 +68,38 @@ Origin origin_of_scenery(const scenes::Scene& scene, const scenes::BodySpec& bod
                          const std::vector<fs::path>& data, const fs::path& work_folder) {
   Origin origin;
   const fs::path mesh = scenery_file(work_folder, body, ".ply");
-  const Json said = read_json(scenery_file(work_folder, body, ".json"));
-  if (!was_found(said)) {
+  const Json json = read_json(scenery_file(work_folder, body, ".json"));
+  const auto said = fields_or_nothing<SceneryOrigin>(json);
+  if (!said) return origin;
+  const auto* file = std::get_if<scenes::FileModel>(&body.model);
+  if (!was_found(said->input)) {
     // Only a file is ever not found.
-    const auto* file = std::get_if<scenes::FileModel>(&body.model);
-    origin.placed_so = file && file->made.empty() &&
-                       said == Json{{"version", said.value("version", "")},
-                                    {"input", {{"triangles", body.triangles}}},
-                                    {"hash", Json()}} &&
-                       !fs::exists(mesh);
+    origin.placed_so = file && file->made.empty() && json == json_of_fields(*said) && !said->hash &&
+                       said->input == Json{{"triangles", body.triangles}} && !fs::exists(mesh);
     return origin;
   }
-  try {
-    Json identity = identity_of(body, said.at("input").at("model").at("source").get<std::string>());
-    identity["triangles"] = body.triangles;
-    origin.placed_so = said.at("input") == identity && said.at("hash") == hash_of_scenery(mesh, said);
-    if (const auto* file = std::get_if<scenes::FileModel>(&body.model);
-        file && !scenes::find_model(file->file, with(data, scene.folder)))
-      return origin;
-    const BodySource found = source_of_scenery(scene, body, data);
-    if (found.identity == said.at("input"))
-      origin.same_surface = same_surface(make_scenery(body, found), read_ply(mesh));
-  } catch (const Json::exception&) {
-    origin.placed_so = false;
-  }
+  const std::optional<std::string> source = model_hash_in(said->input);
+  if (!source) return origin;
+  Json identity = identity_of(body, *source);
+  identity["triangles"] = body.triangles;
+  origin.placed_so = said->input == identity && said->hash == hash_of_scenery(mesh, said->input);
+  if (file && !scenes::find_model(file->file, with(data, scene.folder))) return origin;
+  const BodySource found = source_of_scenery(scene, body, data);
+  if (found.identity == said->input)
+    origin.same_surface = same_surface(make_scenery(body, found), read_ply(mesh));
   return origin;
 }
 
 namespace {
 
 // The words by which limber prepare was told to read a model.
-PrepareOptions words_of(const Json& identity, const fs::path& file) {
+PrepareOptions words_of(const FileIdentity& identity, const fs::path& file) {
   PrepareOptions words;
   words.model = file;
-  identity.at("scale").get_to(words.scale), identity.at("y_up").get_to(words.y_up);
-  if (const auto label = identity.find("label"); label != identity.end()) {
-    label->at("name").get_to(words.label), label->at("gap").get_to(words.label_gap);
-    label->at("rounds").get_to(words.label_rounds), label->at("least_island").get_to(words.min_island);
+  words.scale = identity.scale, words.y_up = identity.y_up;
+  if (const auto& label = identity.label) {
+    words.label = label->name, words.label_gap = label->gap;
+    words.label_rounds = label->rounds, words.min_island = label->least_island;
   }
   return words;
 }
@@ -120,26 +115,22 @@ void compare(const meshing::ImportedModel& model, const PreparedBody& prepared, 
 }  // namespace
 
 Origin origin_of_model(const PreparedBody& prepared, const fs::path& file) {
-  const Json& said = prepared.report.at("input");
+  const BodyInput& said = prepared.report.input;
   Origin origin;
   if (!prepared.appearance.empty()) origin.appearance = Appearing::not_here;
   const std::string file_hash = content_of_model(file).file_hash;
-  try {
-    const Json& identity = said.at("model");
-    if (identity.contains("model"))
-      throw InputError(
-          fmt::format("{}: the body was made for a scene; name that with --scene, and leave "
-                      "--model out",
-                      file.string()));
-    if (identity.at("file_hash") != file_hash) return origin;
-    const BodySource found = source_of(words_of(identity, file), file);
-    origin.placed_so = found.identity == identity;
-    meshing::ImportedModel model = found.load();
-    make_model_of_body(model, settings_of_input(said));
-    compare(model, prepared, origin);
-  } catch (const Json::exception&) {
-    origin.placed_so = false;
-  }
+  if (said.model.contains("model"))
+    throw InputError(
+        fmt::format("{}: the body was made for a scene; name that with --scene, and leave "
+                    "--model out",
+                    file.string()));
+  const auto identity = fields_or_nothing<FileIdentity>(said.model);
+  if (!identity || identity->file_hash != file_hash) return origin;
+  const BodySource found = source_of(words_of(*identity, file), file);
+  origin.placed_so = found.identity == said.model;
+  meshing::ImportedModel model = found.load();
+  make_model_of_body(model, said.settings);
+  compare(model, prepared, origin);
   return origin;
 }
 
@@ -147,27 +138,24 @@ Origin origin_of_model(const PreparedBody& prepared, const fs::path& file) {
 // tells.
 Origin origin_of(const scenes::Scene& scene, const scenes::BodySpec& body, const std::vector<fs::path>& data,
                  const PreparedBody& prepared) {
-  const Json& said = prepared.report.at("input");
+  const BodyInput& said = prepared.report.input;
   Origin origin;
   if (!prepared.appearance.empty()) origin.appearance = Appearing::not_here;
-  try {
-    const std::string source = said.at("model").at("model").at("source").get<std::string>();
-    origin.placed_so = said == input_of(identity_of(body, source), settings_of(body));
-    const auto* file = std::get_if<scenes::FileModel>(&body.model);
-    if (file && !scenes::find_model(file->file, with(data, scene.folder))) {
-      const std::optional<SurfaceMesh> made = scenes::made_surface(body);
-      if (!made || source != hash_of_made(*made, scenes::made_appearance(body, *made))) return origin;
-    }
-    const BodySource found = source_of(scene, body, data);
-    // A file may have changed, or another of its name lie here.
-    if (file && found.identity.at("model").at("source") != source) return origin;
-    meshing::ImportedModel model = found.load();
-    make_model_of_body(model, settings_of(body));
-    compare(model, prepared, origin);
-    origin.made_cage = found.made_cage();
-  } catch (const Json::exception&) {
-    origin.placed_so = false;
+  const std::optional<std::string> source = model_hash_in(said.model);
+  if (!source) return origin;
+  origin.placed_so = said.all == input_of(identity_of(body, *source), settings_of(body));
+  const auto* file = std::get_if<scenes::FileModel>(&body.model);
+  if (file && !scenes::find_model(file->file, with(data, scene.folder))) {
+    const std::optional<SurfaceMesh> made = scenes::made_surface(body);
+    if (!made || source != hash_of_made(*made, scenes::made_appearance(body, *made))) return origin;
   }
+  const BodySource found = source_of(scene, body, data);
+  // A file may have changed, or another of its name lie here.
+  if (file && model_hash_in(found.identity) != source) return origin;
+  meshing::ImportedModel model = found.load();
+  make_model_of_body(model, settings_of(body));
+  compare(model, prepared, origin);
+  origin.made_cage = found.made_cage();
   return origin;
 }
 

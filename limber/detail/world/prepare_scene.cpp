@@ -31,12 +31,11 @@ PreparedScene prepare_scene(const ScenePrepareOptions& options) {
     const scenes::BodySpec& body = scene.bodies[b];
     if (!options.bodies.empty() && std::count(options.bodies.begin(), options.bodies.end(), body.name) == 0)
       continue;
-    const Json report =
+    const BodyReport report =
         prepare_body_of(scene, body, options.scene.data, options.out, store ? &*store : nullptr);
     keep_stiffness_share(scene, b, options.out);
-    prepared.bodies.push_back({body.name, body_folder(options.out, body),
-                               report.at("surface").at("triangles").get<int>(),
-                               report.at("cage").at("tets").get<int>()});
+    prepared.bodies.push_back(
+        {body.name, body_folder(options.out, body), report.surface.triangles, report.cage.value().tets});
   }
   if (options.bodies.empty()) prepare_beside(scene, options.scene.data, options.out);
   return prepared;

@@ -27,23 +27,20 @@ void prepare_scenery(const scenes::Scene& scene, const scenes::BodySpec& body,
   const fs::path mesh = scenery_file(work_folder, body, ".ply"),
                  origin = scenery_file(work_folder, body, ".json");
   try {
-    const Json made = read_json(origin);
-    if (made.at("version") == version && made.at("input") == source.identity &&
-        made.at("hash") == hash_of_scenery(mesh, made))
+    const SceneryOrigin made = read_fields<SceneryOrigin>(read_json(origin), origin.string(), "");
+    if (made.version == version && made.input == source.identity &&
+        made.hash == hash_of_scenery(mesh, made.input))
       return;
   } catch (const InputError&) {
-  } catch (const Json::exception&) {
   }
   log::info("{}: reading {}", mesh.string(), source.model);
   make_folder(mesh.parent_path());
-  const Json input = {{"version", version}, {"input", source.identity}};
-  if (was_found(input))
+  if (was_found(source.identity))
     write_ply(mesh, make_scenery(body, source));
   else
     fs::remove(mesh);
-  Json told = input;
-  told["hash"] = hash_of_scenery(mesh, input);
-  write_json(origin, told);
+  write_json(origin,
+             json_of_fields(SceneryOrigin{version, source.identity, hash_of_scenery(mesh, source.identity)}));
 }
 
 // The copy stays where the file is not found any more: the scene may come from a plan, whose folder has the
@@ -72,8 +69,8 @@ std::optional<fs::path> find_goal_cage(const scenes::Scene& scene, std::vector<f
   return std::nullopt;
 }
 
-Json prepare_body_of(const scenes::Scene& scene, const scenes::BodySpec& body,
-                     const std::vector<fs::path>& data, const fs::path& work_folder, BodyStore* store) {
+BodyReport prepare_body_of(const scenes::Scene& scene, const scenes::BodySpec& body,
+                           const std::vector<fs::path>& data, const fs::path& work_folder, BodyStore* store) {
   throw_if_stopped();
   const BodySource source = source_of(scene, body, data);
   if (!source.warning.empty()) log::warn("{}", source.warning);
@@ -123,8 +120,8 @@ std::vector<SurfaceMesh> read_scenery(const scenes::Scene& scene, const fs::path
   for (const scenes::BodySpec& body : scene.scenery) {
     const fs::path file = scenery_file(work_folder, body, ".ply");
     try {
-      const Json said = read_json(scenery_file(work_folder, body, ".json"));
-      meshes.push_back(was_found(said) ? read_ply(file) : SurfaceMesh{});
+      const auto said = fields_or_nothing<SceneryOrigin>(read_json(scenery_file(work_folder, body, ".json")));
+      meshes.push_back(said && !was_found(said->input) ? SurfaceMesh{} : read_ply(file));
     } catch (const InputError& error) {
       throw InputError(fmt::format("{}; make it anew with limber plan", error.what()));
     }

@@ -26,8 +26,8 @@ std::vector<PreparedBody> prepare_bodies(const scenes::Scene&, const std::vector
                                          const fs::path& work_folder, const fs::path& store = {});
 
 // The same of one body, or of what the scene has beside its bodies: the goal's shape and scenery.
-Json prepare_body_of(const scenes::Scene&, const scenes::BodySpec&, const std::vector<fs::path>& data,
-                     const fs::path& work_folder, BodyStore* store);
+BodyReport prepare_body_of(const scenes::Scene&, const scenes::BodySpec&, const std::vector<fs::path>& data,
+                           const fs::path& work_folder, BodyStore* store);
 void prepare_beside(const scenes::Scene&, const std::vector<fs::path>& data, const fs::path& work_folder);
 
 // What prepare begins with. Throw InputError when the model is not found, or is none; scenery that is not
