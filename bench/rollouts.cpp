@@ -17,9 +17,9 @@ namespace {
 
 using namespace limber;
 
-class InOrder final : public plan::RolloutSource {
+class RolloutList final : public plan::RolloutSource {
  public:
-  InOrder(std::vector<plan::Rollout>& all, std::atomic<std::size_t>& next, int at_once)
+  RolloutList(std::vector<plan::Rollout>& all, std::atomic<std::size_t>& next, int at_once)
       : all_(all), next_(next), at_once_(at_once) {}
   int at_once() const override { return at_once_; }
   plan::Rollout* next() override {
@@ -58,7 +58,7 @@ int main(int argc, char** argv) {
     std::atomic<std::size_t> next{0};
     const auto began = std::chrono::steady_clock::now();
     parallel_for(thread_count(), [&](int t) {
-      InOrder supply(rollouts, next, system.lanes());
+      RolloutList supply(rollouts, next, system.lanes());
       propagators[std::size_t(t)]->run(supply, 1 << 30);
     });
     seconds.push_back(std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count());

@@ -201,7 +201,7 @@ Hole hole_of(const World& world, const State& state, int ring) {
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> spread(from_middle.transpose() * from_middle);
   const Vec3 normal = spread.eigenvectors().col(0);  // along which they spread least
   const Points in_plane = from_middle - (from_middle * normal) * normal.transpose();
-  return {middle, normal, in_plane.rowwise().norm().minCoeff()};
+  return {middle, normal, in_plane.rowwise().norm().mean()};
 }
 
 // Neighbours that the plane cuts share an edge that it cuts.

@@ -44,8 +44,8 @@ std::vector<double> volume_changes(const World&, const State&, int body);  // (T
 double turn_from_goal_shape_deg(const World&, const State&);
 double distance_from_goal_shape_m(const World&, const State&);
 
-// The hole of a body that is a ring: the plane in which the nodes of its cage lie best, through their middle,
-// as far from there as the nearest of them.
+// The hole of a body that is a ring: the plane in which the nodes of its cage lie best, round their middle,
+// as far as they are in the mean. What is nearer there cannot be in the ring itself.
 struct Hole {
   Vec3 middle_m, normal;
   double radius_m = 0;

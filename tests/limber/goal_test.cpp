@@ -97,8 +97,7 @@ TEST(Goal, PiecesInTheHoleOfARingAreCounted) {
   const fem::World world = fem::build_world(spec);
   const fem::Hole hole = fem::hole_of(world, fem::rest_state(world), 1);
   EXPECT_NEAR(std::abs(hole.normal.x()), 1, 1e-6);
-  EXPECT_GT(hole.radius_m, 0.4);
-  EXPECT_LT(hole.radius_m, 0.46);
+  EXPECT_NEAR(hole.radius_m, 0.5, 0.02);
   const Points rest = world.bodies[0].cage.positions;
   const auto at = [&](double first_y, double second_y, bool bent) {
     Points p = rest;

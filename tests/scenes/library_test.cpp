@@ -223,11 +223,10 @@ TEST(Library, UnknownSceneNamesTheNearest) {
     find_scene("bariers1");
     FAIL();
   } catch (const InputError& error) {
-    EXPECT_THAT(
-        error.what(),
-        HasSubstr("did you mean \"barriers1\"? known scenes: barriers1, barriers2, "
-                  "body_parts, bunny_gate, colon, crowd, falling_objects, heart_and_lung, knot, mattress, moving_door, "
-                  "squeeze, there_and_back, torso, windows"));
+    EXPECT_THAT(error.what(), HasSubstr("did you mean \"barriers1\"? known scenes: barriers1, barriers2, "
+                                        "body_parts, bunny_gate, colon, crowd, falling_objects, "
+                                        "heart_and_lung, knot, mattress, moving_door, "
+                                        "squeeze, there_and_back, torso, windows"));
   }
 }
 
