@@ -39,12 +39,13 @@ std::string text_of(const plan::AnytimeReport& report) {
 
 std::string text_of(const plan::RefineReport& report, const Json& summary) {
   return fmt::format(
-      "  refine       {}; replayed to {:.3f} m from the goal, followed for {:.2f} s, at most {:.3f} m off; "
-      "{} "
-      "iterations; CPU s: replay {:.2f}, following {:.2f}, search {:.2f}\n",
-      summary.at("refine").at("how").get<std::string>(), report.replay_distance_m, report.tracked_s,
-      report.largest_error_m, report.iterations, report.replay_cpu_s, report.track_cpu_s,
-      report.search_cpu_s);
+      "  refine       {}; replayed for {:.2f} s to {:.3f} m from the goal ({}), at most {:.3f} m off; "
+      "followed "
+      "for {:.2f} s, at most {:.3f} m off; {} iterations; CPU s: replay {:.2f}, following {:.2f}, search "
+      "{:.2f}\n",
+      summary.at("refine").at("how").get<std::string>(), report.replay_s, report.replay_distance_m,
+      report.replay_ends, report.replay_largest_error_m, report.tracked_s, report.largest_error_m,
+      report.iterations, report.replay_cpu_s, report.track_cpu_s, report.search_cpu_s);
 }
 
 std::string text_of(const detail::HowFound& how, const Json& summary) {

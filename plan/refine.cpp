@@ -86,6 +86,7 @@ class ReferenceFollower {
             (at(reference_.centers, frame_of(rollout.to)) - system_.robot_center(rollout.to)).norm();
         if (error > 2 * settings_.goal.radius_m) return path;
         report.largest_error_m = std::max(report.largest_error_m, error);
+        report.mean_error_m += (error - report.mean_error_m) * steps / double(rollout.to.step - first_step_);
         state = rollout.to;
         path.controls.push_back(rollout.control);
         path.states.push_back(std::move(rollout.to));
@@ -149,6 +150,37 @@ class ReferenceFollower {
   bool complete_ = false;
 };
 
+const char* name_of(ControlRollout::Result result) {
+  switch (result) {
+    case ControlRollout::rests_in_goal:
+      return "rests_in_goal";
+    case ControlRollout::ends_elsewhere:
+      return "ends_elsewhere";
+    case ControlRollout::not_acceptable:
+      return "not_acceptable";
+    case ControlRollout::diverged:
+      return "diverged";
+    case ControlRollout::too_costly:
+      return "too_costly";
+  }
+  return "";
+}
+
+void tell_of_replay(const System& system, const Settings& settings, const Reference& reference,
+                    ControlRollout& replay, RefineReport& report) {
+  report.replay_ends = name_of(replay.result);
+  report.replay_s = replay.costs.duration_s;
+  report.replay_distance_m = distance_from_goal(system, settings, replay.end);
+  const double step = reference.frames_per_second / settings.frames_per_second;
+  for (std::size_t i = 0; i < replay.frames.size(); ++i) {
+    const double error =
+        (at(reference.centers, double(i) * step) - system.robot_center(replay.frames[i])).norm();
+    report.replay_largest_error_m = std::max(report.replay_largest_error_m, error);
+    report.replay_mean_error_m += error / double(replay.frames.size());
+  }
+  replay.frames = {};
+}
+
 // From the end of what was followed into the goal and to rest.
 ControlRollout arrive(const System& system, const Settings& settings, const ControlRollout& followed) {
   ControlRollout path;
@@ -178,10 +210,19 @@ const char* name_of(RefineReport::How how) {
 }  // namespace
 
 Json json_of(const RefineReport& report) {
-  return {{"how", name_of(report.how)},        {"replay_distance_m", report.replay_distance_m},
-          {"tracked_s", report.tracked_s},     {"largest_error_m", report.largest_error_m},
-          {"iterations", report.iterations},   {"replay_cpu_s", report.replay_cpu_s},
-          {"track_cpu_s", report.track_cpu_s}, {"search_cpu_s", report.search_cpu_s}};
+  return {{"how", name_of(report.how)},
+          {"replay_ends", report.replay_ends},
+          {"replay_s", report.replay_s},
+          {"replay_distance_m", report.replay_distance_m},
+          {"replay_mean_error_m", report.replay_mean_error_m},
+          {"replay_largest_error_m", report.replay_largest_error_m},
+          {"tracked_s", report.tracked_s},
+          {"mean_error_m", report.mean_error_m},
+          {"largest_error_m", report.largest_error_m},
+          {"iterations", report.iterations},
+          {"replay_cpu_s", report.replay_cpu_s},
+          {"track_cpu_s", report.track_cpu_s},
+          {"search_cpu_s", report.search_cpu_s}};
 }
 
 Reference reference_of(const System& system, const Trajectory& trajectory) {
@@ -221,10 +262,12 @@ Plan refine(const System& system, const Settings& settings, const Reference& ref
   ControlRollout replay;
   replay.from = system.start();
   replay.controls = in_steps_of(system.dt_s(), reference.controls, reference.dt_s);
-  run(system, settings, {&replay, 1}, {});
+  run(system, settings, {&replay, 1}, {.keep_frames = true});
+  tell_of_replay(system, settings, reference, replay, report);
+  bool arrives = replay.result == ControlRollout::rests_in_goal;
+  if (arrives && !may_be_shown(system, settings, replay)) arrives = false, report.replay_ends = "looks_wrong";
   report.replay_cpu_s = spent();
-  report.replay_distance_m = distance_from_goal(system, settings, replay.end);
-  if (replay.result == ControlRollout::rests_in_goal && may_be_shown(system, settings, replay)) {
+  if (arrives) {
     report.how = RefineReport::replayed;
     return solved_by(system, settings, replay);
   }
@@ -232,8 +275,9 @@ Plan refine(const System& system, const Settings& settings, const Reference& ref
   ReferenceFollower follower(system, settings, reference);
   const ControlRollout followed = follower.follow(report);
   const ControlRollout arrived = follower.complete() ? arrive(system, settings, followed) : ControlRollout{};
+  arrives = arrived.result == ControlRollout::rests_in_goal && may_be_shown(system, settings, arrived);
   report.track_cpu_s = spent();
-  if (arrived.result == ControlRollout::rests_in_goal && may_be_shown(system, settings, arrived)) {
+  if (arrives) {
     report.how = RefineReport::tracked;
     return solved_by(system, settings, arrived);
   }

@@ -19,10 +19,15 @@ Reference reference_of(const System&, const Trajectory&);
 
 struct RefineReport {
   enum How { replayed, tracked, replanned, failed } how = failed;
-  double replay_distance_m = 0;  // of the end of the reference's controls as they are, from the goal
-  double tracked_s = 0;          // of the reference; all of it unless the robot lost it
-  double largest_error_m = 0;    // between the centres while it was tracked
-  std::int64_t iterations = 0;   // of the search from the states tracked so far
+  // Of the reference's controls as they are. What ends them, by its name in JSON; looks_wrong: it rests in
+  // the goal, and System::first_refused lets not all frames pass.
+  std::string replay_ends;
+  double replay_s = 0;                                         // so long, with the settle if it came to that
+  double replay_distance_m = 0;                                // of their end from the goal
+  double replay_mean_error_m = 0, replay_largest_error_m = 0;  // between the centres at the frame times
+  double tracked_s = 0;                          // of the reference; all of it unless the robot lost it
+  double mean_error_m = 0, largest_error_m = 0;  // between the centres while it was tracked
+  std::int64_t iterations = 0;                   // of the search from the states tracked so far
   double replay_cpu_s = 0, track_cpu_s = 0, search_cpu_s = 0;
 };
 Json json_of(const RefineReport&);

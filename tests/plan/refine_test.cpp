@@ -29,6 +29,9 @@ TEST(Refine, ToTheSameSystemGivesBackTheSamePath) {
   EXPECT_EQ(report.how, RefineReport::replayed);
   EXPECT_EQ(hash_of(again.trajectory), hash_of(found.trajectory));
   EXPECT_EQ(report.iterations, 0);
+  EXPECT_EQ(report.replay_ends, "rests_in_goal");
+  EXPECT_EQ(report.replay_largest_error_m, 0);
+  EXPECT_NEAR(report.replay_s, double(found.trajectory.end.step) * toy.dt_s(), 1e-9);
 }
 
 TEST(Refine, ControlsKeepTheirTimesInOtherSteps) {
@@ -58,6 +61,11 @@ TEST(Refine, FollowsWhereTheSamePushesLeadElsewhere) {
   EXPECT_EQ(report.how, RefineReport::tracked);
   EXPECT_GT(report.tracked_s, 1);
   EXPECT_LT(report.largest_error_m, 2 * toy_settings().goal.radius_m);
+  EXPECT_GT(report.mean_error_m, 0);
+  EXPECT_LT(report.mean_error_m, report.largest_error_m);
+  EXPECT_NE(report.replay_ends, "rests_in_goal");
+  EXPECT_GT(report.replay_largest_error_m, report.largest_error_m);  // feedback is nearer to it than none
+  EXPECT_GT(report.replay_largest_error_m, report.replay_mean_error_m);
   expect_solved(other, carried);
   EXPECT_EQ(carried.system_hash, other.hash());
 }
