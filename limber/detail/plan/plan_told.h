@@ -58,13 +58,15 @@ struct RefineTold {
   std::string how;
   // Not told by older limbers.
   std::optional<std::string> replay_ends;
-  std::optional<double> replay_s, replay_distance_m, replay_mean_error_m, replay_largest_error_m, mean_error_m;
+  std::optional<double> replay_s, replay_distance_m, replay_mean_error_m, replay_largest_error_m,
+      mean_error_m;
   double tracked_s = 0, largest_error_m = 0;
   std::int64_t iterations = 0, coarse_tets = 0, tets = 0;
   template <class Fields>
   void fields(Fields& f) {
     f("how", how), f.if_there("replay_ends", replay_ends), f.if_there("replay_s", replay_s);
-    f.if_there("replay_distance_m", replay_distance_m), f.if_there("replay_mean_error_m", replay_mean_error_m);
+    f.if_there("replay_distance_m", replay_distance_m),
+        f.if_there("replay_mean_error_m", replay_mean_error_m);
     f.if_there("replay_largest_error_m", replay_largest_error_m), f.if_there("mean_error_m", mean_error_m);
     f("tracked_s", tracked_s);
     f("largest_error_m", largest_error_m), f("iterations", iterations);
