@@ -389,8 +389,7 @@ Json report_of(const std::string& name, const std::vector<Run>& runs) {
   }
   const auto spread = [](const std::vector<double>& values) {
     if (values.empty()) return Json();
-    const Quartiles q = quartiles(values);
-    return Json{q.first, q.median, q.third};
+    return Json(quartiles(values));
   };
   return {{"planner", name},           {"solved", motion.size()},
           {"runs", runs.size()},       {"iterations", spread(iterations)},

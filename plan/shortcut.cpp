@@ -39,14 +39,17 @@ class Changes {
     // The first round looks at every part of the path from where the goal might be reached directly.
     const int cuts = std::min(free, changes_a_round);
     c.first = keep_;
-    if (round == 0 && number < cuts) {
+    if (round == 0 && number < cuts && interpolates()) {
       c.first = keep_ + number * free / cuts;
       return c;
     }
     if (free == 0) return c;
     const int i = keep_ + rng.below(free), j = i + 1 + rng.below(n - i);  // a stretch [i, j)
     c.first = i;
-    switch (rng.below(8)) {
+    int kind = rng.below(8);
+    const bool draws = kind <= 1, pushes_all = kind == 4 || kind == 5;
+    if ((draws && !interpolates()) || (pushes_all && settings_.weights.body == 0)) kind = 3;
+    switch (kind) {
       case 0:  // straight to the goal
         break;
       case 1:  // by way of a later node to the goal
@@ -83,6 +86,8 @@ class Changes {
   }
 
  private:
+  // Nobody is pushed as the search may not push.
+  bool interpolates() const { return settings_.weights.interpolation > 0; }
   static int whole(double steps) { return std::max(1, int(std::lround(steps))); }
 
   Vec3 center(int node) const { return system_.robot_center(state_before(node)); }
@@ -135,7 +140,8 @@ class Changes {
   Control in_other_time(Control control, double slower) const {
     const double most = settings_.max_force_n * just_below_one, now = double(largest_force(control));
     const double force = now > 0 ? std::min(1 / (slower * slower), most / now) : 1;
-    control.force_n = (control.force_n.cast<double>() * force).cast<float>();
+    for (Vec3f* force_n : {&control.force_n, &control.second_force_n})
+      *force_n = (force_n->cast<double>() * force).cast<float>();
     control.max_force_n = float(double(control.max_force_n) * std::min(force, 1.0));
     control.steps = whole(control.steps * slower);
     return control;

@@ -113,6 +113,21 @@ TEST(Shortcut, NeverCostsMoreNorLastsLongerAndSolvesTheQuery) {
 
 // A point that nothing hinders or slows takes 2 √(m d / F) from rest to rest; nothing beats that, and
 // shortcutting comes near it from a path several times as long.
+// Where a robot is pushed at points alone, by an instrument's tip or by carriers, nobody else pushes it.
+TEST(Shortcut, PushesAsTheSearchMayAlone) {
+  const Toy toy(5, true, false, 99);
+  Settings s = settings_of_seed(3);
+  s.weights = {.body = 0, .control_point = 1, .interpolation = 0};
+  s.max_iterations = 4000, s.control_point_radius_m = 2;
+  Plan p = plan(toy, s);
+  ASSERT_TRUE(p.solved()) << explain(p);
+  const double before = double(p.trajectory.end.step);
+  shorten(toy, p, {.rounds = 20});
+  EXPECT_LT(double(p.trajectory.end.step), before);
+  for (std::size_t c = 0; c + (p.trajectory.settle_steps > 0) < p.trajectory.controls.size(); ++c)
+    EXPECT_EQ(p.trajectory.controls[c].manipulation, Manipulation::control_point) << c;
+}
+
 TEST(Shortcut, OfAFreePointComesNearBangBang) {
   Toy toy(1, false, false, 99);
   toy.damping_per_s = 0;
