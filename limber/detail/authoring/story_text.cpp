@@ -1,0 +1,410 @@
+#include "limber/detail/authoring/story_text.h"
+
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <optional>
+
+#include "limber/detail/authoring/line_of_sight.h"
+#include "scenes/anatomy.h"
+
+namespace limber::detail {
+
+bool organ_moves(const NewSceneOptions& options) {
+  return options.story == Story::away || options.story == Story::aside;
+}
+
+namespace {
+
+constexpr int max_triangles_seen_through = 30'000;
+constexpr int points_looked_at = 150;  // of the robot
+
+std::string vector_text(const Vec3& v) {
+  return fmt::format("[{:.4g}, {:.4g}, {:.4g}]", v.x(), v.y(), v.z());
+}
+
+constexpr const char* no_gravity = "gravity_m_s2 = [0, 0, 0]   # whoever leads it bears its weight\n";
+
+std::string body_text(const Organ& organ, const NewSceneOptions& options, double scale) {
+  const bool robot = organ.name == options.robot && organ_moves(options);
+  const Vec3 center = organ.box.center() + organ.way_m;
+  std::string text = fmt::format("\n[[bodies]]\nname = \"{}\"\nrole = \"{}\"\n", organ.name,
+                                 organ.see_through                      ? "scenery"
+                                 : robot                                ? "robot"
+                                 : options.fascia_hz > 0 && !organ.bone ? "free"
+                                                                        : "obstacle");
+  if (organ.bone && !organ.see_through) text += "kind = \"rigid\"\n";
+  text += fmt::format("model = {{ file = \"{}\", scale = {:g}, up = \"{}\", front = \"{}\" }}\n", organ.file,
+                      options.scale * (organ.see_through ? 1 : scale), options.up, options.front);
+  text += fmt::format("pose = {{ position_m = [{:.7g}, {:.7g}, {:.7g}], anchor = \"center\" }}", center.x(),
+                      center.y(), center.z());
+  if (organ.way_m.norm() > 0) text += fmt::format("   # {:.2g} m from its true place", organ.way_m.norm());
+  text += "\n";
+  const scenes::Anatomy& usual = scenes::anatomy_of(organ.name);
+  if (organ.see_through) {
+    const bool hull = usual.kind == scenes::PartKind::hull;
+    text += fmt::format("color = \"{}\"\nopacity = {}\n",
+                        organ.bone ? "#efe6d0"
+                        : hull     ? "#c98f70"
+                                   : usual.color,
+                        organ.bone ? 0.35
+                        : hull     ? 0.22
+                                   : 0.15);
+    if (organ.surface.triangles.rows() > max_triangles_seen_through)
+      text += fmt::format("triangles = {}\n", max_triangles_seen_through);
+    return text;
+  }
+  text += fmt::format("cage = {{ tets = {} }}\n", organ.bone ? bone_tets : options.tets);
+  if (organ.bone) return text + "color = \"#e8dfc8\"\nlook = \"bone\"\n";
+  const bool hung = options.fascia_hz > 0 && !robot;
+  text += fmt::format(
+      "material = {{ youngs_modulus_pa = {:g}, poisson_ratio = 0.45, density_kg_m3 = {:g}, friction = 0.05{} "
+      "}}\n",
+      usual.youngs_modulus_pa, usual.density_kg_m3,
+      hung ? fmt::format(", fascia_hz = {:g}", options.fascia_hz) : "");
+  text += fmt::format("color = \"{}\"\nlook = \"tissue\"\n", usual.color);
+  if (robot && options.fascia_hz > 0) text += no_gravity;
+  if (robot || hung) return text;
+  const Vec3 half = 0.5 * scale * organ.box.size();
+  const Vec3 lower(center.x() - 2 * half.x(), center.y() - 2 * half.y(), center.z() - 2 * half.z()),
+      upper(center.x() - 0.5 * half.x(), center.y() + 2 * half.y(), center.z() + 2 * half.z());
+  return text + fmt::format("fixed = [{{ box_m = [{}, {}] }}]   # its back\n", vector_text(lower),
+                            vector_text(upper));
+}
+
+const Vec3& direction_of(const std::string& goal) {
+  static const std::map<std::string, Vec3> directions{{"front", Vec3::UnitX()}, {"back", -Vec3::UnitX()},
+                                                      {"left", Vec3::UnitY()},  {"right", -Vec3::UnitY()},
+                                                      {"up", Vec3::UnitZ()},    {"down", -Vec3::UnitZ()}};
+  return directions.at(goal);
+}
+
+Vec3 center_of_mass(const TetMesh& cage) {
+  Vec3 sum = Vec3::Zero();
+  double all = 0;
+  for (Eigen::Index t = 0; t < cage.tets.rows(); ++t) {
+    const auto corner = [&](int i) -> Vec3 { return cage.positions.row(cage.tets(t, i)); };
+    const double share = signed_volume(corner(0), corner(1), corner(2), corner(3));
+    sum += share / 4 * (corner(0) + corner(1) + corner(2) + corner(3)), all += share;
+  }
+  return sum / all;
+}
+
+// How far the robot goes along `direction` until it is past all that lies in its way, and at least one and a
+// half times its length there and once its largest.
+double way_to_goal(const std::vector<Organ>& organs, const Organ& robot, double scale,
+                   const Vec3& direction) {
+  const Box box = bounding_box(placed(robot, scale).positions);
+  const Vec3 along = direction.cwiseAbs();
+  const double from = direction.dot(box.center()) - along.dot(box.size()) / 2;
+  const double length = scale * along.dot(robot.box.size());
+  double way =
+      std::max(1.5 * length, scale * robot.box.size().maxCoeff());  // the goal's radius is 0.4 of that
+  for (const std::size_t i : simulated(organs)) {
+    if (&organs[i] == &robot) continue;
+    const Box other = bounding_box(placed(organs[i], scale).positions);
+    const Vec3 gap = (other.center() - box.center()).cwiseAbs() - (other.size() + 1.25 * box.size()) / 2;
+    bool in_the_way = true;
+    for (int c = 0; c < 3; ++c) in_the_way &= along[c] > 0 || gap[c] < 0;
+    const double end = direction.dot(other.center()) + along.dot(other.size()) / 2;
+    if (in_the_way) way = std::max(way, end - from + 0.1 * length);
+  }
+  return way;
+}
+
+// To which side the robot is moved, by about its own length: where least is in the way, bones three times.
+std::string free_side(const std::vector<Organ>& organs, const Organ& robot, double scale) {
+  const Box box = bounding_box(placed(robot, scale).positions);
+  std::string best;
+  double least = std::numeric_limits<double>::infinity();
+  for (const char* side : {"left", "right", "front", "down", "up"}) {
+    const Vec3 way = 0.8 * std::abs(direction_of(side).dot(box.size())) * direction_of(side);
+    double in_the_way = 0;
+    for (const std::size_t i : simulated(organs)) {
+      if (&organs[i] == &robot) continue;
+      const Box other = bounding_box(placed(organs[i], scale).positions);
+      const Vec3 both =
+          ((box.upper + way).cwiseMin(other.upper) - (box.lower + way).cwiseMax(other.lower)).cwiseMax(0);
+      in_the_way += (organs[i].bone ? 3 : 1) * both.prod();
+    }
+    if (in_the_way < least) least = in_the_way, best = side;
+  }
+  return best;
+}
+
+// A rod with round ends that comes to an organ, point first.
+struct Instrument {
+  Vec3 outward;                // unit; from the organ along the rod
+  Vec3 at_start_m, at_goal_m;  // its middle
+  double length_m, width_m;
+  bool is_free = true;  // nothing stands in its way
+};
+
+constexpr double instrument_length_m = 0.15, instrument_width_m = 0.008;
+constexpr double before_organ_m = 0.002, tissue_beside_m = 0.004;
+
+// From before the body, or from above and below there, to that point of the organ that is farthest out on a
+// line through its middle: where nothing is in the way, then where no ribs are, then most from the front.
+Instrument instrument_to(const NewSceneOptions& options, const std::vector<Organ>& organs,
+                         const Organ& target, double scale) {
+  std::vector<SurfaceMesh> solid, ribs;
+  for (const Organ& organ : organs)
+    if (&organ != &target && (!organ.see_through || organ.bone))
+      (organ.see_through ? ribs : solid).push_back(placed_surface(options, organ, scale));
+  const SurfaceMesh surface = placed_surface(options, target, scale);
+  const Vec3 center = bounding_box(surface.positions).center();
+  Instrument best{};
+  double most = -1;
+  for (const double around_deg : {0.0, -20.0, 20.0, -40.0, 40.0, -60.0, 60.0, -80.0, 80.0})
+    for (const double up_deg : {0.0, 25.0, -25.0, 50.0, -50.0}) {
+      const double around = around_deg * EIGEN_PI / 180, up = up_deg * EIGEN_PI / 180;
+      const Vec3 outward(std::cos(up) * std::cos(around), std::cos(up) * std::sin(around), std::sin(up));
+      Vec3 aim = center;
+      double farthest = -std::numeric_limits<double>::infinity();
+      for (Eigen::Index v = 0; v < surface.positions.rows(); ++v) {
+        const Vec3 from_center = Vec3(surface.positions.row(v)) - center;
+        const double along = outward.dot(from_center), aside = (from_center - along * outward).norm();
+        if (along - 2 * aside > farthest) farthest = along - 2 * aside, aim = center + from_center;
+      }
+      constexpr int spokes = 12;
+      Points tube(2 * spokes + 1, 3);
+      const Vec3 x = outward.unitOrthogonal(), y = outward.cross(x);
+      tube.row(0) = aim.transpose();
+      for (int i = 0; i < 2 * spokes; ++i) {
+        const double turn = 2 * EIGEN_PI * i / spokes,
+                     radius = (i < spokes ? 0.5 : 1) * (0.5 * instrument_width_m + tissue_beside_m);
+        tube.row(1 + i) = (aim + radius * (std::cos(turn) * x + std::sin(turn) * y)).transpose();
+      }
+      const double free = share_in_sight(tube, outward, solid);
+      const double worth = 4 * free + share_in_sight(tube, outward, ribs) + 0.5 * outward.x();
+      if (worth <= most) continue;
+      most = worth;
+      const double way_m = std::max(0.08, 0.6 * scale * target.box.size().maxCoeff());
+      best = {.outward = outward,
+              .at_start_m = aim + (before_organ_m + way_m + 0.5 * instrument_length_m) * outward,
+              .at_goal_m = aim + (before_organ_m + 0.5 * instrument_length_m) * outward,
+              .length_m = instrument_length_m,
+              .width_m = instrument_width_m,
+              .is_free = free == 1};
+    }
+  return best;
+}
+
+std::string body_text(const Instrument& rod, const NewSceneOptions& options) {
+  const Vec3 axis = Vec3::UnitX().cross(rod.outward);
+  const double angle_deg = std::atan2(axis.norm(), rod.outward.x()) * 180 / EIGEN_PI;
+  return fmt::format(
+             "\n[[bodies]]\nname = \"{}\"\nrole = \"robot\"\nkind = \"rigid\"\n"
+             "model = {{ box = {{ size_m = [{:g}, {:g}, {:g}], bevel_m = {:g} }} }}\n"
+             "pose = {{ position_m = {}, axis = {}, angle_deg = {:.5g} }}\n"
+             "cage = {{ tets = 60 }}\nmaterial = {{ density_kg_m3 = 4000, friction = 0.05 }}\n"
+             "color = \"#aab4bd\"\nroughness = 0.3\nmetallic = 0.6\n",
+             instrument_name, rod.length_m, rod.width_m, rod.width_m, 0.49 * rod.width_m,
+             vector_text(rod.at_start_m), axis.norm() > 1e-9 ? vector_text(axis.normalized()) : "[0, 0, 1]",
+             angle_deg) +
+         (options.fascia_hz > 0 ? no_gravity : "");
+}
+
+struct Views {
+  Vec3 best, side;  // from the scene to the camera
+};
+
+// Directions from which most of the points is seen past the other organs, at the start, on the way and at the
+// goal: of those from before the body, or from above it, and of those square to the way.
+Views views_of(const std::vector<Organ>& organs, const Organ& about, double scale, const Points& all,
+               const Vec3& way) {
+  std::vector<SurfaceMesh> hiding;
+  for (const std::size_t i : simulated(organs)) {
+    if (&organs[i] == &about) continue;
+    const TetMesh cage = placed(organs[i], scale);
+    hiding.push_back({cage.positions, boundary_triangles(cage.tets)});
+  }
+  const Eigen::Index step = std::max<Eigen::Index>(1, all.rows() / points_looked_at);
+  constexpr int stops = 4;  // of the way
+  Points points(stops * (all.rows() / step), 3);
+  for (Eigen::Index p = 0; p < points.rows(); ++p)
+    points.row(p) = all.row(p / stops * step) + double(p % stops) / (stops - 1) * way.transpose();
+  // A way that leads to or from the eye looks short.
+  const auto worth = [&](const Vec3& direction) {
+    return share_in_sight(points, direction, hiding) -
+           0.4 * std::abs(direction.normalized().dot(way.normalized()));
+  };
+  const auto best_of = [&](const std::vector<Vec3>& directions) {
+    return *std::max_element(directions.begin(), directions.end(),
+                             [&](const Vec3& a, const Vec3& b) { return worth(a) < worth(b); });
+  };
+  std::vector<Vec3> before;
+  for (const double to_the_left : {-1.5, -1.0, -0.6, -0.3, 0.3, 0.6, 1.0, 1.5})
+    for (const double up : {0.15, 0.35, 0.7}) before.push_back({1, to_the_left, up});
+  Vec3 across = way.cross(Vec3::UnitZ());
+  if (across.norm() < 1e-9 * way.norm()) across = Vec3::UnitY();
+  across.normalize();
+  const Vec3 up(0, 0, 0.12);
+  return {best_of(before), best_of({across + up, up - across})};
+}
+
+std::string camera_text(const char* header, const Vec3& direction, const std::string& more) {
+  return fmt::format("\n{}\ndirection = {}\nfov_deg = 24\n{}", header, vector_text(direction), more);
+}
+
+std::string subject_text(const std::string& name, double fill) {
+  return fmt::format("subject = \"{}\"\nfill = {:g}\n", name, fill);
+}
+
+// Of all organs, then to the one it is about, round that, and back.
+std::string tour_text(const std::vector<Organ>& organs, const Organ& about, double scale) {
+  Box all;
+  for (const std::size_t i : simulated(organs))
+    if (!organs[i].bone) all.include(bounding_box(placed(organs[i], scale).positions));
+  const Box one = bounding_box(placed(about, scale).positions);
+  const auto distance = [](const Box& box, double room) {
+    return room * 0.5 * box.diagonal() / std::tan(12 * EIGEN_PI / 180);
+  };
+  const double far_m = distance(all, 1.1), near_m = distance(one, 1.5);
+  struct Stop {
+    double at;
+    Vec3 direction, target;
+    double distance_m;
+  };
+  const Vec3 middle = 0.5 * (all.center() + one.center());
+  const Stop stops[] = {{0, {1, -0.25, 0.1}, all.center(), far_m},
+                        {0.25, {1, 0.7, 0.2}, middle, 0.5 * (far_m + near_m)},
+                        {0.5, {1, 0.25, 0.25}, one.center(), near_m},
+                        {0.75, {1, -0.6, 0.2}, one.center(), near_m},
+                        {1, {1, -0.25, 0.1}, all.center(), far_m}};
+  std::string text = "\n[camera]   # to the organ it is about, and back\nfov_deg = 24\nkeyframes = [\n";
+  for (const Stop& stop : stops)
+    text += fmt::format("  {{ at = {:g}, eye_m = {}, target_m = {} }},\n", stop.at,
+                        vector_text(stop.target + stop.distance_m * stop.direction.normalized()),
+                        vector_text(stop.target));
+  return text + "]\n" + camera_text("[[cameras]]\nname = \"front\"", {1, 0, 0.05}, "") +
+         camera_text("[[cameras]]\nname = \"side\"", {0.1, 1, 0.1}, "") +
+         camera_text("[[cameras]]\nname = \"above\"", {1, -0.3, 1.2}, subject_text(about.name, 0.4));
+}
+
+// Names of all but the hulls; and the front taken off what is only seen, before the middle of the organs.
+std::string film_text(const std::vector<Organ>& organs, const NewSceneOptions& options, double scale,
+                      const std::string& caption, double speed) {
+  std::vector<std::string> names, hulls;
+  Box soft;
+  for (const Organ& organ : organs) {
+    if (organ.see_through) hulls.push_back(fmt::format("\"{}\"", organ.name));
+    if (!organ.see_through || organ.bone || scenes::anatomy_of(organ.name).kind != scenes::PartKind::hull)
+      names.push_back(fmt::format("\"{}\"", organ.name));
+    if (!organ.see_through && !organ.bone) soft.include(bounding_box(placed(organ, scale).positions));
+  }
+  if (options.story == Story::instrument) names.push_back(fmt::format("\"{}\"", instrument_name));
+  std::string text = fmt::format(
+      "\n[film]\nframes_per_second = 30\nspeed = {:.2g}{}\nlook = \"clinical\"\nbounds_lines = false\n"
+      "clock = {}\nscale_bar = true\ncaption = \"{}\"\nlabels = [{}]\n",
+      speed, speed < 1 ? "   # slow motion: what is small moves quickly" : "", options.story != Story::tour,
+      caption, fmt::join(names, ", "));
+  if (!hulls.empty() && !soft.empty())
+    text += fmt::format(
+        "\n[[film.cuts]]   # opens the body from the front\npoint_m = {}\nnormal = [1, 0, 0]\n"
+        "bodies = [{}]\n",
+        vector_text(soft.center()), fmt::join(hulls, ", "));
+  return text;
+}
+
+std::string in_words(std::string name) {
+  std::replace(name.begin(), name.end(), '_', ' ');
+  return name;
+}
+
+}  // namespace
+
+std::string scene_text(const std::vector<Organ>& organs, const NewSceneOptions& options, double scale) {
+  const Organ& robot = *std::find_if(organs.begin(), organs.end(),
+                                     [&](const Organ& organ) { return organ.name == options.robot; });
+  const bool of_instrument = options.story == Story::instrument;
+  const TetMesh robot_cage = placed(robot, scale);
+  const std::optional<Instrument> rod =
+      of_instrument ? std::optional(instrument_to(options, organs, robot, scale)) : std::nullopt;
+  const std::string side = !options.goal.empty()           ? options.goal
+                           : options.story == Story::aside ? free_side(organs, robot, scale)
+                                                           : "front";
+  const Vec3 size = scale * robot.box.size(), direction = direction_of(side);
+  const double along = std::abs(direction.dot(size));
+  const double way_m = options.story == Story::aside ? std::max(0.8 * along, 0.5 * size.maxCoeff())
+                                                     : way_to_goal(organs, robot, scale, direction);
+  const Vec3 start = rod ? rod->at_start_m : center_of_mass(robot_cage),
+             goal = rod ? rod->at_goal_m : Vec3(start + way_m * direction);
+  Box bounds;
+  for (const std::size_t i : simulated(organs)) {
+    // Bones do not move, and may reach out.
+    const Box box = organs[i].bone ? Box{organs[i].box.center(), organs[i].box.center()}
+                                   : bounding_box(placed(organs[i], scale).positions);
+    const Vec3 more = Vec3::Constant(0.3 * size.maxCoeff());
+    bounds.include(box.lower - more), bounds.include(box.upper + more);
+  }
+  if (rod) {
+    const Vec3 reach = Vec3::Constant(0.7 * rod->length_m);
+    bounds.include(start + reach), bounds.include(start - reach);
+  } else if (organ_moves(options)) {
+    bounds.include(goal + 1.5 * size), bounds.include(goal - 1.5 * size);
+  }
+  // At 5 m/s² a body of a metre is pushed for 0.2 to 1 s at a time; times go with the root of the length.
+  const double length = rod ? (goal - start).norm() : size.maxCoeff(), time = std::sqrt(length);
+  const double mass =
+      rod ? 4000 * rod->length_m * rod->width_m * rod->width_m
+          : std::pow(scale, 3) * robot.volume_m3 * scenes::anatomy_of(robot.name).density_kg_m3;
+  const std::string of_true_size = scale < 1
+                                       ? fmt::format("{:g} of its true size, about its own middle", scale)
+                                       : std::string("of its true size");
+  const std::size_t others = simulated(organs).size() - 1;
+  const std::string name = in_words(robot.name);
+  const std::string description =
+      of_instrument ? fmt::format("an instrument comes to the {} among {} bodies", name, others)
+      : options.story == Story::aside
+          ? fmt::format("the {} is moved aside, to the {}, among {} bodies", name, side, others)
+      : options.story == Story::tour
+          ? fmt::format("a tour of {} bodies, to the {}", others + 1, name)
+          : fmt::format("{} moves to the {} among {} bodies", robot.name, side, others);
+  std::string text = fmt::format(
+      "# Made by limber scene new. Every organ is {}.\n"
+      "# In an atlas some are a little in one another: those stand off their true places, so that no two "
+      "touch at "
+      "the\n"
+      "# start. Materials are usual ones. Edit what is to be otherwise: docs/scene.md has all keys.\n"
+      "name = \"{}\"\ndescription = \"{}\"\n\n[world]\nbounds_m = [{}, "
+      "{}]\ngravity_m_s2 = [0, 0, {}]\n",
+      of_true_size, options.out.stem().string(), description, vector_text(bounds.lower),
+      vector_text(bounds.upper), options.fascia_hz > 0 ? "-9.81" : "0");
+  for (const Organ& organ : organs) text += body_text(organ, options, scale);
+  if (rod) text += body_text(*rod, options);
+  if (options.story == Story::tour)
+    return text + tour_text(organs, robot, scale) + film_text(organs, options, scale, description, 0.1);
+
+  const double radius = rod ? 0.006 : options.story == Story::aside ? 0.2 * length : 0.4 * length;
+  text += fmt::format("\n[goal]\ncenter_of_mass_m = {}\nradius_m = {:.3g}\n", vector_text(goal), radius);
+  text += fmt::format(
+      "\n[planner]\npreset = \"fast\"\nmax_force_n = {:.2g}\nduration_s = [{:.2g}, {:.2g}]\n"
+      "control_point_radius_m = {:.2g}\nsettle_speed_m_s = {:.2g}\n",
+      5 * mass, 0.2 * time, time, 0.35 * length, 0.02 * time);
+  if (rod) text += "weights = { body = 1, control_point = 0, interpolation = 0 }   # it is not turned\n";
+  Points looked_at = robot_cage.positions;
+  if (rod) {
+    constexpr int places = 60;
+    looked_at.resize(places, 3);
+    for (int i = 0; i < places; ++i)
+      looked_at.row(i) =
+          (start + (double(i) / (places - 1) - 0.5) * rod->length_m * rod->outward).transpose();
+  }
+  const Views views = views_of(organs, robot, scale, looked_at, goal - start);
+  // Of an instrument's way the organ is where it leads to.
+  text += camera_text("[camera]   # from where most of the way is seen", views.best,
+                      rod ? subject_text(robot.name, 0.4) : subject_text(robot.name, 0.45));
+  text += camera_text("[[cameras]]\nname = \"side\"", views.side,
+                      rod ? subject_text(robot.name, 0.35) : subject_text(robot.name, 0.45));
+  text += rod ? camera_text("[[cameras]]\nname = \"near\"", views.best, subject_text(robot.name, 0.65))
+              : camera_text("[[cameras]]\nname = \"follow\"", views.best,
+                            fmt::format("follow = \"{}\"\n", robot.name));
+  text += camera_text("[[cameras]]\nname = \"whole\"", {1, -0.5, 0.3}, "");
+  return text + film_text(organs, options, scale, description, std::clamp(time, 0.05, 1.0));
+}
+
+}  // namespace limber::detail
