@@ -49,6 +49,7 @@ class Shells {
     if (options.exact) {
       exact_parts_ = exact_convex_parts(mesh);
       for (const std::vector<Vec3>& corners : exact_parts_) {
+        throw_if_stopped();
         std::vector<Vec3> work;
         for (const Vec3& p : corners) work.push_back(solid_.frame.work_from_user(p));
         result_.shells.push_back(shell_of(work, corners));
@@ -190,6 +191,7 @@ void Shells::count_uncovered() {
   std::vector<Box> boxes;
   for (const ConvexShell& shell : shells) boxes.push_back(bounding_box(shell.vertices));
   for (int v : vertices_of(mesh_.triangles)) {
+    throw_if_stopped();
     const Vec3 p = mesh_.positions.row(v);
     bool covered = false;
     for (std::size_t s = 0; s < shells.size() && !covered; ++s)
@@ -235,6 +237,7 @@ std::int64_t Shells::triangles_uncovered_by_exact_parts() const {
   };
   std::int64_t uncovered = 0;
   for (Eigen::Index t = 0; t < mesh_.triangles.rows(); ++t) {
+    throw_if_stopped();
     std::vector<Polygon> left = {{mesh_.positions.row(mesh_.triangles(t, 0)),
                                   mesh_.positions.row(mesh_.triangles(t, 1)),
                                   mesh_.positions.row(mesh_.triangles(t, 2))}};

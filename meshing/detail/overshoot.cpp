@@ -89,6 +89,7 @@ std::vector<BoundarySample> boundary_samples(const std::vector<ConvexShell>& she
     Rng rng(20061, s);
     double due = 0.5;  // samples owed to the area walked over so far
     for (Eigen::Index f = 0; f < shells[s].triangles.rows(); ++f) {
+      throw_if_stopped();
       const Vec3 a = shells[s].vertices.row(shells[s].triangles(f, 0));
       const Vec3 u = Vec3(shells[s].vertices.row(shells[s].triangles(f, 1))) - a;
       const Vec3 v = Vec3(shells[s].vertices.row(shells[s].triangles(f, 2))) - a;

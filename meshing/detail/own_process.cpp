@@ -99,12 +99,14 @@ OwnProcessResult run_in_own_process(const std::function<std::string()>& work, in
 
   int status = 0;
   // Asked again and again: a signal that comes just before a wait would not end it.
-  for (pid_t ended = 0; ended != child; ended = waitpid(child, &status, stop_signal() ? 0 : WNOHANG)) {
+  for (pid_t ended = 0; ended != child;) {
     LIMBER_CHECK(ended == 0 || errno == EINTR, errno);
-    if (stop_signal())
+    const bool stopped = stop_signal() != 0;  // asked once: who waits without end must have killed it
+    if (stopped)
       kill(child, SIGKILL);
     else
       usleep(2000);
+    ended = waitpid(child, &status, stopped ? 0 : WNOHANG);
   }
   throw_if_stopped();
   if (WIFSIGNALED(status)) {

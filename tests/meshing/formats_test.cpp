@@ -1,6 +1,7 @@
 // What a file holds is what comes in, whatever it is named; a damaged one is an InputError with its place.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/resource.h>
 
 #include <algorithm>
 #include <array>
@@ -11,6 +12,8 @@
 
 #include "core/error.h"
 #include "core/hash.h"
+#include "core/job.h"
+#include "core/progress.h"
 #include "meshing/detail/own_process.h"
 #include "meshing/import.h"
 #include "tests/meshing/import_meshes.h"
@@ -422,6 +425,36 @@ TEST(OwnProcess, ACrashIsAnAnswer) {
       1);
   EXPECT_FALSE(hung.finished);
   EXPECT_THAT(hung.bytes, HasSubstr("stopped after 1 s"));
+}
+
+// Says stop when it is asked the n-th time.
+struct StopsAt : Watcher {
+  explicit StopsAt(int n) : left(n) {}
+  bool stop() override { return --left <= 0; }
+  int left;
+};
+
+// Whichever question is the first that is answered by stop, the process is ended and not waited for.
+TEST(OwnProcess, AStopEndsItAtOnce) {
+  const auto cpu_s_of_children = [] {
+    rusage used{};
+    getrusage(RUSAGE_CHILDREN, &used);
+    return double(used.ru_utime.tv_sec) + 1e-6 * double(used.ru_utime.tv_usec);
+  };
+  for (const int asked : {1, 2, 3, 4}) {
+    StopsAt watcher(asked);
+    Job job({.watcher = &watcher});
+    const WorkingFor working(&job);
+    const double before = cpu_s_of_children();
+    EXPECT_THROW(detail::run_in_own_process(
+                     []() -> std::string {
+                       for (volatile bool on = true; on;) continue;
+                       return {};
+                     },
+                     3),
+                 Interrupted);
+    EXPECT_LT(cpu_s_of_children() - before, 1) << asked;
+  }
 }
 
 }  // namespace

@@ -289,6 +289,26 @@ class Scenes(unittest.TestCase):
         timer.join()
         self.assertEqual(world.rollout(world.start(), limber.pushes(1, steps=1)).steps[0], 1)
 
+    def test_ctrl_c_is_heard_while_a_model_is_decomposed_exactly(self):
+        # A sphere with a hundred dents: hundreds of convex parts, for longer than the test waits.
+        rows, columns = 16, 24
+        around, up = np.meshgrid(np.arange(columns) * 2 * np.pi / columns, np.arange(1, rows) * np.pi / rows)
+        radius = 1 + 0.2 * ((np.arange(columns)[None, :] + np.arange(1, rows)[:, None]) % 2)
+        points = (radius * np.sin(up) * np.cos(around), radius * np.sin(up) * np.sin(around), radius * np.cos(up))
+        vertices = np.vstack([np.stack(points, 2).reshape(-1, 3), [[0, 0, 1], [0, 0, -1]]])
+        faces, north = [], len(vertices) - 2
+        for c in range(columns):
+            d, last = (c + 1) % columns, (rows - 2) * columns
+            faces += [[north, c, d], [north + 1, last + d, last + c]]
+            for r in range(0, last, columns):
+                faces += [[r + c, r + columns + c, r + columns + d], [r + c, r + columns + d, r + d]]
+        for heard_after in (0.2, 1.5):
+            timer = threading.Timer(heard_after, lambda: os.kill(os.getpid(), signal.SIGINT))
+            timer.start()
+            with self.assertRaises(KeyboardInterrupt):
+                limber.decompose(vertices, np.array(faces), exact=True)
+            timer.join()
+
     def test_a_search_that_is_cut_is_kept_and_goes_on(self):
         whole = limber.plan("squeeze", preset="fast", seed=1)
         told = []
