@@ -19,6 +19,17 @@ foreach(header ${headers})
   endif()
 endforeach()
 
+# What the interface's classes hold is nobody's to link against.
+find_program(NM nm)
+if(NM)
+  file(GLOB library ${WORK}/prefix/lib*/liblimber.so ${WORK}/prefix/lib*/*/liblimber.so)
+  list(GET library 0 library)
+  run(${NM} -DC --defined-only ${library})
+  if(out MATCHES "([^\n]*::Impl::[^\n]*)")
+    message(FATAL_ERROR "${library} shows ${CMAKE_MATCH_1}")
+  endif()
+endif()
+
 # The prefix may lie elsewhere than where the build was to be installed.
 find_program(PKG_CONFIG pkg-config)
 if(PKG_CONFIG)

@@ -8,7 +8,7 @@
 
 namespace limber {
 
-struct Body::Impl {
+struct [[gnu::visibility("hidden")]] Body::Impl {
   Mesh surface;
   std::vector<Mesh> hulls;
   Cage cage;

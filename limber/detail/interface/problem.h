@@ -12,12 +12,12 @@
 
 namespace limber {
 
-struct Scene::Impl {
+struct [[gnu::visibility("hidden")]] Scene::Impl {
   scenes::Scene scene;
   std::vector<std::filesystem::path> data;
 };
 
-struct Problem::Impl {
+struct [[gnu::visibility("hidden")]] Problem::Impl {
   Scene scene;
   detail::WorkFolder folder;
   std::vector<detail::PreparedBody> prepared;
@@ -41,7 +41,7 @@ struct Problem::Impl {
        const std::vector<float>& start_positions);
 };
 
-struct Plan::Impl {
+struct [[gnu::visibility("hidden")]] Plan::Impl {
   Problem problem;
   plan::Plan plan;
   Json extra = {};
