@@ -104,6 +104,7 @@ class ReferenceFollower {
     State now = *rollout.from;
     const std::int64_t end = now.step + rollout.control.steps;
     while (now.step < end) {
+      throw_if_stopped();
       Rollout piece{&now, rollout.control, {}, false};
       piece.control.steps = int(std::min(end, frames_.next_step(now.step)) - now.step);
       propagator_->propagate({&piece, 1});
@@ -189,7 +190,7 @@ ControlRollout arrive(const System& system, const Settings& settings, const Cont
   path.reach_force_n = settings.max_force_n * just_below_one;
   const std::int64_t now = followed.states.empty() ? path.from.step : followed.states.back().step;
   path.last_step = now + steps_of(reach_s + settings.settle.max_duration_s, system.dt_s());
-  run(system, settings, {&path, 1}, {});
+  run(system, settings, {&path, 1}, {.stoppable = true});
   return path;
 }
 
@@ -248,6 +249,7 @@ std::vector<Control> in_steps_of(double dt_s, std::vector<Control> controls, dou
 Plan refine(const System& system, const Settings& settings, const Reference& reference,
             RefineReport& report) {
   LIMBER_CHECK(!reference.centers.empty(), reference.centers.size());
+  report = {};
   validate(settings, system);
   if (!settings.via.empty())
     throw InputError(
@@ -262,7 +264,7 @@ Plan refine(const System& system, const Settings& settings, const Reference& ref
   ControlRollout replay;
   replay.from = system.start();
   replay.controls = in_steps_of(system.dt_s(), reference.controls, reference.dt_s);
-  run(system, settings, {&replay, 1}, {.keep_frames = true});
+  run(system, settings, {&replay, 1}, {.keep_frames = true, .stoppable = true});
   tell_of_replay(system, settings, reference, replay, report);
   bool arrives = replay.result == ControlRollout::rests_in_goal;
   if (arrives && !may_be_shown(system, settings, replay)) arrives = false, report.replay_ends = "looks_wrong";

@@ -38,7 +38,8 @@ std::vector<Control> in_steps_of(double dt_s, std::vector<Control>, double their
 // Tries one after the other: the reference's controls as they are; its robot's centre and velocity followed
 // by a force at most max_force_n, anew every 0.1 s, and interpolation into the goal; a search from all states
 // on that way as far as it was good. Each piece is a control like any other, so the plan is one like any
-// other, and counts as an iteration. Throws InputError where the settings have via points.
+// other, and counts as an iteration. Throws InputError where the settings have via points, Interrupted where
+// a signal comes before the search, which keeps what it has.
 Plan refine(const System&, const Settings&, const Reference&, RefineReport&);
 
 }  // namespace limber::plan

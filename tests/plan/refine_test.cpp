@@ -2,6 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <csignal>
+
+#include "core/error.h"
+#include "core/progress.h"
 #include "core/threads.h"
 #include "tests/plan/toy.h"
 
@@ -90,6 +94,11 @@ TEST(Refine, SearchesFromWhereItWasLost) {
     EXPECT_EQ(hash_of(refine(other, s, reference, once_more).tree), hash_of(carried.tree)) << threads;
   }
   set_thread_count(0);
+
+  request_stop(SIGTERM);  // ends it before there is a search to keep
+  RefineReport stopped;
+  EXPECT_THROW(refine(other, s, reference, stopped), Interrupted);
+  request_stop(0);
 
   Settings few = s;
   few.max_iterations = report.iterations / 2;

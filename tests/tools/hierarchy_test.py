@@ -43,7 +43,7 @@ def main():
     with tempfile.TemporaryDirectory() as folder:
         scene, out, svg = (pathlib.Path(folder) / name for name in ("scene.toml", "out", "plot.svg"))
         scene.write_text(SCENE)
-        command = [sys.executable, TOOL, out, "--scenes", scene, "--tets", "40,135", "--seeds", "1"]
+        command = [sys.executable, TOOL, out, "--scenes", scene, "--tets", "40,135", "--seeds", "1", "--forces", "0.5"]
 
         def hierarchy(*more):
             environment = {**os.environ, "LIMBER": sys.argv[1]}
@@ -51,7 +51,7 @@ def main():
             assert done.returncode == 0, done.stderr
             return done
 
-        first = hierarchy("--svg", svg)
+        first = hierarchy("--verify", "--svg", svg)
         costs, carried, gains = tables(first.stdout)
         assert [row["soft tets"] for row in costs] == ["40", "135"], costs  # five a cell
         assert [row["nodes"] for row in costs] == ["27", "64"], costs
