@@ -35,6 +35,7 @@ class Changes {
     Change c;
     // Haste costs nothing where only time counts.
     c.reach_force_n = cost_ == CostKind::duration ? largest : largest * rng.uniform(0.2, 1);
+    if (!interpolates()) c.reach_force_n = 0;
     const int n = int(path_.controls.size()), free = n - keep_;
     // The first round looks at every part of the path from where the goal might be reached directly.
     const int cuts = std::min(free, changes_a_round);

@@ -115,7 +115,7 @@ TEST(Shortcut, NeverCostsMoreNorLastsLongerAndSolvesTheQuery) {
 // shortcutting comes near it from a path several times as long.
 // Where a robot is pushed at points alone, by an instrument's tip or by carriers, nobody else pushes it.
 TEST(Shortcut, PushesAsTheSearchMayAlone) {
-  const Toy toy(5, true, false, 99);
+  const Toy toy(5, false, false, 99);
   Settings s = settings_of_seed(3);
   s.weights = {.body = 0, .control_point = 1, .interpolation = 0};
   s.max_iterations = 4000, s.control_point_radius_m = 2;
