@@ -168,7 +168,7 @@ const char* name_of(ControlRollout::Result result) {
 }
 
 void tell_of_replay(const System& system, const Settings& settings, const Reference& reference,
-                    ControlRollout& replay, RefineReport& report) {
+                    const ControlRollout& replay, RefineReport& report) {
   report.replay_ends = name_of(replay.result);
   report.replay_s = replay.costs.duration_s;
   report.replay_distance_m = distance_from_goal(system, settings, replay.end);
@@ -179,7 +179,11 @@ void tell_of_replay(const System& system, const Settings& settings, const Refere
     report.replay_largest_error_m = std::max(report.replay_largest_error_m, error);
     report.replay_mean_error_m += error / double(replay.frames.size());
   }
-  replay.frames = {};
+}
+
+// As may_be_shown(), of a course whose frames were kept.
+bool looks_right(const System& system, const ControlRollout& course) {
+  return system.first_refused(course.frames) == course.frames.size();
 }
 
 // From the end of what was followed into the goal and to rest.
@@ -190,7 +194,7 @@ ControlRollout arrive(const System& system, const Settings& settings, const Cont
   path.reach_force_n = settings.max_force_n * just_below_one;
   const std::int64_t now = followed.states.empty() ? path.from.step : followed.states.back().step;
   path.last_step = now + steps_of(reach_s + settings.settle.max_duration_s, system.dt_s());
-  run(system, settings, {&path, 1}, {.stoppable = true});
+  run(system, settings, {&path, 1}, {.keep_frames = true, .stoppable = true});
   return path;
 }
 
@@ -266,10 +270,12 @@ Plan refine(const System& system, const Settings& settings, const Reference& ref
   replay.controls = in_steps_of(system.dt_s(), reference.controls, reference.dt_s);
   run(system, settings, {&replay, 1}, {.keep_frames = true, .stoppable = true});
   tell_of_replay(system, settings, reference, replay, report);
-  bool arrives = replay.result == ControlRollout::rests_in_goal;
-  if (arrives && !may_be_shown(system, settings, replay)) arrives = false, report.replay_ends = "looks_wrong";
+  const bool rests = replay.result == ControlRollout::rests_in_goal,
+             good = rests && looks_right(system, replay);
+  if (rests && !good) report.replay_ends = "looks_wrong";
+  replay.frames = {};
   report.replay_cpu_s = spent();
-  if (arrives) {
+  if (good) {
     report.how = RefineReport::replayed;
     return solved_by(system, settings, replay);
   }
@@ -277,7 +283,7 @@ Plan refine(const System& system, const Settings& settings, const Reference& ref
   ReferenceFollower follower(system, settings, reference);
   const ControlRollout followed = follower.follow(report);
   const ControlRollout arrived = follower.complete() ? arrive(system, settings, followed) : ControlRollout{};
-  arrives = arrived.result == ControlRollout::rests_in_goal && may_be_shown(system, settings, arrived);
+  const bool arrives = arrived.result == ControlRollout::rests_in_goal && looks_right(system, arrived);
   report.track_cpu_s = spent();
   if (arrives) {
     report.how = RefineReport::tracked;
