@@ -45,7 +45,8 @@ Sample draw_sample(const Settings& s, const System& system, std::int64_t iterati
 
 Control steered_control(const Sample& d, const Settings& s, const System& system, const NodeMotion& from,
                         const Vec3& target, const Vec3& target_velocity) {
-  const double force = d.force_n * just_below_one, acceleration = force / system.robot_mass_kg();
+  const double force = d.force_n * just_below_one;
+  const Drive drive{force / system.robot_mass_kg(), system.robot_drag_per_s()};
   Control control;
   control.manipulation = d.manipulation == Manipulation::interpolation ? Manipulation::body : d.manipulation;
   if (control.manipulation == Manipulation::control_point) {
@@ -54,9 +55,9 @@ Control steered_control(const Sample& d, const Settings& s, const System& system
   }
   control.steps = d.steps;
   const Vec3 way = target - from.center, velocity = from.velocity - target_velocity;
-  if (acceleration <= 0 || way.squaredNorm() == 0) return control;
-  control.force_n = (force * best_direction(way, velocity, acceleration)).cast<float>();
-  const double lasts = time_to_go(way, velocity, acceleration) * (shortest_stretch + stretches * d.stretch);
+  if (drive.acceleration <= 0 || way.squaredNorm() == 0) return control;
+  control.force_n = (force * best_direction(way, velocity, drive)).cast<float>();
+  const double lasts = time_to_go(way, velocity, drive) * (shortest_stretch + stretches * d.stretch);
   control.steps = steps_of(std::clamp(lasts, s.min_duration_s, s.max_duration_s), system.dt_s());
   return control;
 }
@@ -67,7 +68,8 @@ Control carriers_control(const Sample& d, const Settings& s, const System& syste
   Vec3 lift = -0.5 * d.lift * system.carriers()->weight_n;
   if (lift.norm() > most) lift *= most / lift.norm();
   // However the two point, together they are no more than may be.
-  const double force = most - lift.norm(), acceleration = 2 * force / system.robot_mass_kg();
+  const double force = most - lift.norm();
+  const Drive drive{2 * force / system.robot_mass_kg(), system.robot_drag_per_s()};
   Control control;
   control.manipulation = Manipulation::control_point;
   control.node = system.carriers()->nodes[0], control.second_node = system.carriers()->nodes[1];
@@ -79,9 +81,9 @@ Control carriers_control(const Sample& d, const Settings& s, const System& syste
                velocity = from.carried[i].velocity - target_velocity;
     Vec3f& on_it = i == 0 ? control.force_n : control.second_force_n;
     on_it = lift.cast<float>();
-    if (acceleration <= 0 || way.squaredNorm() == 0) continue;
-    on_it = (lift + force * best_direction(way, velocity, acceleration)).cast<float>();
-    lasts = std::max(lasts, time_to_go(way, velocity, acceleration));
+    if (drive.acceleration <= 0 || way.squaredNorm() == 0) continue;
+    on_it = (lift + force * best_direction(way, velocity, drive)).cast<float>();
+    lasts = std::max(lasts, time_to_go(way, velocity, drive));
   }
   if (s.search_options.steer && lasts > 0)
     control.steps = steps_of(

@@ -31,6 +31,7 @@ struct NodeMotion {
   Vec3 center = Vec3::Zero(), velocity = Vec3::Zero();
   Vec3 goal_shift = Vec3::Zero(), goal_velocity = Vec3::Zero();
   std::array<NodePlace, 2> carried{};  // where the system has carriers
+  Windings windings = {};
 };
 
 // Pushes towards `target` (which moves at `target_velocity`) reckoning with the velocity; the way there takes

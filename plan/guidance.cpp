@@ -14,6 +14,7 @@ namespace {
 constexpr float far = 1e18f;
 constexpr double rigid_over_soft = 10;
 constexpr double inside_rigid = 1000;  // price of a metre: never better than a way round, yet a number
+constexpr std::size_t most_sheets = 200;
 
 // Lower envelope of parabolas, along one line of a grid.
 class LineTransform {
@@ -69,10 +70,12 @@ std::vector<float> distance_in_cells(const Eigen::Vector3i& n, const std::vector
   return d;
 }
 
-Guidance::Guidance(const Workspace& space, const Vec3& goal, double soft_price) : space_(space), goal_(goal) {
+Guidance::Guidance(const Workspace& space, const Vec3& goal, double soft_price, const Windings& start)
+    : space_(space), goal_(goal) {
   LIMBER_CHECK(space.cells.minCoeff() > 0 && space.what.size() == std::size_t(space.cells.prod()),
                space.what.size());
   set_prices(soft_price);
+  set_sheets(start);
   renew();
 }
 
@@ -116,15 +119,62 @@ void Guidance::set_prices(double soft_price) {
   }
 }
 
+// All reduced words in which no hole is more often than the goal asks for, or than it is at the start. Where
+// those are too many, there is one sheet, and holes are holes in walls.
+void Guidance::set_sheets(const Windings& start) {
+  std::vector<int> most;
+  for (std::size_t h = 0; h < space_.holes.size(); ++h)
+    most.push_back(std::max(space_.holes[h].pieces, pieces_in(start, int(h))));
+  sheets_ = {{}};
+  for (std::size_t s = 0; s < sheets_.size() && sheets_.size() <= most_sheets; ++s)
+    for (int letter = -int(most.size()); letter <= int(most.size()); ++letter) {
+      const Windings& word = sheets_[s];
+      if (letter == 0 || (!word.empty() && word.back() == -letter)) continue;
+      if (pieces_in(word, std::abs(letter) - 1) == most[std::size_t(std::abs(letter)) - 1]) continue;
+      Windings longer = word;
+      longer.push_back(letter);
+      sheets_.push_back(std::move(longer));
+    }
+  if (sheets_.size() > most_sheets) sheets_ = {{}}, space_.holes.clear();
+  for (std::size_t s = 0; s < sheets_.size(); ++s) sheet_of_[sheets_[s]] = int(s);
+  near_hole_.assign(price_.size(), false);
+  for (std::size_t c = 0; c < price_.size(); ++c)
+    for (const Hole& hole : space_.holes) {
+      const Vec3 away = center_of(int(c)) - hole.middle_m;
+      const double step = 2 * space_.cell_m;  // longer than to any neighbour
+      if (std::abs(away.dot(hole.normal)) < step && away.norm() < hole.radius_m + step) near_hole_[c] = true;
+    }
+}
+
+int Guidance::node_at(const Vec3& place, Windings windings) const {
+  const int cell = cell_at(place);
+  if (space_.holes.empty()) return cell;
+  wind(windings, space_.holes, place, center_of(cell));
+  const auto sheet = sheet_of_.find(windings);
+  return sheet == sheet_of_.end() ? -1 : sheet->second * cells() + cell;
+}
+
+int Guidance::sheet_behind(int sheet, int cell, int other) const {
+  if (!near_hole_[std::size_t(cell)]) return sheet;
+  Windings windings = sheets_[std::size_t(sheet)];
+  wind(windings, space_.holes, center_of(cell), center_of(other));
+  const auto found = sheet_of_.find(windings);
+  return found == sheet_of_.end() ? -1 : found->second;
+}
+
+// A step backwards unwinds what the step itself winds, so from the goal the same rule holds.
 void Guidance::renew() {
   const int nx = space_.cells.x(), ny = space_.cells.y(), nz = space_.cells.z();
-  to_go_.assign(price_.size(), std::numeric_limits<float>::infinity());
-  next_.assign(price_.size(), -1);
+  to_go_.assign(sheets_.size() * price_.size(), std::numeric_limits<float>::infinity());
+  next_.assign(to_go_.size(), -1);
   using Entry = std::pair<float, int>;  // equal costs in order of cells: one result
   std::priority_queue<Entry, std::vector<Entry>, std::greater<Entry>> open;
-  const int goal = cell_at(goal_);
-  to_go_[std::size_t(goal)] = 0, next_[std::size_t(goal)] = goal;
-  open.emplace(0.0f, goal);
+  for (std::size_t s = 0; s < sheets_.size(); ++s) {
+    if (!hangs_as_asked(sheets_[s], space_.holes)) continue;
+    const int goal = int(s) * cells() + cell_at(goal_);
+    to_go_[std::size_t(goal)] = 0, next_[std::size_t(goal)] = goal;
+    open.emplace(0.0f, goal);
+  }
   struct Step {
     int x, y, z;
     float length;
@@ -136,45 +186,52 @@ void Guidance::renew() {
         if (x || y || z)
           steps.push_back({x, y, z, float(space_.cell_m) * std::sqrt(float(x * x + y * y + z * z))});
   while (!open.empty()) {
-    const auto [cost, cell] = open.top();
+    const auto [cost, at] = open.top();
     open.pop();
-    if (cost > to_go_[std::size_t(cell)]) continue;
+    if (cost > to_go_[std::size_t(at)]) continue;
+    const int sheet = at / cells(), cell = at % cells();
+    farthest_ = cost;
     const int x = cell % nx, y = cell / nx % ny, z = cell / (nx * ny);
     for (const Step& s : steps) {
       const int i = x + s.x, j = y + s.y, k = z + s.z;
       if (i < 0 || j < 0 || k < 0 || i >= nx || j >= ny || k >= nz) continue;
       const int other = (k * ny + j) * nx + i;
       const float way = cost + 0.5f * s.length * (price_[std::size_t(cell)] + price_[std::size_t(other)]);
-      if (!(way < to_go_[std::size_t(other)])) continue;
-      to_go_[std::size_t(other)] = way, next_[std::size_t(other)] = cell;
-      open.emplace(way, other);
+      const int behind = sheet_behind(sheet, cell, other);
+      if (behind < 0) continue;
+      const int from = behind * cells() + other;
+      if (!(way < to_go_[std::size_t(from)])) continue;
+      to_go_[std::size_t(from)] = way, next_[std::size_t(from)] = at;
+      open.emplace(way, from);
     }
   }
 }
 
-double Guidance::to_go(const Vec3& place) const {
-  const int cell = cell_at(place);
+double Guidance::to_go(const Vec3& place, const Windings& windings) const {
+  const int from = node_at(place, windings);
+  if (from < 0) return double(farthest_);
   // Within a cell the way to its middle's successor is measured, so that the number changes as the robot
   // moves.
-  const int next = next_[std::size_t(cell)];
-  const Vec3 towards = next == cell ? goal_ : center_of(next);
-  const double price = double(price_[std::size_t(cell)]);
+  const int next = next_[std::size_t(from)];
+  const Vec3 towards = next == from ? goal_ : center_of(next % cells());
+  const double price = double(price_[std::size_t(from % cells())]);
   return double(to_go_[std::size_t(next)]) + price * (towards - place).norm();
 }
 
-Vec3 Guidance::ahead(const Vec3& place, double way_m) const {
-  int cell = cell_at(place);
-  Vec3 at = place;
-  while (next_[std::size_t(cell)] != cell) {
-    cell = next_[std::size_t(cell)];
-    const Vec3 to = center_of(cell);
-    const double length = (to - at).norm();
-    if (length >= way_m) return at + (to - at) * (way_m / length);
+Vec3 Guidance::ahead(const Vec3& place, double way_m, const Windings& windings) const {
+  int node = node_at(place, windings);
+  if (node < 0) return place;
+  Vec3 here = place;
+  while (next_[std::size_t(node)] != node) {
+    node = next_[std::size_t(node)];
+    const Vec3 to = center_of(node % cells());
+    const double length = (to - here).norm();
+    if (length >= way_m) return here + (to - here) * (way_m / length);
     way_m -= length;
-    at = to;
+    here = to;
   }
-  const double length = (goal_ - at).norm();
-  return length > way_m ? Vec3(at + (goal_ - at) * (way_m / length)) : goal_;
+  const double length = (goal_ - here).norm();
+  return length > way_m ? Vec3(here + (goal_ - here) * (way_m / length)) : goal_;
 }
 
 double Guidance::price(const Vec3& place) const { return double(price_[std::size_t(cell_at(place))]); }

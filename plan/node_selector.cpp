@@ -5,7 +5,6 @@
 #include <limits>
 
 #include "core/error.h"
-#include "plan/steering.h"
 
 namespace limber::plan {
 
@@ -32,10 +31,11 @@ NodeSelector::NodeSelector(const System& system, const Settings& settings, const
                                    settings.search_options.soft_price);
 }
 
-double NodeSelector::strongest() const {
+Drive NodeSelector::strongest() const {
   const double carriers = system_.carriers() ? 2 : 1;
-  return std::max(1e-9,
-                  carriers * settings_.max_force_n * settings_.max_force_share / system_.robot_mass_kg());
+  return {
+      std::max(1e-9, carriers * settings_.max_force_n * settings_.max_force_share / system_.robot_mass_kg()),
+      system_.robot_drag_per_s()};
 }
 
 void NodeSelector::add(const Tree& tree, int of_tree) {
@@ -44,8 +44,12 @@ void NodeSelector::add(const Tree& tree, int of_tree) {
   const State state = tree.states[std::size_t(of_tree)];
   const Vec3f center = tree.centers[of_tree];
   const Vec3 shift = system_.goal_shift(state);
-  motions_.push_back(
-      {center.cast<double>(), system_.robot_velocity(state), shift, system_.goal_velocity(state)});
+  motions_.push_back({center.cast<double>(),
+                      system_.robot_velocity(state),
+                      shift,
+                      system_.goal_velocity(state),
+                      {},
+                      system_.windings(state)});
   if (const Carriers* carriers = system_.carriers())
     for (std::size_t i = 0; i < 2; ++i)
       motions_.back().carried[i] = system_.node_place(state, carriers->nodes[i]);
@@ -90,12 +94,14 @@ void NodeSelector::rank_all() {
   std::sort(ranking_.begin(), ranking_.end());
 }
 
-double NodeSelector::seconds_to_go(const Guidance& guidance, const Vec3& place, const Vec3& velocity) const {
-  const double radius = guidance.workspace().robot_radius_m, a = strongest();
-  const Vec3 way = guidance.ahead(place, 2 * radius) - place;
+double NodeSelector::seconds_to_go(const Guidance& guidance, const Vec3& place, const Vec3& velocity,
+                                   const Windings& windings) const {
+  const double radius = guidance.workspace().robot_radius_m;
+  const Vec3 way = guidance.ahead(place, 2 * radius, windings) - place;
   const Vec3 direction = way.norm() > 0 ? Vec3(way.normalized()) : Vec3::Zero();
   const double along = velocity.dot(direction), across = (velocity - along * direction).norm();
-  return min_time_to_go(guidance.to_go(place), along, a) + across / a;
+  return min_time_to_go(guidance.to_go(place, windings), along, strongest()) +
+         time_to_stop(across, strongest());
 }
 
 double NodeSelector::heuristic(int node) const {
@@ -103,11 +109,11 @@ double NodeSelector::heuristic(int node) const {
   double to_go = 0;
   for (std::size_t i = 0; i < carrier_guidance_.size(); ++i)
     to_go += 0.5 * seconds_to_go(carrier_guidance_[i], at.carried[i].place - at.goal_shift,
-                                 at.carried[i].velocity - at.goal_velocity);
+                                 at.carried[i].velocity - at.goal_velocity, {});
   if (carrier_guidance_.empty())
-    to_go = seconds_to_go(*guidance_, at.center - at.goal_shift, at.velocity - at.goal_velocity);
+    to_go = seconds_to_go(*guidance_, at.center - at.goal_shift, at.velocity - at.goal_velocity, at.windings);
   return to_go + settings_.search_options.time_weight * times_s_[std::size_t(node)] +
-         child_price * std::sqrt(2 * guidance_->workspace().robot_radius_m / strongest()) *
+         child_price * std::sqrt(2 * guidance_->workspace().robot_radius_m / strongest().acceleration) *
              children_[std::size_t(node)];
 }
 
@@ -118,7 +124,9 @@ void NodeSelector::learn(const Control& control, int parent, int node) {
   const NodeMotion& to = motions_[std::size_t(node)];
   const double t = control.steps * system_.dt_s(), radius = guidance_->workspace().robot_radius_m;
   const Vec3 push = control.force_n.cast<double>() / system_.robot_mass_kg();
-  const Vec3 open_way = (from.velocity - from.goal_velocity) * t + 0.5 * push * t * t;
+  const Drive a_metre{1, system_.robot_drag_per_s()};
+  const Vec3 open_way =
+      (from.velocity - from.goal_velocity) * drift_m(a_metre, t) + push * driven_m(a_metre, t);
   const Vec3 way = (to.center - to.goal_shift) - (from.center - from.goal_shift);
   if (push.norm() == 0 || open_way.norm() < 0.5 * radius || way.norm() > stuck_share * open_way.norm())
     return;
@@ -158,7 +166,9 @@ int NodeSelector::nearest_in_time(const Sample& d) const {
     const NodeMotion& at = motions_[std::size_t(node)];
     const Vec3 way = d.point + (d.towards_goal ? at.goal_shift : Vec3::Zero()) - at.center;
     const Vec3 velocity = at.velocity - (d.towards_goal ? at.goal_velocity : Vec3::Zero());
-    if (!carried && min_time_to_go(way.norm(), velocity.norm(), strongest()) >= least) continue;
+    // Without drag it is sooner still, and quickly told.
+    const Drive unslowed{strongest().acceleration};
+    if (!carried && min_time_to_go(way.norm(), velocity.norm(), unslowed) >= least) continue;
     if (const double c = cost_of(d, node); c < least) best = node, least = c;
   }
   return best;
@@ -208,7 +218,7 @@ Control NodeSelector::control(const Sample& d, int node) const {
   if (d.guided) {
     const double radius = guidance_->workspace().robot_radius_m;
     const double way = radius * (nearest_ahead + (farthest_ahead - nearest_ahead) * d.ahead);
-    const Vec3 target = guidance_->ahead(at.center - at.goal_shift, way) + at.goal_shift;
+    const Vec3 target = guidance_->ahead(at.center - at.goal_shift, way, at.windings) + at.goal_shift;
     if (settings_.weights.interpolation > 0 && target == settings_.goal.center_of_mass_m + at.goal_shift) {
       Sample arriving = d;
       arriving.manipulation = Manipulation::interpolation;

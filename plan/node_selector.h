@@ -6,6 +6,7 @@
 
 #include "plan/expansion.h"
 #include "plan/guidance.h"
+#include "plan/steering.h"
 #include "plan/tree.h"
 
 namespace limber::plan {
@@ -37,12 +38,12 @@ class NodeSelector {
   // Where the carriers are to go from a node: that pose of the robot, of which the draw says centre and turn.
   std::array<Vec3, 2> carrier_targets(const Sample&, int node) const;
   double heuristic(int node) const;  // seconds to the goal; less is better
-  double seconds_to_go(const Guidance&, const Vec3& place, const Vec3& velocity) const;
+  double seconds_to_go(const Guidance&, const Vec3& place, const Vec3& velocity, const Windings&) const;
   void rank(int node);
   void unrank(int node);
   void rank_all();
   void learn(const Control&, int parent, int node);
-  double strongest() const;  // metres a second squared
+  Drive strongest() const;
 
   const System& system_;
   const Settings& settings_;

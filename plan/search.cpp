@@ -85,9 +85,10 @@ struct Expansion : Rollout {
 };
 
 // The cost-to-go over a grid, where a share of the expansions is led by it (plan/guidance.h).
-std::optional<Guidance> guidance_of(const System& system, const Settings& settings) {
+std::optional<Guidance> guidance_of(const System& system, const Settings& settings, const State& root) {
   if (settings.search_options.guidance == 0) return std::nullopt;
-  return Guidance(system.workspace(), settings.goal.center_of_mass_m, settings.search_options.soft_price);
+  return Guidance(system.workspace(), settings.goal.center_of_mass_m, settings.search_options.soft_price,
+                  system.windings(root));
 }
 
 // Threads take expansions from one queue and commit them in its order. With a lag, an expansion is drawn when
@@ -108,7 +109,7 @@ class Search {
         progress_("plan", settings.max_iterations),
         started_(started),
         frames_(system, settings.frames_per_second),
-        guidance_(guidance_of(system, settings)),
+        guidance_(guidance_of(system, settings, plan.tree.states[std::size_t(plan.legs.back().root)])),
         selector_(system, settings, guidance_ ? &*guidance_ : nullptr, plan.legs.back().root),
         next_iteration_(plan.legs.back().first_iteration),
         committed_(next_iteration_) {
@@ -264,7 +265,7 @@ class Search {
         moved < settings_.settle.mean_speed_m_s * search_options_.look_s ? e.looks_at_rest + 1 : 0;
     if (e.looks_at_rest == 2) return false;
     if (!e.sample.guided) return true;
-    const double to_go = guidance_->to_go(place);
+    const double to_go = guidance_->to_go(place, look.windings);
     e.min_to_go = std::min(e.min_to_go, to_go);
     return to_go <= e.min_to_go + leads_away * guidance_->workspace().robot_radius_m;
   }

@@ -10,6 +10,7 @@
 
 #include "core/mesh.h"
 #include "core/state.h"
+#include "plan/windings.h"
 
 namespace limber::plan {
 
@@ -29,6 +30,7 @@ struct Observation {
   int steps = 0;                                        // since it began
   Vec3 center = Vec3::Zero(), velocity = Vec3::Zero();  // as System::robot_center, robot_velocity
   Vec3 goal_shift = Vec3::Zero();                       // as System::goal_shift
+  Windings windings = {};                               // as System::windings
   bool lost = false;  // the goal cannot be reached any more, and the state is not acceptable
 };
 
@@ -80,9 +82,10 @@ struct Workspace {
   Box box;
   double cell_m = 0;
   Eigen::Vector3i cells = Eigen::Vector3i::Zero();
-  std::vector<Cell> what;     // [(z · ny + y) · nx + x]; the robot itself leaves no trace
-  bool walls = true;          // the box is closed
-  double robot_radius_m = 0;  // of the largest ball round the robot's centre of mass that it holds
+  std::vector<Cell> what;        // [(z · ny + y) · nx + x]; the robot itself leaves no trace
+  bool walls = true;             // the box is closed
+  double robot_radius_m = 0;     // of the largest ball round the robot's centre of mass that it holds
+  std::vector<Hole> holes = {};  // of which the goal says what hangs in them; see System::windings
 };
 
 // What a path is judged by beside its time and its forces.
@@ -101,8 +104,9 @@ class System {
   virtual Vec3 robot_center(const State&) const = 0;
   virtual Vec3 robot_velocity(const State&) const = 0;
   virtual double robot_mass_kg() const = 0;
-  virtual double mean_speed(const State&) const = 0;  // of the robot's nodes, metres a second
-  virtual int robot_nodes() const = 0;                // Control::node is below it
+  virtual double robot_drag_per_s() const { return 0; }  // what slows it, by so much of its velocity
+  virtual double mean_speed(const State&) const = 0;     // of the robot's nodes, metres a second
+  virtual int robot_nodes() const = 0;                   // Control::node is below it
   // The node that a control point is at, of one drawn below robot_nodes().
   virtual int control_node(int drawn) const { return drawn; }
   virtual const Carriers* carriers() const {
@@ -122,6 +126,8 @@ class System {
   virtual std::size_t first_refused(std::span<const State> frames) const { return frames.size(); }
   // What else than the place of the robot's centre of mass makes it reach the goal: its turn, its shape, …
   virtual bool goal_holds(const State&) const { return true; }
+  // How the robot, a strand led by its end, hangs in the workspace's holes: from its tail to robot_center.
+  virtual Windings windings(const State&) const { return {}; }
   // How far the goal has moved since the start: it may hang on a body that moves by itself. Metres.
   virtual Vec3 goal_shift(const State&) const { return Vec3::Zero(); }
   // The same dynamics on the leg to the goal with this number (Settings::via, then the last): acceptable and

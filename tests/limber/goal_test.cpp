@@ -108,14 +108,20 @@ TEST(Goal, PiecesInTheHoleOfARingAreCounted) {
     }
     return with_robot_at(world, p);
   };
-  const std::tuple<State, int, const char*> cases[] = {
-      {at(0.8, 0, false), 0, "beside it"},
-      {at(0, 0, false), 1, "through it"},
-      {at(-0.2, 0.2, true), 2, "through it and back"},
-      {at(-0.2, 0.8, true), 1, "through it and back round it"},
-      {at(0.8, 1.1, true), 0, "there and back beside it"}};
-  for (const auto& [state, pieces, what] : cases) {
+  // Led by its end at x = 2; through and back it is a bight, which can be drawn out.
+  const int there = hole.normal.x() > 0 ? 1 : -1;
+  const std::tuple<State, int, plan::Windings, const char*> cases[] = {
+      {at(0.8, 0, false), 0, {}, "beside it"},
+      {at(0, 0, false), 1, {there}, "through it"},
+      {at(-0.2, 0.2, true), 2, {}, "through it and back"},
+      {at(-0.2, 0.8, true), 1, {there}, "through it and back round it"},
+      {at(0.8, 0.2, true), 1, {-there}, "round it and back through it"},
+      {at(0.8, 1.1, true), 0, {}, "there and back beside it"}};
+  for (const auto& [state, pieces, windings, what] : cases) {
     EXPECT_EQ(fem::pieces_through(world, state, 1), pieces) << what;
+    GoalRules led;
+    led.through = {{1, 1}}, led.lead = true, led.patches_m = {{Vec3(1.85, 1, -1), Vec3(2.1, 2, 1)}};
+    EXPECT_EQ(FemSystem(world, led).windings(state), windings) << what;
     for (const int asked : {1, 2}) {
       GoalRules rules;
       rules.through = {{1, asked}};

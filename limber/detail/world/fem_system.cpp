@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
+#include <queue>
 
 #include "core/error.h"
 #include "core/hash.h"
@@ -84,6 +86,37 @@ std::uint64_t hash_of_world(const fem::World& world) {
   }
   add_script(world, hasher);
   return hasher.digest();
+}
+
+// The shortest way along edges, at rest, to `end` from the node that is farthest from it.
+std::vector<int> strand_to(const TetMesh& cage, int end) {
+  std::vector<std::vector<int>> neighbours(std::size_t(cage.positions.rows()));
+  for (Eigen::Index t = 0; t < cage.tets.rows(); ++t)
+    for (int i = 0; i < 4; ++i)
+      for (int j = 0; j < 4; ++j)
+        if (i != j) neighbours[std::size_t(cage.tets(t, i))].push_back(cage.tets(t, j));
+  std::vector<double> way(neighbours.size(), std::numeric_limits<double>::infinity());
+  std::vector<int> next(neighbours.size(), end);
+  std::priority_queue<std::pair<double, int>, std::vector<std::pair<double, int>>, std::greater<>> open;
+  way[std::size_t(end)] = 0;
+  open.emplace(0, end);
+  int last = end;
+  while (!open.empty()) {
+    const auto [length, node] = open.top();
+    open.pop();
+    if (length > way[std::size_t(node)]) continue;
+    last = node;
+    for (const int other : neighbours[std::size_t(node)]) {
+      const double longer = length + (cage.positions.row(other) - cage.positions.row(node)).norm();
+      if (longer >= way[std::size_t(other)]) continue;
+      way[std::size_t(other)] = longer, next[std::size_t(other)] = node;
+      open.emplace(longer, other);
+    }
+  }
+  std::vector<int> strand;
+  for (; last != end; last = next[std::size_t(last)]) strand.push_back(last);
+  strand.push_back(end);
+  return strand;
 }
 
 }  // namespace
@@ -218,6 +251,7 @@ class FemSystem::Propagator final : public plan::Propagator {
     if (!system_.lead_nodes_.empty()) {
       batch.peek(lane, peeked_);
       look.center = system_.robot_center(peeked_), look.velocity = system_.robot_velocity(peeked_);
+      look.windings = system_.windings(peeked_);
     }
     if (system_.goal_.body >= 0)
       look.goal_shift = batch.motion(lane, system_.goal_.body).center_m - system_.goal_body_start_m_;
@@ -254,6 +288,9 @@ FemSystem::FemSystem(const fem::World& world, const GoalRules& goal, std::option
   for (const auto& [ring, pieces] : goal.through) hasher.text("through").value(ring).value(pieces);
   if (!goal.patches_m.empty()) find_patches(), hasher.text("patches").value(int(goal.lead));
   if (goal.carry) hasher.text("carry");
+  // A search of before these were known grew another tree.
+  if (robot_drag_per_s() > 0) hasher.text("steered by drag");
+  if (!holes_.empty()) hasher.text("guided by windings");
   for (const Box& patch : goal.patches_m) hasher.matrix(patch.lower).matrix(patch.upper);
   for (GoalRules rules : goal.via) {
     rules.patches_m = goal.patches_m, rules.lead = goal.lead, rules.carry = goal.carry;
@@ -301,6 +338,24 @@ void FemSystem::find_patches() {
   if (!goal_.lead) return;
   lead_nodes_ = free_in(goal_.patches_m[0]);
   for (const int n : lead_nodes_) lead_mass_kg_ += robot.node_mass_kg[std::size_t(n)];
+  if (goal_.through.empty()) return;
+  strand_ = strand_to(robot.cage, patch_nodes_[0]);
+  const State begins = fem::start_state(world_);
+  for (const auto& [ring, pieces] : goal_.through) {
+    const fem::Hole hole = fem::hole_of(world_, begins, ring);
+    holes_.push_back({hole.middle_m, hole.normal, hole.radius_m, pieces});
+  }
+}
+// A ring that moves takes its hole along, but a guidance that knows the holes of the start only would go
+// wrong: those are looked at where they were.
+plan::Windings FemSystem::windings(const State& state) const {
+  plan::Windings windings;
+  if (strand_.empty()) return windings;
+  Vec3 last = node_place(state, strand_[0]).place;
+  const auto on_to = [&](const Vec3& next) { plan::wind(windings, holes_, last, next), last = next; };
+  for (const int node : strand_) on_to(node_place(state, node).place);
+  on_to(robot_center(state));
+  return windings;
 }
 // Of the nodes that lead, the mean of what the state has of each, by their masses.
 Vec3 FemSystem::mean_of_lead(const std::vector<float>& of_nodes) const {
@@ -320,6 +375,9 @@ Vec3 FemSystem::robot_velocity(const State& state) const {
   return fem::center_velocity_m_s(world_, state, world_.robot);
 }
 double FemSystem::robot_mass_kg() const { return world_.bodies[std::size_t(world_.robot)].mass_kg; }
+double FemSystem::robot_drag_per_s() const {
+  return world_.bodies[std::size_t(world_.robot)].material.mass_damping_per_s;
+}
 double FemSystem::mean_speed(const State& state) const {
   return fem::mean_speed_m_s(world_, state, world_.robot);
 }
@@ -418,7 +476,7 @@ plan::Measures FemSystem::measures(const State& state) const {
 Vec3 FemSystem::goal_velocity(const State& state) const {
   return goal_.body < 0 ? Vec3::Zero() : fem::center_velocity_m_s(world_, state, goal_.body);
 }
-plan::Workspace FemSystem::workspace() const { return workspace_of(world_, given_start_); }
+plan::Workspace FemSystem::workspace() const { return workspace_of(world_, given_start_, holes_); }
 int FemSystem::lanes() const { return preferred_lanes; }
 std::unique_ptr<plan::Propagator> FemSystem::make_propagator() const {
   return std::make_unique<Propagator>(*this);

@@ -48,6 +48,7 @@ class FemSystem final : public plan::System {
   Vec3 robot_center(const State&) const override;
   Vec3 robot_velocity(const State&) const override;
   double robot_mass_kg() const override;
+  double robot_drag_per_s() const override;
   double mean_speed(const State&) const override;
   int robot_nodes() const override;
   int control_node(int drawn) const override;
@@ -59,6 +60,7 @@ class FemSystem final : public plan::System {
   // It is sound, nothing is pressed by more than it may be, and the goal is not lost.
   bool acceptable(const State&) const override;
   bool goal_holds(const State&) const override;
+  plan::Windings windings(const State&) const override;
   const System& on_leg(int) const override;
   Vec3 goal_shift(const State&) const override;
   plan::Measures measures(const State&) const override;
@@ -79,6 +81,8 @@ class FemSystem final : public plan::System {
   std::vector<std::unique_ptr<FemSystem>> via_;
   std::vector<int> patch_nodes_;  // of the robot: of each patch's, the nearest to its middle
   std::vector<int> lead_nodes_;   // of the robot; empty: no patch leads
+  std::vector<int> strand_;  // of the robot: from its far end to the patch that leads; empty: nobody asks
+  std::vector<plan::Hole> holes_;  // that the goal speaks of, as the world begins
   double lead_mass_kg_ = 0;
   std::optional<plan::Carriers> carriers_;
   const FemSystem* last_ = this;  // on the leg to the last goal: what is lost to it is lost

@@ -10,7 +10,7 @@ namespace limber::detail {
 namespace {
 
 constexpr double cells_a_radius = 4;
-constexpr int max_cells = 200000;
+constexpr int max_cells = 200000, max_cells_a_sheet = 40000;
 
 // The cells whose middles are in the tet; where a field is given, only those that were inside its surface
 // while the tet was at rest.
@@ -60,12 +60,15 @@ void mark_surface(const DistanceField& field, plan::Workspace::Cell kind, plan::
 
 }  // namespace
 
-plan::Workspace workspace_of(const fem::World& world, const std::optional<State>& given) {
+plan::Workspace workspace_of(const fem::World& world, const std::optional<State>& given,
+                             const std::vector<plan::Hole>& holes) {
   plan::Workspace w;
+  w.holes = holes;
   w.robot_radius_m = fem::inner_radius_m(world, world.robot);
   w.box = world.bounds_m, w.walls = world.walls;
   const Vec3 size = w.box.size();
-  w.cell_m = std::max(w.robot_radius_m / cells_a_radius, std::cbrt(size.prod() / max_cells));
+  w.cell_m = std::max(w.robot_radius_m / cells_a_radius,
+                      std::cbrt(size.prod() / (holes.empty() ? max_cells : max_cells_a_sheet)));
   for (int i = 0; i < 3; ++i) w.cells[i] = std::max(1, int(std::ceil(size[i] / w.cell_m - 1e-9)));
   w.what.assign(std::size_t(w.cells.prod()), plan::Workspace::open);
   const State start = given.value_or(fem::start_state(world));
