@@ -15,6 +15,7 @@ constexpr float far = 1e18f;
 constexpr double rigid_over_soft = 10;
 constexpr double inside_rigid = 1000;  // price of a metre: never better than a way round, yet a number
 constexpr std::size_t most_sheets = 200;
+constexpr double bend = 3;  // of a strand's radius: bent so, its outside is stretched by a third
 
 // Lower envelope of parabolas, along one line of a grid.
 class LineTransform {
@@ -74,6 +75,7 @@ Guidance::Guidance(const Workspace& space, const Vec3& goal, double soft_price, 
     : space_(space), goal_(goal) {
   LIMBER_CHECK(space.cells.minCoeff() > 0 && space.what.size() == std::size_t(space.cells.prod()),
                space.what.size());
+  if (!space_.holes.empty()) space_.robot_radius_m *= bend;
   set_prices(soft_price);
   set_sheets(start);
   renew();

@@ -29,6 +29,7 @@ class Guidance {
   void raise(const Vec3& place, double by);
   void renew();  // the cost-to-go under the present prices
 
+  // Of a strand that hangs in holes the robot's radius is that in which it bends.
   const Workspace& workspace() const { return space_; }
 
  private:

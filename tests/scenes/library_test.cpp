@@ -225,7 +225,7 @@ TEST(Library, UnknownSceneNamesTheNearest) {
   } catch (const InputError& error) {
     EXPECT_THAT(error.what(), HasSubstr("did you mean \"barriers1\"? known scenes: barriers1, barriers2, "
                                         "body_parts, bunny_gate, colon, crowd, falling_objects, "
-                                        "heart_and_lung, mattress, moving_door, "
+                                        "heart_and_lung, knot, mattress, moving_door, "
                                         "squeeze, there_and_back, torso, windows"));
   }
 }
