@@ -4,6 +4,7 @@
 
 #include "core/hash.h"
 #include "core/threads.h"
+#include "plan/replan.h"
 #include "plan/search.h"
 #include "tests/plan/toy.h"
 
@@ -162,6 +163,64 @@ TEST(Follow, IsOverInTheGoalOrWhenItIsTooLate) {
   there.controls = guide.pieces;
   run(was.toy, was.settings, {&there, 1}, {});
   EXPECT_TRUE(follower.is_over(there.end));
+}
+
+Replanner::From from_here(const Toy& toy) {
+  return [&toy](const State& state) {
+    auto begun = std::make_unique<Toy>(toy.nodes, toy.wall, toy.lava, toy.unacceptable_above_z);
+    begun->mass_kg = toy.mass_kg, begun->damping_per_s = toy.damping_per_s;
+    begun->begins_at = state;
+    return begun;
+  };
+}
+
+// One course in `acting`, whose planner takes it for `known`.
+ControlRollout replanned(const Toy& acting, const Settings& s, Replanner& replanner) {
+  ControlRollout course;
+  course.from = acting.start();
+  course.next = [&](const State& state) { return replanner.next(state); };
+  run(acting, s, {&course, 1},
+      {.settle = ControlRolloutOptions::anywhere, .keep_frames = true, .ask_acceptable = false});
+  return course;
+}
+
+TEST(Replan, WhereAllGoesAsPlannedItIsThePlan) {
+  const Toy toy(5, true, false, 99);
+  const Settings s = toy_settings();
+  const Plan found = plan(toy, s);
+  Replanner replanner(from_here(toy), from_here(toy), toy.start(), s, guide_of(toy, s, found.trajectory), {});
+  const ControlRollout course = replanned(toy, s, replanner);
+  EXPECT_EQ(course.result, ControlRollout::rests_in_goal);
+  EXPECT_TRUE(course.frames == found.trajectory.frames);
+  EXPECT_EQ(replanner.searches(), 0);
+  EXPECT_GT(replanner.looks(), 3);
+}
+
+// Eight times as heavy as known and more damped, and a wall with a gap between start and goal: followed, it
+// is late and is caught at the wall; who looks ahead plans anew.
+TEST(Replan, GetsThereWhereFollowingIsCaught) {
+  const Toy toy(1, true, false, 99);
+  const Settings s = toy_settings();
+  int followed_there = 0, replanned_there = 0, searches = 0;
+  for (int seed = 1; seed <= 5; ++seed) {
+    Settings seeded = s;
+    seeded.seed = std::uint64_t(seed);
+    const Plan found = plan(toy, seeded);
+    ASSERT_TRUE(found.solved()) << seed;
+    const Guide guide = guide_of(toy, seeded, found.trajectory);
+    Toy other(1, true, false, 99);
+    other.mass_kg = 8 * toy.mass_kg, other.damping_per_s = 1;
+    followed_there +=
+        followed(other, seeded, Follower(other, seeded, guide)).result == ControlRollout::rests_in_goal;
+    Replanner replanner(from_here(toy), from_here(other), other.start(), seeded, guide, {.searches = 30});
+    const ControlRollout course = replanned(other, seeded, replanner);
+    replanned_there += course.result == ControlRollout::rests_in_goal;
+    searches += replanner.searches();
+    for (const Control& control : course.controls) EXPECT_LE(largest_force(control), s.max_force_n);
+  }
+  EXPECT_LT(followed_there, 3);
+  EXPECT_EQ(replanned_there, 5);
+  EXPECT_GT(searches, 0);
 }
 
 }  // namespace
