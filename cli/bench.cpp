@@ -1,14 +1,13 @@
-#include "limber/detail/bench/bench.h"
-
 #include <fmt/format.h>
 
 #include "cli/bench_table.h"
 #include "cli/commands.h"
+#include "core/json_fields.h"
 
 namespace limber::cli {
 
-Outcome bench(const detail::BenchOptions& options) {
-  detail::Benchmark benchmark = detail::bench(options);
+Outcome bench(const BenchOptions& options) {
+  const Benchmark benchmark = run_benchmark(options, at_terminal());
   std::string text = text_of_benchmark(benchmark.report);
   Json report = json_of_fields(benchmark.report);
   if (benchmark.records) {

@@ -4,8 +4,6 @@
 
 #include <algorithm>
 
-#include "limber/detail/bench/bench.h"
-
 namespace limber::cli {
 
 namespace {
@@ -30,21 +28,21 @@ std::string table(const std::vector<std::vector<std::string>>& rows, std::size_t
   return text;
 }
 
-std::string text_of_quartiles(const std::optional<detail::Quartiles>& q, int digits) {
+std::string text_of_quartiles(const std::optional<Quartiles>& q, int digits) {
   if (!q) return "-";
   return fmt::format("{:.{}f} {:.{}f} {:.{}f}", (*q)[0], digits, (*q)[1], digits, (*q)[2], digits);
 }
 
 }  // namespace
 
-std::string text_of_benchmark(const detail::BenchReport& report) {
+std::string text_of_benchmark(const BenchReport& report) {
   std::vector<std::vector<std::string>> runs{{"scene", "preset", "solved", "iterations", "CPU s", "wall s",
                                               "motion s", "penetration %", "overlap %", "in itself %",
                                               "gap %", "stretch", "inverted", "force N"}},
       volumes{{"scene", "preset", "body", "change at most %"}};
-  for (const int limit : detail::volume_limits_percent) volumes[0].push_back(fmt::format("≤ {} %", limit));
+  for (const int limit : volume_limits_percent) volumes[0].push_back(fmt::format("≤ {} %", limit));
   std::string notes;
-  for (const detail::BenchGroup& g : report.groups) {
+  for (const BenchGroup& g : report.groups) {
     runs.push_back(
         {g.scene, g.preset, fmt::format("{}/{}", g.solved, g.runs), text_of_quartiles(g.iterations, 0),
          text_of_quartiles(g.cpu_s, 2), text_of_quartiles(g.wall_s, 2), text_of_quartiles(g.motion_s, 1),

@@ -3,10 +3,10 @@
 
 #include <string>
 
-#include "limber/detail/bench/bench.h"
+#include "limber/bench.h"
 
 namespace limber::cli {
 
-std::string text_of_benchmark(const detail::BenchReport&);
+std::string text_of_benchmark(const BenchReport&);
 
 }  // namespace limber::cli

@@ -135,7 +135,7 @@ int run_command_line(int argc, const char* const* argv) {
     return report_failure(exit_disk, fmt::format("{}: {}", error.path1().string(), error.code().message()),
                           global.json);
   } catch (const std::bad_alloc&) {
-    return report_failure(exit_bad_input, detail::not_enough_memory, global.json);
+    return report_failure(exit_bad_input, not_enough_memory, global.json);
   } catch (const std::exception& error) {
     return report_failure(exit_defect, fmt::format("this is a defect of limber: {}", error.what()),
                           global.json);

@@ -127,7 +127,7 @@ void add_limits(CLI::App& command, Options& options) {
       ->capture_default_str();
 }
 template void add_limits(CLI::App&, detail::PlanOptions&);
-template void add_limits(CLI::App&, detail::BenchOptions&);
+template void add_limits(CLI::App&, BenchOptions&);
 template void add_limits(CLI::App&, detail::RefineOptions&);
 
 }  // namespace limber::cli

@@ -47,6 +47,6 @@ void add_body_options(CLI::App& command, detail::PrepareOptions&);
 // Of each of many models: its time and memory, and whether it is tried again.
 std::vector<CLI::Option*> add_model_limits(CLI::App& command, detail::BatchOptions&);
 // Runs of a benchmark.
-void add_runs(CLI::App& command, detail::BenchOptions&);
+void add_runs(CLI::App& command, BenchOptions&);
 
 }  // namespace limber::cli

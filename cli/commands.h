@@ -4,13 +4,13 @@
 #include <optional>
 #include <string>
 
+#include "core/job.h"
 #include "core/json.h"
+#include "limber/bench.h"
 #include "limber/detail/authoring/new_scene.h"
 #include "limber/detail/authoring/scene_check.h"
 #include "limber/detail/batch/prepare_many.h"
-#include "limber/detail/bench/bench.h"
 #include "limber/detail/body/export.h"
-#include "limber/detail/exit_codes.h"
 #include "limber/detail/exports/export_motion.h"
 #include "limber/detail/farm/farm_folder.h"
 #include "limber/detail/farm/work.h"
@@ -23,10 +23,9 @@
 #include "limber/detail/verify/robustness.h"
 #include "limber/detail/verify/verify.h"
 #include "limber/detail/world/prepare_scene.h"
+#include "limber/exit_codes.h"
 
 namespace limber::cli {
-
-using enum detail::ExitCode;
 
 struct Outcome {
   int exit_code = exit_done;
@@ -51,7 +50,7 @@ Outcome export_body(const detail::BodyExportOptions&);
 Outcome verify(const detail::VerifyOptions&);
 Outcome robust(const detail::RobustOptions&);
 Outcome report(const fs::path& folder, const std::optional<fs::path>& file = {});
-Outcome bench(const detail::BenchOptions&);
+Outcome bench(const BenchOptions&);
 
 // Of engine "local" the exit code is that of what ran, else 0.
 Outcome farm_submit(const detail::FarmOptions&);

@@ -48,7 +48,7 @@ struct DescribedCommands {
   detail::StillOptions still_options;
   detail::ExportOptions export_options;
   double export_density_kg_m3 = detail::BodyExportOptions{}.density_kg_m3;
-  detail::BenchOptions bench_options;
+  BenchOptions bench_options;
   detail::FarmOptions farm_options;
   detail::WorkOptions work_options;
   std::string farm_until = "report";  // submit

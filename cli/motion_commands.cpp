@@ -131,7 +131,7 @@ void add_render(CLI::App& command, detail::RenderOptions& options) {
 
 }  // namespace
 
-void add_runs(CLI::App& command, detail::BenchOptions& options) {
+void add_runs(CLI::App& command, BenchOptions& options) {
   command.add_option("SCENE", options.scenes,
                      "scene files, or names of scenes that come with limber (see limber scenes)");
   command.add_option("-o,--out", options.out, "folder of the records; what is in it is not run again")
@@ -149,7 +149,7 @@ void add_runs(CLI::App& command, detail::BenchOptions& options) {
 
 namespace {
 
-void add_bench(CLI::App& command, detail::BenchOptions& options) {
+void add_bench(CLI::App& command, BenchOptions& options) {
   add_runs(command, options);
   command.add_option("--chunk", options.chunk, "do the i-th of n parts of the runs, 1 ≤ i ≤ n")
       ->type_name("I/N");

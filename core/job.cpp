@@ -13,7 +13,11 @@ bool Watcher::stop() { return false; }
 
 namespace {
 thread_local Job* job_of_thread = nullptr;
-}
+Watcher nobody;  // stands for the terminal, and is never asked
+}  // namespace
+
+Context at_terminal() { return {.watcher = &nobody}; }
+bool is_at_terminal(const Context& context) { return context.watcher == &nobody; }
 
 Job::Job(const Context& context)
     : watcher_(context.watcher),

@@ -26,6 +26,10 @@ class Job {
   std::mutex mutex_;
 };
 
+// Of the program at the terminal: who calls the library with it has no job.
+Context at_terminal();
+bool is_at_terminal(const Context&);
+
 // Of this thread; nullptr: none. Whoever starts threads hands it on to them.
 Job* current_job();
 

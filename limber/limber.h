@@ -15,6 +15,8 @@
 //   }
 #pragma once
 
+#include "limber/bench.h"
+#include "limber/exit_codes.h"
 #include "limber/mesh.h"
 #include "limber/scene.h"
 #include "limber/work_folder.h"

@@ -21,7 +21,7 @@
 #include "limber/detail/body/body.h"
 #include "limber/detail/body/export.h"
 #include "limber/detail/body/preview.h"
-#include "limber/detail/exit_codes.h"
+#include "limber/exit_codes.h"
 #include "render/png_file.h"
 #include "tests/cli/program.h"
 #include "tests/places.h"

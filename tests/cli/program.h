@@ -14,7 +14,7 @@
 #include "cli/command_line.h"
 #include "core/error.h"
 #include "core/json.h"
-#include "limber/detail/exit_codes.h"
+#include "limber/exit_codes.h"
 #include "tests/core/temporary_folder.h"
 
 namespace limber::detail {

@@ -22,7 +22,7 @@
 #include "core/threads.h"
 #include "limber/detail/batch/limited_process.h"
 #include "limber/detail/body/preview.h"
-#include "limber/detail/exit_codes.h"
+#include "limber/exit_codes.h"
 
 namespace limber::detail {
 

@@ -8,8 +8,8 @@
 #include "core/error.h"
 #include "core/log.h"
 #include "core/threads.h"
-#include "limber/detail/exit_codes.h"
 #include "limber/detail/farm/lease.h"
+#include "limber/exit_codes.h"
 
 namespace limber::detail {
 

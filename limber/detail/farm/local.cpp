@@ -8,9 +8,9 @@
 #include "core/error.h"
 #include "core/log.h"
 #include "core/progress.h"
-#include "limber/detail/exit_codes.h"
 #include "limber/detail/farm/engines.h"
 #include "limber/detail/farm/run_program.h"
+#include "limber/exit_codes.h"
 
 namespace limber::detail {
 

@@ -21,11 +21,11 @@
 #include "core/progress.h"
 #include "core/threads.h"
 #include "limber/detail/body/body_store.h"
-#include "limber/detail/exit_codes.h"
 #include "limber/detail/farm/engines.h"
 #include "limber/detail/farm/lease.h"
 #include "limber/detail/report/report.h"
 #include "limber/detail/world/scene_world.h"
+#include "limber/exit_codes.h"
 #include "plan/plan_file.h"
 #include "scenes/library.h"
 

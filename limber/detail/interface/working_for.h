@@ -7,6 +7,7 @@ namespace limber::detail {
 
 template <class F>
 auto working_for(const Context& context, F&& call) {
+  if (is_at_terminal(context)) return call();
   Job job(context);
   const WorkingFor working(&job);
   return call();

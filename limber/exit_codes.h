@@ -1,7 +1,7 @@
 // How limber's process ends: what the program says, and what a batch hears from those that it starts.
 #pragma once
 
-namespace limber::detail {
+namespace limber {
 
 // docs/cli.md tells users.
 enum ExitCode : int {
@@ -19,4 +19,4 @@ enum ExitCode : int {
 inline constexpr const char* not_enough_memory =
     "the machine's memory is not enough for this; ask for fewer tets, shells or iterations";
 
-}  // namespace limber::detail
+}  // namespace limber
