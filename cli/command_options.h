@@ -43,9 +43,9 @@ void add_scene(CLI::App& command, detail::SceneOptions&);
 template <class Options>
 void add_limits(CLI::App& command, Options&);
 // What a body is to be.
-void add_body_options(CLI::App& command, detail::PrepareOptions&);
+void add_body_options(CLI::App& command, ModelOptions&);
 // Of each of many models: its time and memory, and whether it is tried again.
-std::vector<CLI::Option*> add_model_limits(CLI::App& command, detail::BatchOptions&);
+std::vector<CLI::Option*> add_model_limits(CLI::App& command, BatchOptions&);
 // Runs of a benchmark.
 void add_runs(CLI::App& command, BenchOptions&);
 

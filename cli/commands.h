@@ -6,11 +6,10 @@
 
 #include "core/job.h"
 #include "core/json.h"
+#include "limber/batch.h"
 #include "limber/bench.h"
 #include "limber/detail/authoring/new_scene.h"
 #include "limber/detail/authoring/scene_check.h"
-#include "limber/detail/batch/prepare_many.h"
-#include "limber/detail/body/export.h"
 #include "limber/detail/exports/export_motion.h"
 #include "limber/detail/farm/farm_folder.h"
 #include "limber/detail/farm/work.h"
@@ -34,8 +33,8 @@ struct Outcome {
 };
 
 // `format`: of a model on stdin, the ending that its file would have.
-Outcome prepare(const detail::PrepareOptions&, const std::string& format = {});
-Outcome prepare_many(const detail::BatchOptions&);
+Outcome prepare(ModelOptions, const std::string& format = {});
+Outcome prepare_many(const BatchOptions&);
 Outcome prepare_scene(const detail::ScenePrepareOptions&);
 
 Outcome plan(const detail::PlanOptions&);
@@ -45,7 +44,7 @@ Outcome render(const detail::RenderOptions&);
 // plan and render; what is up to date is skipped.
 Outcome run(const detail::PlanOptions&, const detail::RenderOptions&);
 Outcome export_motion(const detail::ExportOptions&);
-Outcome export_body(const detail::BodyExportOptions&);
+Outcome export_body(const BodyExportOptions&);
 
 Outcome verify(const detail::VerifyOptions&);
 Outcome robust(const detail::RobustOptions&);

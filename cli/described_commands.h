@@ -37,8 +37,8 @@ struct DescribedCommands {
   void add_scene_commands();   // scene new, prepare, check; scenes. cli/scene_commands.cpp
   void add_word_commands();    // completion, man. cli/word_commands.cpp
 
-  detail::BatchOptions batch_options;
-  detail::PrepareOptions& prepare_options = batch_options.each;
+  BatchOptions batch_options;
+  ModelOptions& prepare_options = batch_options.each;
   std::string format;                 // of a model on stdin
   std::vector<CLI::Option*> of_many;  // options of prepare that one model has no use for
   detail::PlanOptions plan_options;   // plan and run
@@ -47,7 +47,7 @@ struct DescribedCommands {
   bool still = false, storyboard = false, watch = false;
   detail::StillOptions still_options;
   detail::ExportOptions export_options;
-  double export_density_kg_m3 = detail::BodyExportOptions{}.density_kg_m3;
+  double export_density_kg_m3 = BodyExportOptions{}.density_kg_m3;
   BenchOptions bench_options;
   detail::FarmOptions farm_options;
   detail::WorkOptions work_options;

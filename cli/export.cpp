@@ -17,8 +17,8 @@ Outcome export_motion(const detail::ExportOptions& options) {
   return {exit_done, json_of(exported), text};
 }
 
-Outcome export_body(const detail::BodyExportOptions& options) {
-  const detail::ExportedBody exported = detail::export_body_folder(options);
+Outcome export_body(const BodyExportOptions& options) {
+  const ExportedBody exported = limber::export_body(options, at_terminal());
   return {exit_done,
           {{"folder", exported.folder.string()}, {"files", exported.files}},
           fmt::format("{}: {}\n", exported.folder.string(), fmt::join(exported.files, ", "))};

@@ -244,7 +244,7 @@ void DescribedCommands::add_motion_commands() {
   export_command.add_option("DIR", export_options.folder, "work folder with a plan, or a body's folder")
       ->required();
   std::vector<std::string> formats = detail::motion_formats;
-  for (const std::string& of_a_body : detail::export_formats)
+  for (const std::string& of_a_body : export_formats)
     if (std::find(formats.begin(), formats.end(), of_a_body) == formats.end()) formats.push_back(of_a_body);
   export_command
       .add_option(
@@ -282,7 +282,7 @@ void DescribedCommands::add_motion_commands() {
                                              : "no body by itself; the formats of motions are gltf, pc2, "
                                                "usd, vtu"));
       };
-      const std::vector<std::string>& formats = of_body ? detail::export_formats : detail::motion_formats;
+      const std::vector<std::string>& formats = of_body ? export_formats : detail::motion_formats;
       for (const std::string& format : export_options.formats)
         if (std::find(formats.begin(), formats.end(), format) == formats.end())
           refuse("the format " + format);

@@ -1,5 +1,3 @@
-#include "limber/detail/body/prepare.h"
-
 #include <fmt/ranges.h>
 #include <unistd.h>
 
@@ -10,7 +8,6 @@
 #include "cli/commands.h"
 #include "core/error.h"
 #include "core/progress.h"
-#include "limber/detail/batch/prepare_many.h"
 #include "limber/detail/world/prepare_scene.h"
 
 namespace limber::cli {
@@ -52,24 +49,25 @@ class ModelOnStdin {
 
 }  // namespace
 
-Outcome prepare(const detail::PrepareOptions& options, const std::string& format) {
+Outcome prepare(ModelOptions options, const std::string& format) {
   require_agreeing(options);
   std::optional<ModelOnStdin> on_stdin;
   if (options.model == "-")
-    on_stdin.emplace(format);
+    options.bytes = on_stdin.emplace(format).file();
   else if (!format.empty())
     throw InputError("--format is of a model on stdin; name the model - or leave it out");
-  detail::PreparedModel prepared = detail::prepare(options, on_stdin ? on_stdin->file() : options.model);
-  std::string text = text_of_report(prepared.report.json);
+  const PreparedFolder prepared = prepare_folder(options, at_terminal());
+  Json report = parse_json(prepared.report_json, "report");
+  std::string text = text_of_report(report);
   if (!prepared.also_written.empty()) {
-    prepared.report.json["also_written"] = prepared.also_written;
+    report["also_written"] = prepared.also_written;
     text += fmt::format("  also         {}\n", fmt::join(prepared.also_written, ", "));
   }
-  return {exit_done, prepared.report.json, text};
+  return {exit_done, report, text};
 }
 
-Outcome prepare_many(const detail::BatchOptions& options) {
-  const detail::PreparedMany prepared = detail::prepare_many(options);
+Outcome prepare_many(const BatchOptions& options) {
+  const PreparedMany prepared = prepare_models(options, at_terminal());
   const int failed = prepared.failed + prepared.failed_before, done = prepared.models - failed;
   const Json json{{"models", prepared.models},
                   {"done", done},
@@ -83,7 +81,7 @@ Outcome prepare_many(const detail::BatchOptions& options) {
                   {"table", prepared.table.string()},
                   {"page", prepared.page.string()}};
   std::string text;
-  for (const detail::BatchModel& model : prepared.not_prepared)
+  for (const BatchModel& model : prepared.not_prepared)
     text += fmt::format("{:8} {}: {}\n", model.reason, model.model.name, model.message);
   text += fmt::format("{} models: {} done ({} made, {} from the store, {} up to date), {} failed",
                       prepared.models, done, prepared.made, prepared.in_store, prepared.up_to_date, failed);

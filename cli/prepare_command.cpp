@@ -7,12 +7,10 @@
 
 #include "cli/described_commands.h"
 #include "core/error.h"
-#include "limber/detail/batch/model_list.h"
-#include "limber/detail/body/export.h"
 
 namespace limber::cli {
 
-void add_body_options(CLI::App& command, detail::PrepareOptions& options) {
+void add_body_options(CLI::App& command, ModelOptions& options) {
   command
       .add_option("--shells,--max-convex-hull,--max-hulls", options.shells,
                   "convex shells, at most; 1 … 1000")
@@ -29,7 +27,7 @@ void add_body_options(CLI::App& command, detail::PrepareOptions& options) {
                   "--concavity in CoACD's unit, half of the longest edge of the model's box, 0 … 1")
       ->check(within(0.0, 1.0));
   command
-      .add_option("--shell-corners,--max-hull-vertices,--max-ch-vertex", options.corners,
+      .add_option("--shell-corners,--max-hull-vertices,--max-ch-vertex", options.max_hull_vertices,
                   "corners of a shell, at most; 8 … 10000")
       ->check(CLI::Range(8, 10000))
       ->capture_default_str();
@@ -69,7 +67,7 @@ void add_body_options(CLI::App& command, detail::PrepareOptions& options) {
           "(body.scn); with -interior behind it of a cage without tets that have all nodes on the boundary")
       ->type_name("FORMAT[,FORMAT…]")
       ->delimiter(',')
-      ->check(CLI::IsMember(detail::export_formats))
+      ->check(CLI::IsMember(export_formats))
       ->allow_extra_args(false);
   command.add_option("--density", options.density_kg_m3, "kg/m³, of the masses of --export; 1e-6 … 1e6")
       ->check(within(1e-6, 1e6))
@@ -85,7 +83,7 @@ void add_body_options(CLI::App& command, detail::PrepareOptions& options) {
   add_label_surfaces(command, options.label_gap, options.label_rounds, options.min_island);
 }
 
-std::vector<CLI::Option*> add_model_limits(CLI::App& command, detail::BatchOptions& options) {
+std::vector<CLI::Option*> add_model_limits(CLI::App& command, BatchOptions& options) {
   return {
       command
           .add_option(
@@ -153,7 +151,7 @@ void DescribedCommands::add_prepare_command() {
   prepare_command.callback([&] {
     chosen = [&] {
       const std::vector<std::string>& models = batch_options.models;
-      if (models.size() > 1 || detail::is_of_many(models.front())) {
+      if (models.size() > 1 || is_of_many(models.front())) {
         if (!format.empty())
           throw InputError("--format is of a model on stdin; leave it out, files are named by their endings");
         return cli::prepare_many(batch_options);

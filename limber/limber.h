@@ -15,7 +15,9 @@
 //   }
 #pragma once
 
+#include "limber/batch.h"
 #include "limber/bench.h"
+#include "limber/body_folder.h"
 #include "limber/exit_codes.h"
 #include "limber/mesh.h"
 #include "limber/scene.h"

@@ -46,16 +46,8 @@ void require_in_range(const detail::PrepareSettings& s) {
   require_mode(s.mode);
 }
 
-detail::PrepareSettings settings_of(const PrepareOptions& o) {
-  const detail::PrepareSettings settings{.shells = o.shells,
-                                         .concavity = o.concavity,
-                                         .threshold = o.threshold,
-                                         .inflate = o.inflate,
-                                         .exact = o.exact,
-                                         .tets = o.tets,
-                                         .mode = o.mode,
-                                         .corners = o.max_hull_vertices,
-                                         .only = {}};
+detail::PrepareSettings settings_of(const PrepareOptions& options) {
+  const detail::PrepareSettings settings = detail::settings_of(options);
   require_in_range(settings);
   return settings;
 }
@@ -278,9 +270,10 @@ Body prepare(const std::filesystem::path& model, const PrepareOptions& options, 
              const Context& context) {
   return working_for(context, [&] {
     const detail::PrepareSettings settings = settings_of(options);
-    detail::PrepareOptions command;
-    command.model = model, command.scale = import.scale, command.y_up = import.y_up;
-    return body_of(detail::source_of(command, model), settings);
+    ModelOptions read;
+    static_cast<ImportOptions&>(read) = import;
+    read.model = model;
+    return body_of(detail::source_of(read, model), settings);
   });
 }
 

@@ -7,18 +7,10 @@
 #include <vector>
 
 #include "core/json_fields.h"
-#include "limber/detail/batch/model_list.h"
+#include "limber/batch.h"
 #include "limber/detail/body/body_report.h"
 
 namespace limber::detail {
-
-// A model of a batch. `reason` is empty where it was prepared; else one of
-// "refused" (it is no model, or none for these options), "time", "memory", "crash", "defect".
-struct BatchModel {
-  ListedModel model;
-  std::string key;  // of all that its result depends on; empty where the file cannot be read
-  std::string reason, message;
-};
 
 fs::path folder_of(const fs::path& batch, const BatchModel&);           // bodies/NAME
 fs::path quarantine_file_of(const fs::path& batch, const BatchModel&);  // failed/NAME.txt

@@ -121,11 +121,6 @@ std::vector<ListedModel> models_of_list(const std::string& list) {
 
 }  // namespace
 
-bool is_of_many(const std::string& word) {
-  std::error_code none;
-  return word.starts_with('@') || fs::is_directory(word, none);
-}
-
 std::vector<ListedModel> list_models(const std::vector<std::string>& words,
                                      const std::vector<fs::path>& but_not) {
   std::vector<ListedModel> all;

@@ -5,16 +5,9 @@
 #include <vector>
 
 #include "core/file.h"
+#include "limber/batch.h"
 
 namespace limber::detail {
-
-struct ListedModel {
-  fs::path file;
-  std::string name;  // of a folder: without / and what other systems do not take; no two alike but for case
-};
-
-// Whether it stands for models that are to be found: a folder, or @LIST (a file, or @- for stdin).
-bool is_of_many(const std::string& word);
 
 // In the order given, those of a folder by their paths; each file once. Folders are searched to their ends
 // for files with endings of models, but for hidden ones, links to folders, and those in `but_not`. A list has

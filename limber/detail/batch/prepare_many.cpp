@@ -116,10 +116,10 @@ class Batch {
 
   void look_at(Work& work) {
     const fs::path& file = work.result.model.file;
-    const PrepareOptions& each = options_.each;
+    const ModelOptions& each = options_.each;
     Json input;
     try {
-      PrepareOptions one = each;
+      ModelOptions one = each;
       one.model = file;
       const BodySource source = source_of(one, file);
       input = input_of(source.identity, settings_of(each));
@@ -255,7 +255,7 @@ class Batch {
   }
 
   std::vector<std::string> words_for(const Work& work, const std::string& folder) const {
-    const PrepareOptions& o = options_.each;
+    const ModelOptions& o = options_.each;
     std::string model = work.result.model.file.string();
     if (model.starts_with('-') || model.starts_with('@')) model = "./" + model;
     std::vector<std::string> words{"prepare", model, "-o", folder};
@@ -265,7 +265,7 @@ class Batch {
     add({"--shells", std::to_string(o.shells), "--concavity", text_of_number(o.concavity), "--inflate",
          text_of_number(o.inflate), "--tets", std::to_string(o.tets), "--mode", o.mode, "--scale",
          text_of_number(o.scale), "--density", text_of_number(o.density_kg_m3), "--shell-corners",
-         std::to_string(o.corners)});
+         std::to_string(o.max_hull_vertices)});
     if (o.threshold > 0) add({"--threshold", text_of_number(o.threshold)});
     if (!o.label.empty())
       add({"--label", o.label, "--label-gap", text_of_number(o.label_gap), "--label-smoothing",

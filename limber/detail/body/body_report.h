@@ -13,7 +13,7 @@ namespace limber::detail {
 struct PrepareSettings {
   int shells = 32;
   double concavity = 0;
-  double threshold = 0;  // as PrepareOptions::threshold
+  double threshold = 0;  // as DecomposeOptions::threshold
   double inflate = 0;
   bool exact = false;
   int tets = 1000;

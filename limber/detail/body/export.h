@@ -1,21 +1,13 @@
 // Files for other programs, made from a prepared body. docs/files.md says what is in them.
 #pragma once
 
-#include <optional>
 #include <string>
 #include <vector>
 
+#include "limber/body_folder.h"
 #include "limber/detail/body/body.h"
 
 namespace limber::detail {
-
-// What ends in -interior is of the cage without tets that have all four nodes on the boundary.
-inline const std::vector<std::string> export_formats{
-    "vtu",          "node",         "interp",        "vtk",           "inp",
-    "msh",          "urdf",         "sdf",           "mjcf",          "usd",
-    "usd-omni",     "sofa",         "vtu-interior",  "node-interior", "vtk-interior",
-    "inp-interior", "msh-interior", "mjcf-interior", "usd-interior",  "usd-omni-interior",
-    "sofa-interior"};
 
 // Writes those files of each format of the body in `body_folder` into `out`, and returns their names, each
 // once. Masses are of density_kg_m3. Throws InputError where the folder's shells are damaged, DiskError.
@@ -25,16 +17,6 @@ std::vector<std::string> export_body(const PreparedBody&, const std::vector<std:
 void remove_exports(const fs::path& folder);
 
 // `limber export` of a folder that `limber prepare` made.
-struct BodyExportOptions {
-  fs::path folder;
-  std::vector<std::string> formats;  // of export_formats
-  std::optional<fs::path> out;       // default: the folder itself, as prepare --export
-  double density_kg_m3 = 1000;
-};
-struct ExportedBody {
-  fs::path folder;
-  std::vector<std::string> files;  // in it
-};
 // Throws InputError where the folder holds no whole body.
 ExportedBody export_body_folder(const BodyExportOptions&);
 

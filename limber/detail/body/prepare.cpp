@@ -5,6 +5,7 @@
 #include <iterator>
 
 #include "core/error.h"
+#include "core/json_text.h"
 #include "core/mesh_files.h"
 #include "imaging/surface_nets.h"
 #include "limber/detail/body/export.h"
@@ -12,18 +13,6 @@
 #include "limber/detail/body/preview.h"
 
 namespace limber::detail {
-
-void require_agreeing(const PrepareOptions& options) {
-  if (options.concavity > 0 && options.threshold > 0)
-    throw InputError("--concavity and --threshold are one bound in two units; leave one out");
-  if (!options.only.empty() && (!options.exports.empty() || options.preview))
-    throw InputError(
-        "--only makes a part of a body, and --preview and --export show a whole one; leave one out");
-  if (options.only == "shells" && options.mode != "lattice")
-    throw InputError("--only shells makes no cage; leave --mode out");
-  if (options.only == "cage" && options.exact)
-    throw InputError("--only cage makes no shells; leave --exact out");
-}
 
 PrepareSettings settings_of(const PrepareOptions& options) {
   return {.shells = options.shells,
@@ -33,13 +22,19 @@ PrepareSettings settings_of(const PrepareOptions& options) {
           .exact = options.exact,
           .tets = options.tets,
           .mode = options.mode,
-          .corners = options.corners,
-          .only = options.only};
+          .corners = options.max_hull_vertices,
+          .only = {}};
+}
+
+PrepareSettings settings_of(const ModelOptions& options) {
+  PrepareSettings settings = settings_of(static_cast<const PrepareOptions&>(options));
+  settings.only = options.only;
+  return settings;
 }
 
 namespace {
 
-meshing::ImportedModel import_label(const PrepareOptions& options, const fs::path& file) {
+meshing::ImportedModel import_label(const ModelOptions& options, const fs::path& file) {
   const imaging::LabelMap map = imaging::read_label_map(file);
   const int row = imaging::row_of_label(map, options.label, file.string());
   const std::string what = fmt::format("{}: label {}", file.string(), map.labels[std::size_t(row)]);
@@ -59,7 +54,7 @@ meshing::ImportedModel import_label(const PrepareOptions& options, const fs::pat
 
 }  // namespace
 
-BodySource source_of(const PrepareOptions& options, const fs::path& file) {
+BodySource source_of(const ModelOptions& options, const fs::path& file) {
   BodySource source;
   source.model = options.model.string();
   const ModelContent content = content_of_model(file);
@@ -88,18 +83,19 @@ BodySource source_of(const PrepareOptions& options, const fs::path& file) {
   return source;
 }
 
-PreparedModel prepare(const PrepareOptions& options, const fs::path& file) {
+PreparedFolder prepare(const ModelOptions& options) {
   require_agreeing(options);
   std::optional<BodyStore> store;
   if (!options.store.empty()) store.emplace(options.store);
 
-  const BodySource source = source_of(options, file);
-  PreparedModel prepared{prepare_body(source, settings_of(options), options.out, store ? &*store : nullptr),
-                         {}};
+  const BodySource source = source_of(options, options.bytes.empty() ? options.model : options.bytes);
+  const BodyReport report =
+      prepare_body(source, settings_of(options), options.out, store ? &*store : nullptr);
+  PreparedFolder prepared{text_of(report.json, 2), {}};
   std::vector<std::string>& written = prepared.also_written;
   if (options.picture) {
     if (!has_picture(options.out)) write_picture(options.out);
-    if (store) store->keep(BodyStore::key_of(source, prepared.report.input.all), options.out);
+    if (store) store->keep(BodyStore::key_of(source, report.input.all), options.out);
     written.push_back(picture_file);
   }
   if (!options.exports.empty() || options.preview) {

@@ -93,8 +93,8 @@ Origin origin_of_scenery(const scenes::Scene& scene, const scenes::BodySpec& bod
 namespace {
 
 // The words by which limber prepare was told to read a model.
-PrepareOptions words_of(const FileIdentity& identity, const fs::path& file) {
-  PrepareOptions words;
+ModelOptions words_of(const FileIdentity& identity, const fs::path& file) {
+  ModelOptions words;
   words.model = file;
   words.scale = identity.scale, words.y_up = identity.y_up;
   if (const auto& label = identity.label) {
