@@ -100,7 +100,7 @@ void add_store(CLI::App& command, fs::path& store, const char* otherwise) {
       ->envname("LIMBER_STORE");
 }
 
-void add_scene(CLI::App& command, detail::SceneOptions& options) {
+void add_scene(CLI::App& command, SceneSource& options) {
   command
       .add_option("SCENE", options.scene,
                   "a scene file, or the name of a scene that comes with limber (see limber scenes)")
@@ -126,8 +126,8 @@ void add_limits(CLI::App& command, Options& options) {
       ->check(CLI::Range(0, 4096))
       ->capture_default_str();
 }
-template void add_limits(CLI::App&, detail::PlanOptions&);
+template void add_limits(CLI::App&, PlanOptions&);
 template void add_limits(CLI::App&, BenchOptions&);
-template void add_limits(CLI::App&, detail::RefineOptions&);
+template void add_limits(CLI::App&, RefineOptions&);
 
 }  // namespace limber::cli

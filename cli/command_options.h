@@ -38,7 +38,7 @@ void add_store(CLI::App& command, fs::path& store, const char* otherwise);
 // How surfaces of a label map's labels are made.
 void add_label_surfaces(CLI::App& command, double& gap, int& rounds, double& least_island);
 // A scene by file or name, its edits, and the store of its bodies.
-void add_scene(CLI::App& command, detail::SceneOptions&);
+void add_scene(CLI::App& command, SceneSource&);
 // Of one search: PlanOptions, BenchOptions or RefineOptions.
 template <class Options>
 void add_limits(CLI::App& command, Options&);

@@ -6,23 +6,16 @@
 
 #include "core/job.h"
 #include "core/json.h"
+#include "limber/authoring.h"
 #include "limber/batch.h"
 #include "limber/bench.h"
-#include "limber/detail/authoring/new_scene.h"
-#include "limber/detail/authoring/scene_check.h"
-#include "limber/detail/exports/export_motion.h"
-#include "limber/detail/farm/farm_folder.h"
-#include "limber/detail/farm/work.h"
-#include "limber/detail/film/render.h"
-#include "limber/detail/film/start.h"
-#include "limber/detail/film/storyboard.h"
-#include "limber/detail/plan/plan.h"
-#include "limber/detail/plan/refine.h"
-#include "limber/detail/plan/simulate.h"
-#include "limber/detail/verify/robustness.h"
-#include "limber/detail/verify/verify.h"
-#include "limber/detail/world/prepare_scene.h"
+#include "limber/body_folder.h"
 #include "limber/exit_codes.h"
+#include "limber/farm.h"
+#include "limber/film.h"
+#include "limber/motion.h"
+#include "limber/robust.h"
+#include "limber/work_folder.h"
 
 namespace limber::cli {
 
@@ -35,36 +28,36 @@ struct Outcome {
 // `format`: of a model on stdin, the ending that its file would have.
 Outcome prepare(ModelOptions, const std::string& format = {});
 Outcome prepare_many(const BatchOptions&);
-Outcome prepare_scene(const detail::ScenePrepareOptions&);
+Outcome prepare_scene(const ScenePrepareOptions&);
 
-Outcome plan(const detail::PlanOptions&);
-Outcome simulate(const detail::SimulateOptions&);
-Outcome refine(const detail::RefineOptions&);
-Outcome render(const detail::RenderOptions&);
+Outcome plan(const PlanOptions&);
+Outcome simulate(const SimulateOptions&);
+Outcome refine(const RefineOptions&);
+Outcome render(const fs::path& folder, const FilmOptions&);
 // plan and render; what is up to date is skipped.
-Outcome run(const detail::PlanOptions&, const detail::RenderOptions&);
-Outcome export_motion(const detail::ExportOptions&);
+Outcome run(const PlanOptions&, const FilmOptions&);
+Outcome export_motion(const ExportOptions&);
 Outcome export_body(const BodyExportOptions&);
 
-Outcome verify(const detail::VerifyOptions&);
-Outcome robust(const detail::RobustOptions&);
+Outcome verify(const VerifyOptions&);
+Outcome robust(const RobustOptions&);
 Outcome report(const fs::path& folder, const std::optional<fs::path>& file = {});
 Outcome bench(const BenchOptions&);
 
 // Of engine "local" the exit code is that of what ran, else 0.
-Outcome farm_submit(const detail::FarmOptions&);
+Outcome farm_submit(const FarmOptions&);
 Outcome farm_status(const fs::path& folder);
 Outcome farm_cancel(const fs::path& folder);
-Outcome farm_work(const detail::WorkOptions&);
+Outcome farm_work(const WorkOptions&);
 
-Outcome new_scene(const detail::NewSceneOptions&);
+Outcome new_scene(const NewSceneOptions&);
 // Exit code 2, with all that is wrong, where it cannot even be simulated.
-Outcome check_scene(const detail::SceneCheckOptions&);
-Outcome render_still(const detail::StillOptions&);
-Outcome write_storyboard(const detail::StoryboardOptions&);
+Outcome check_scene(const SceneCheckOptions&);
+Outcome render_still(const StillOptions&);
+Outcome write_storyboard(const StoryboardOptions&);
 // Makes it anew whenever the scene, a model, or an image of one is edited, and prints its name; what is wrong
 // with an edit is told, and waited for. Ends by Interrupted alone, or when the picture cannot be written.
-Outcome watch_still(detail::StillOptions);
+Outcome watch_still(StillOptions);
 Outcome info(const fs::path& path);
 Outcome list_scenes();
 

@@ -41,26 +41,26 @@ struct DescribedCommands {
   ModelOptions& prepare_options = batch_options.each;
   std::string format;                 // of a model on stdin
   std::vector<CLI::Option*> of_many;  // options of prepare that one model has no use for
-  detail::PlanOptions plan_options;   // plan and run
-  detail::SimulateOptions simulate_options;
-  detail::RenderOptions render_options;  // render and run
+  PlanOptions plan_options;           // plan and run
+  SimulateOptions simulate_options;
+  FilmOptions film_options;  // render and run
   bool still = false, storyboard = false, watch = false;
-  detail::StillOptions still_options;
-  detail::ExportOptions export_options;
+  StillOptions still_options;
+  ExportOptions export_options;
   double export_density_kg_m3 = BodyExportOptions{}.density_kg_m3;
   BenchOptions bench_options;
-  detail::FarmOptions farm_options;
-  detail::WorkOptions work_options;
+  FarmOptions farm_options;
+  WorkOptions work_options;
   std::string farm_until = "report";  // submit
   std::string work_until;
-  fs::path folder;  // report, info, farm status and cancel
-  detail::VerifyOptions verify_options;
+  fs::path folder;  // render, report, info, farm status and cancel
+  VerifyOptions verify_options;
   std::optional<fs::path> page;
-  detail::RobustOptions robust_options;
-  detail::RefineOptions refine_options;
-  detail::NewSceneOptions new_options;
-  detail::ScenePrepareOptions scene_prepare_options;
-  detail::SceneCheckOptions check_options;
+  RobustOptions robust_options;
+  RefineOptions refine_options;
+  NewSceneOptions new_options;
+  ScenePrepareOptions scene_prepare_options;
+  SceneCheckOptions check_options;
   std::string shell;
   std::vector<std::string> command_words;
   fs::path pages;

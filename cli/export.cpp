@@ -1,20 +1,19 @@
-#include "limber/detail/exports/export_motion.h"
-
 #include <fmt/ranges.h>
 
 #include "cli/commands.h"
+#include "core/json_fields.h"
 
 namespace limber::cli {
 
-Outcome export_motion(const detail::ExportOptions& options) {
-  const detail::ExportedMotion exported = detail::export_motion(options);
+Outcome export_motion(const ExportOptions& options) {
+  const ExportedMotion exported = limber::export_motion(options, at_terminal());
   std::string text = fmt::format("{} of {} frames, {} bodies\n", exported.frames.size(),
                                  exported.frames_of_motion, exported.bodies.size());
   for (const auto& [format, written] : exported.formats)
     text += fmt::format("  {:4}  {} ({}{:.2f} MB)\n", format, written.open.string(),
                         written.files > 1 ? fmt::format("{} files, ", written.files) : "",
                         1e-6 * double(written.bytes));
-  return {exit_done, json_of(exported), text};
+  return {exit_done, json_of_fields(exported), text};
 }
 
 Outcome export_body(const BodyExportOptions& options) {

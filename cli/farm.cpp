@@ -1,5 +1,3 @@
-#include "limber/detail/farm/farm.h"
-
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
@@ -9,24 +7,20 @@ namespace limber::cli {
 
 namespace {
 
-Json json_of_farm(const detail::FarmStatus& status) {
+Json json_of_farm(const FarmStatus& status) {
   Json stages = Json::array(), tasks = Json::array();
-  for (const detail::FarmStatus::OfStage& of : status.stages)
-    stages.push_back({{"stage", detail::name_of(of.stage)},
+  for (const FarmStatus::OfStage& of : status.stages)
+    stages.push_back({{"stage", name_of(of.stage)},
                       {"units", of.known ? Json(of.units) : Json()},
                       {"done", of.done},
                       {"running", of.running},
                       {"failed", of.failed},
                       {"waiting", of.waiting},
                       {"seconds", of.seconds}});
-  for (const detail::SlurmTask& task : status.tasks)
+  for (const SlurmTask& task : status.tasks)
     tasks.push_back({{"id", task.id}, {"state", task.state}, {"why", task.why}});
-  Json json{{"state", detail::name_of(status.state)},
-            {"engine", status.engine},
-            {"stages", stages},
-            {"running", status.running},
-            {"failed", status.failed},
-            {"tasks", tasks}};
+  Json json{{"state", name_of(status.state)}, {"engine", status.engine}, {"stages", stages},
+            {"running", status.running},      {"failed", status.failed}, {"tasks", tasks}};
   json["notes"] = status.notes;
   if (!status.engine_fails.empty()) json["engine_fails"] = status.engine_fails;
   if (!status.explanation.empty()) json["solved"] = status.solved, json["explanation"] = status.explanation;
@@ -36,14 +30,13 @@ Json json_of_farm(const detail::FarmStatus& status) {
   return json;
 }
 
-std::string text_of_farm(const detail::FarmStatus& status) {
+std::string text_of_farm(const FarmStatus& status) {
   std::string text = fmt::format("  {:<8} {:>6} {:>6} {:>8} {:>7} {:>8} {:>10}\n", "stage", "units", "done",
                                  "running", "failed", "waiting", "seconds");
-  for (const detail::FarmStatus::OfStage& of : status.stages)
-    text += of.known
-                ? fmt::format("  {:<8} {:>6} {:>6} {:>8} {:>7} {:>8} {:>10.1f}\n", detail::name_of(of.stage),
-                              of.units, of.done, of.running, of.failed, of.waiting, of.seconds)
-                : fmt::format("  {:<8} {:>6} known when there is a plan\n", detail::name_of(of.stage), "-");
+  for (const FarmStatus::OfStage& of : status.stages)
+    text += of.known ? fmt::format("  {:<8} {:>6} {:>6} {:>8} {:>7} {:>8} {:>10.1f}\n", name_of(of.stage),
+                                   of.units, of.done, of.running, of.failed, of.waiting, of.seconds)
+                     : fmt::format("  {:<8} {:>6} known when there is a plan\n", name_of(of.stage), "-");
   for (const std::string& running : status.running) text += "running  " + running + "\n";
   for (const std::string& failed : status.failed) text += "failed   " + failed + "\n";
   if (!status.explanation.empty()) text += "plan     " + status.explanation + "\n";
@@ -53,22 +46,22 @@ std::string text_of_farm(const detail::FarmStatus& status) {
   if (!status.report.empty()) text += "report   " + status.report.string() + "\n";
   for (const std::string& note : status.notes) text += "note     " + note + "\n";
   if (!status.engine_fails.empty()) text += "slurm    " + status.engine_fails + "\n";
-  for (const detail::SlurmTask& task : status.tasks)
+  for (const SlurmTask& task : status.tasks)
     text += fmt::format("slurm    {} {}{}\n", task.id, task.state,
                         task.why.empty() || task.why == "None" ? "" : " (" + task.why + ")");
-  return text + "state    " + detail::name_of(status.state) + "\n";
+  return text + "state    " + name_of(status.state) + "\n";
 }
 
-int exit_code_of_farm(const detail::FarmStatus& status) {
-  if (status.state == detail::FarmStatus::done)
+int exit_code_of_farm(const FarmStatus& status) {
+  if (status.state == FarmStatus::done)
     return !status.solved ? exit_no_plan : status.failed_models > 0 ? exit_models_failed : exit_done;
   return status.exit_code != 0 ? status.exit_code : exit_defect;
 }
 
 }  // namespace
 
-Outcome farm_submit(const detail::FarmOptions& options) {
-  const detail::Submitted submitted = detail::submit(options);
+Outcome farm_submit(const FarmOptions& options) {
+  const Submitted submitted = submit_to_farm(options, at_terminal());
   if (options.dry_run)
     return {exit_done,
             {{"engine", submitted.engine}, {"would", submitted.would}},
@@ -102,12 +95,12 @@ Outcome farm_submit(const detail::FarmOptions& options) {
 }
 
 Outcome farm_status(const fs::path& folder) {
-  const detail::FarmStatus status = detail::farm_status(folder);
+  const FarmStatus status = limber::farm_status(folder, at_terminal());
   return {exit_done, json_of_farm(status), text_of_farm(status)};
 }
 
 Outcome farm_cancel(const fs::path& folder) {
-  const detail::Cancelled cancelled = detail::cancel_farm(folder);
+  const Cancelled cancelled = cancel_farm(folder, at_terminal());
   std::string text = cancelled.was_at_work ? "cancelled" : "nothing was at work";
   if (!cancelled.jobs.empty()) text += fmt::format(": jobs {}", fmt::join(cancelled.jobs, ", "));
   return {exit_done,
@@ -115,9 +108,9 @@ Outcome farm_cancel(const fs::path& folder) {
           text + fmt::format("; limber farm submit -o {} goes on\n", folder.string())};
 }
 
-Outcome farm_work(const detail::WorkOptions& options) {
-  const detail::WorkDone done = detail::work(options);
-  using enum detail::WorkDone::Ending;
+Outcome farm_work(const WorkOptions& options) {
+  const WorkDone done = work_at_farm(options, at_terminal());
+  using enum WorkDone::Ending;
   const char* how = done.ending == all_done         ? "all is done"
                     : done.ending == others_at_work ? "others are at the rest"
                     : done.ending == sent_again     ? "what is missing was sent once more"

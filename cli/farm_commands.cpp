@@ -4,16 +4,15 @@
 
 #include "cli/described_commands.h"
 #include "core/error.h"
-#include "limber/detail/film/shot.h"
 
 namespace limber::cli {
 
 namespace {
 
 // Of what comes out: with a folder that has it already none of these is told again.
-std::vector<CLI::Option*> add_result(CLI::App& command, detail::FarmOptions& options) {
-  detail::PlanOptions& plan = options.plan;
-  detail::RenderOptions& film = options.film;
+std::vector<CLI::Option*> add_result(CLI::App& command, FarmOptions& options) {
+  PlanOptions& plan = options.plan;
+  FilmOptions& film = options.film;
   std::vector<CLI::Option*> of_result{
       command.add_option("--seed", plan.seed, "as of limber plan, 0 … 2^53")->check(within(0.0, 0x1p53)),
       command
@@ -41,7 +40,7 @@ std::vector<CLI::Option*> add_result(CLI::App& command, detail::FarmOptions& opt
       command.add_option("--passes", film.passes, "pictures beside each frame, as of limber render")
           ->type_name("PASS[,PASS…]")
           ->delimiter(',')
-          ->check(CLI::IsMember(detail::pass_names))
+          ->check(CLI::IsMember(pass_names))
           ->allow_extra_args(false),
       command.add_option("--bits", film.bits, "a channel of frames and passes, 8 or 16")
           ->check(CLI::IsMember({8, 16}))
@@ -59,7 +58,7 @@ std::vector<CLI::Option*> add_result(CLI::App& command, detail::FarmOptions& opt
 }
 
 // Who does it, and how.
-void add_engine(CLI::App& command, detail::FarmOptions& options) {
+void add_engine(CLI::App& command, FarmOptions& options) {
   command
       .add_option(
           "--engine", options.engine,
@@ -85,8 +84,7 @@ void add_engine(CLI::App& command, detail::FarmOptions& options) {
   command.add_flag("--dry-run", options.dry_run, "say what would be written and sent, and do nothing");
 }
 
-const std::vector<std::string> stages_of_a_scene(detail::stage_names.begin(),
-                                                 detail::stage_names.begin() + 6);
+const std::vector<std::string> stages_of_a_scene(stage_names.begin(), stage_names.begin() + 6);
 
 }  // namespace
 
@@ -122,7 +120,7 @@ void DescribedCommands::add_farm_commands() {
                 "{} is of a scene, and none is named: what was submitted before goes on as it was; name the "
                 "scene, or leave {} out",
                 option->get_name(), option->get_name()));
-      farm_options.until = detail::stage_named(farm_until);
+      farm_options.until = stage_named(farm_until);
       return farm_submit(farm_options);
     };
   });
@@ -194,7 +192,7 @@ void DescribedCommands::add_farm_commands() {
   work_command.add_option("DIR", work_options.folder, "work folder")->required();
   work_command
       .add_option("--until", work_until, "the last stage that it takes units of; default: the last of all")
-      ->check(CLI::IsMember(detail::stage_names));
+      ->check(CLI::IsMember(stage_names));
   work_command.add_flag("--wait", work_options.wait,
                         "where others are at all that is left, wait for them, and go on after them");
   work_command.add_flag(
@@ -203,7 +201,7 @@ void DescribedCommands::add_farm_commands() {
   add_global(work_command, global), add_threads(work_command, global);
   work_command.callback([&] {
     chosen = [&] {
-      if (!work_until.empty()) work_options.until = detail::stage_named(work_until);
+      if (!work_until.empty()) work_options.until = stage_named(work_until);
       work_options.threads = global.threads;
       return farm_work(work_options);
     };

@@ -4,7 +4,7 @@
 #include "cli/commands.h"
 #include "cli/scene_text.h"
 #include "core/json_text.h"
-#include "limber/detail/inspect/file_facts.h"
+#include "limber/info.h"
 
 namespace limber::cli {
 
@@ -46,31 +46,32 @@ std::string text_of_body(const Json& body) {
   return text;
 }
 
-std::string text_of_facts(const detail::FileFacts& file) {
-  switch (file.kind) {
-    case detail::FileFacts::scene:
-      return text_of_scene(file.facts);
-    case detail::FileFacts::body:
-      return text_of_body(file.facts);
-    case detail::FileFacts::label_map:
-      return text_of_label_map(file.facts);
-    case detail::FileFacts::other:
+std::string text_of_facts(FileFacts::Kind kind, const Json& facts) {
+  switch (kind) {
+    case FileFacts::scene:
+      return text_of_scene(facts);
+    case FileFacts::body:
+      return text_of_body(facts);
+    case FileFacts::label_map:
+      return text_of_label_map(facts);
+    case FileFacts::other:
       break;
   }
-  return text_of_any(file.facts);
+  return text_of_any(facts);
 }
 
 }  // namespace
 
 Outcome info(const fs::path& path) {
-  const detail::FileFacts file = detail::facts_of_file(path);
-  return {exit_done, file.facts, text_of_facts(file)};
+  const FileFacts file = facts_of_file(path, at_terminal());
+  const Json facts = parse_json(file.json, path.string());
+  return {exit_done, facts, text_of_facts(file.kind, facts)};
 }
 
 Outcome list_scenes() {
   Json json = Json::array();
   std::string text;
-  for (const detail::KnownSceneFacts& known : detail::facts_of_known_scenes()) {
+  for (const KnownScene& known : known_scenes()) {
     json.push_back({{"name", known.name}, {"file", known.file.string()}, {"description", known.description}});
     text += fmt::format("{:20} {}\n", known.name, known.description);
   }

@@ -6,55 +6,70 @@ namespace limber::cli {
 
 namespace {
 
-std::string text_of(const plan::ShortcutReport& report) {
-  const plan::Costs &before = report.before, &after = report.after;
-  return fmt::format(
-      "  shortcut     {} changes accepted in {} rounds, {:.2f} CPU s: {:.3g} → {:.3g} s, effort {:.3g} → "
-      "{:.3g} "
-      "N s, elastic energy {:.3g} → {:.3g} J, volume change {:.3g} → {:.3g} %\n",
-      report.accepted, report.settings.rounds_done, report.cpu_s, before.duration_s, after.duration_s,
-      before.effort_n_s, after.effort_n_s, before.strain_energy_j, after.strain_energy_j,
-      100 * before.volume_change, 100 * after.volume_change);
-}
+// Each of what the summary tells of it.
 
-std::string text_of(const plan::PortfolioReport& report, const Json& summary) {
+std::string text_of_portfolio(const Json& report, const Json& summary) {
+  const Json& searches = report.at("searches");
   return fmt::format(
       "  portfolio    seeds {} to {}, {} iterations in all, {:.2f} CPU s, {:.2f} s; {} seed {}\n",
-      report.searches.front().seed, report.searches.back().seed, report.iterations, report.cpu_s,
-      report.wall_s, summary.at("solved").get<bool>() ? "the quickest is" : "none solves it, the nearest is",
+      searches.front().at("seed").get<std::uint64_t>(), searches.back().at("seed").get<std::uint64_t>(),
+      report.at("iterations").get<std::int64_t>(), report.at("cpu_s").get<double>(),
+      report.at("wall_s").get<double>(),
+      summary.at("solved").get<bool>() ? "the quickest is" : "none solves it, the nearest is",
       summary.at("seed").get<std::uint64_t>());
 }
 
-std::string text_of(const plan::AnytimeReport& report) {
+std::string text_of_shortcut(const Json& report) {
+  const auto before_and_after = [&](const char* cost, double factor = 1) {
+    return fmt::format("{:.3g} → {:.3g}", factor * report.at("before").at(cost).get<double>(),
+                       factor * report.at("after").at(cost).get<double>());
+  };
+  return fmt::format(
+      "  shortcut     {} changes accepted in {} rounds, {:.2f} CPU s: {} s, effort {} N s, elastic energy "
+      "{} J, volume change {} %\n",
+      report.at("accepted").get<int>(), report.at("rounds").get<int>(), report.at("cpu_s").get<double>(),
+      before_and_after("duration_s"), before_and_after("effort_n_s"), before_and_after("strain_energy_j"),
+      before_and_after("volume_change", 100));
+}
+
+std::string text_of_improve(const Json& report) {
+  const std::string cost = report.at("cost").get<std::string>();
+  const char* const key = cost == "duration" ? "duration_s"
+                          : cost == "effort" ? "effort_n_s"
+                          : cost == "strain" ? "strain_energy_j"
+                                             : "volume_change";
   std::string text = fmt::format(
       "  improve      {} searches, {} of them reached the goal, {} iterations in all; {:.2f} CPU s, {:.2f} "
       "s\n",
-      report.searches, report.solved, report.iterations, report.cpu_s, report.wall_s);
-  for (const plan::Improvement& i : report.improvements)
-    text += fmt::format("               {} {:.4g} after {:.2f} s and {} iterations\n",
-                        plan::name_of(report.settings.cost), plan::cost_in(i.costs, report.settings.cost),
-                        i.wall_s, i.iterations);
+      report.at("searches").get<std::int64_t>(), report.at("solved").get<std::int64_t>(),
+      report.at("iterations").get<std::int64_t>(), report.at("cpu_s").get<double>(),
+      report.at("wall_s").get<double>());
+  for (const Json& i : report.at("improvements"))
+    text += fmt::format("               {} {:.4g} after {:.2f} s and {} iterations\n", cost,
+                        i.at("costs").at(key).get<double>(), i.at("wall_s").get<double>(),
+                        i.at("iterations").get<std::int64_t>());
   return text;
 }
 
-std::string text_of(const plan::RefineReport& report, const Json& summary) {
+std::string text_of_refine(const Json& report) {
+  const auto number = [&](const char* key) { return report.at(key).get<double>(); };
   return fmt::format(
       "  refine       {}; replayed for {:.2f} s to {:.3f} m from the goal ({}), at most {:.3f} m off; "
       "followed "
       "for {:.2f} s, at most {:.3f} m off; {} iterations; CPU s: replay {:.2f}, following {:.2f}, search "
       "{:.2f}\n",
-      summary.at("refine").at("how").get<std::string>(), report.replay_s, report.replay_distance_m,
-      report.replay_ends, report.replay_largest_error_m, report.tracked_s, report.largest_error_m,
-      report.iterations, report.replay_cpu_s, report.track_cpu_s, report.search_cpu_s);
+      report.at("how").get<std::string>(), number("replay_s"), number("replay_distance_m"),
+      report.at("replay_ends").get<std::string>(), number("replay_largest_error_m"), number("tracked_s"),
+      number("largest_error_m"), report.at("iterations").get<std::int64_t>(), number("replay_cpu_s"),
+      number("track_cpu_s"), number("search_cpu_s"));
 }
 
-std::string text_of(const detail::HowFound& how, const Json& summary) {
-  std::string text;
-  if (how.portfolio) text += text_of(*how.portfolio, summary);
-  if (how.shortcut) text += text_of(*how.shortcut);
-  if (how.improve) text += text_of(*how.improve);
-  if (how.refine) text += text_of(*how.refine, summary);
-  return text;
+std::string text_of_done(const std::string& what, const Json& summary) {
+  const Json& report = summary.at(what);
+  return what == "portfolio"  ? text_of_portfolio(report, summary)
+         : what == "shortcut" ? text_of_shortcut(report)
+         : what == "improve"  ? text_of_improve(report)
+                              : text_of_refine(report);
 }
 
 std::string text_of_legs(const Json& legs) {
@@ -153,21 +168,21 @@ std::string text_of_search(const Json& s, const std::string& extra, const fs::pa
 
 }  // namespace
 
-std::string text_of_beginning(const detail::KeptPlan& kept, const fs::path& from) {
+std::string text_of_beginning(const Json& summary, const fs::path& from) {
   if (from.empty()) return "";
-  return fmt::format("  from         frame {} of {}\n", kept.summary.at("from").at("frame").get<int>(),
+  return fmt::format("  from         frame {} of {}\n", summary.at("from").at("frame").get<int>(),
                      from.string());
 }
 
-std::string text_of(const detail::KeptPlan& kept, const std::string& more) {
-  if (!kept.measured) return "";
-  const std::string lines = more + text_of(kept.how, kept.summary);
-  return kept.is_simulation ? text_of_simulation(kept.summary, lines, kept.file)
-                            : text_of_search(kept.summary, lines, kept.file);
-}
-
-Outcome outcome_of(const detail::KeptPlan& kept, const std::string& more) {
-  return {kept.reached ? exit_done : exit_no_plan, kept.summary, text_of(kept, more)};
+Outcome outcome_of(const KeptPlan& kept, const std::function<std::string(const Json&)>& more) {
+  const Json summary = parse_json(kept.summary_json, kept.file.string());
+  Outcome outcome{kept.reached ? exit_done : exit_no_plan, summary, ""};
+  if (!kept.measured) return outcome;
+  std::string lines = more ? more(summary) : "";
+  for (const std::string& what : kept.also_done) lines += text_of_done(what, summary);
+  outcome.text = kept.is_simulation ? text_of_simulation(summary, lines, kept.file)
+                                    : text_of_search(summary, lines, kept.file);
+  return outcome;
 }
 
 }  // namespace limber::cli

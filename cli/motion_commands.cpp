@@ -9,7 +9,6 @@
 
 #include "cli/described_commands.h"
 #include "core/error.h"
-#include "limber/detail/film/shot.h"
 
 namespace limber::cli {
 
@@ -28,7 +27,7 @@ void add_from(CLI::App& command, fs::path& folder, std::optional<int>& frame) {
       ->needs(from);
 }
 
-void add_plan(CLI::App& command, detail::PlanOptions& options) {
+void add_plan(CLI::App& command, PlanOptions& options) {
   command.add_option("-o,--out", options.out, "work folder; it is made where it is missing")
       ->required()
       ->type_name("DIR");
@@ -52,7 +51,7 @@ void add_plan(CLI::App& command, detail::PlanOptions& options) {
       ->type_name("FILE.jsonl");
 }
 
-void add_simulate(CLI::App& command, detail::SimulateOptions& options) {
+void add_simulate(CLI::App& command, SimulateOptions& options) {
   command.add_option("-o,--out", options.out, "work folder; it is made where it is missing")
       ->required()
       ->type_name("DIR");
@@ -76,7 +75,7 @@ void add_simulate(CLI::App& command, detail::SimulateOptions& options) {
                    "go on from the simulation in the work folder: longer, or after it was stopped");
 }
 
-void add_shortcut(CLI::App& command, detail::PlanOptions& options) {
+void add_shortcut(CLI::App& command, PlanOptions& options) {
   command
       .add_option("--shortcut", options.shortcut_rounds,
                   "rounds of sixteen changes to the path that is found, each simulated, 0 … 100000; default: "
@@ -93,7 +92,7 @@ void add_shortcut(CLI::App& command, detail::PlanOptions& options) {
                    "go on after the first path until --iterations or --time-limit, and keep the best");
 }
 
-void add_render(CLI::App& command, detail::RenderOptions& options) {
+void add_render(CLI::App& command, FilmOptions& options) {
   command
       .add_option(
           "--frames", options.frames,
@@ -111,7 +110,7 @@ void add_render(CLI::App& command, detail::RenderOptions& options) {
                   "what their levels mean")
       ->type_name("PASS[,PASS…]")
       ->delimiter(',')
-      ->check(CLI::IsMember(detail::pass_names))
+      ->check(CLI::IsMember(pass_names))
       ->allow_extra_args(false);
   command.add_option("--bits", options.bits, "a channel of frames and passes, 8 or 16")
       ->check(CLI::IsMember({8, 16}))
@@ -181,13 +180,11 @@ void DescribedCommands::add_motion_commands() {
   simulate_command.callback([&] { chosen = [&] { return cli::simulate(simulate_options); }; });
 
   CLI::App& render_command = *program.add_subcommand("render", "path → frames, contact sheet, film");
-  render_command
-      .add_option("DIR", render_options.folder,
-                  "work folder with a plan; with --still or --storyboard a scene")
+  render_command.add_option("DIR", folder, "work folder with a plan; with --still or --storyboard a scene")
       ->required();
-  add_render(render_command, render_options);
+  add_render(render_command, film_options);
   render_command
-      .add_option("--set", render_options.sets,
+      .add_option("--set", film_options.sets,
                   "edit how it is filmed: film.KEY=VALUE, camera.KEY=VALUE, bodies.NAME.color=… (also "
                   "opacity, look, roughness, metallic, deformation)")
       ->type_name("KEY=VALUE")
@@ -215,8 +212,7 @@ void DescribedCommands::add_motion_commands() {
       ->type_name("DIR")
       ->check(CLI::ExistingDirectory)
       ->allow_extra_args(false);
-  render_command.add_flag("--resume", render_options.resume,
-                          "keep frames that already show what they should");
+  render_command.add_flag("--resume", film_options.resume, "keep frames that already show what they should");
   add_global(render_command, global), add_threads(render_command, global),
       add_progress(render_command, global);
   watch_flag->excludes(render_command.get_option("--json"));
@@ -228,11 +224,11 @@ void DescribedCommands::add_motion_commands() {
       if (!still && !storyboard) {
         if (still_options.out || !still_options.scene.data.empty())
           throw InputError("-o and --data are of --still and --storyboard; a film is in its work folder");
-        return cli::render(render_options);
+        return cli::render(folder, film_options);
       }
-      still_options.scene.scene = render_options.folder.string();
-      still_options.scene.sets = render_options.sets;
-      still_options.camera = render_options.camera, still_options.size = render_options.size;
+      still_options.scene.scene = folder.string();
+      still_options.scene.sets = film_options.sets;
+      still_options.camera = film_options.camera, still_options.size = film_options.size;
       if (storyboard)
         return cli::write_storyboard({still_options.scene, still_options.size, still_options.out});
       return watch ? cli::watch_still(still_options) : cli::render_still(still_options);
@@ -243,7 +239,7 @@ void DescribedCommands::add_motion_commands() {
       *program.add_subcommand("export", "path, or body → files for viewers, simulators and ParaView");
   export_command.add_option("DIR", export_options.folder, "work folder with a plan, or a body's folder")
       ->required();
-  std::vector<std::string> formats = detail::motion_formats;
+  std::vector<std::string> formats = motion_formats;
   for (const std::string& of_a_body : export_formats)
     if (std::find(formats.begin(), formats.end(), of_a_body) == formats.end()) formats.push_back(of_a_body);
   export_command
@@ -282,7 +278,7 @@ void DescribedCommands::add_motion_commands() {
                                              : "no body by itself; the formats of motions are gltf, pc2, "
                                                "usd, vtu"));
       };
-      const std::vector<std::string>& formats = of_body ? export_formats : detail::motion_formats;
+      const std::vector<std::string>& formats = of_body ? export_formats : motion_formats;
       for (const std::string& format : export_options.formats)
         if (std::find(formats.begin(), formats.end(), format) == formats.end())
           refuse("the format " + format);
@@ -296,9 +292,9 @@ void DescribedCommands::add_motion_commands() {
   CLI::App& run_command =
       *program.add_subcommand("run", "all of it: prepare, plan, render; what is up to date is skipped");
   add_scene(run_command, plan_options.scene), add_plan(run_command, plan_options),
-      add_shortcut(run_command, plan_options), add_render(run_command, render_options);
+      add_shortcut(run_command, plan_options), add_render(run_command, film_options);
   add_global(run_command, global), add_threads(run_command, global), add_progress(run_command, global);
-  run_command.callback([&] { chosen = [&] { return cli::run(plan_options, render_options); }; });
+  run_command.callback([&] { chosen = [&] { return cli::run(plan_options, film_options); }; });
 
   CLI::App& bench_command = *program.add_subcommand(
       "bench", "many runs: scenes × seeds × presets → a record a run, a table; what is done is skipped");

@@ -1,13 +1,11 @@
-#include "limber/detail/authoring/new_scene.h"
-
 #include <fmt/format.h>
 
 #include "cli/commands.h"
 
 namespace limber::cli {
 
-Outcome new_scene(const detail::NewSceneOptions& options) {
-  const detail::NewScene made = detail::new_scene(options);
+Outcome new_scene(const NewSceneOptions& options) {
+  const NewScene made = make_scene(options, at_terminal());
   const std::string data = made.data.empty() ? std::string() : fmt::format(" --data {}", made.data.string()),
                     next =
                         made.plannable

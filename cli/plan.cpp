@@ -1,15 +1,12 @@
-#include "limber/detail/plan/plan.h"
-
 #include "cli/kept_plan.h"
-#include "limber/detail/plan/refine.h"
 
 namespace limber::cli {
 
-Outcome plan(const detail::PlanOptions& options) {
-  const detail::KeptPlan kept = detail::plan(options);
-  return outcome_of(kept, text_of_beginning(kept, options.from));
+Outcome plan(const PlanOptions& options) {
+  return outcome_of(plan_scene(options, at_terminal()),
+                    [&](const Json& summary) { return text_of_beginning(summary, options.from); });
 }
 
-Outcome refine(const detail::RefineOptions& options) { return outcome_of(detail::refine(options)); }
+Outcome refine(const RefineOptions& options) { return outcome_of(refine_plan(options, at_terminal())); }
 
 }  // namespace limber::cli

@@ -8,7 +8,6 @@
 #include "cli/commands.h"
 #include "core/error.h"
 #include "core/progress.h"
-#include "limber/detail/world/prepare_scene.h"
 
 namespace limber::cli {
 
@@ -94,12 +93,12 @@ Outcome prepare_many(const BatchOptions& options) {
   return {failed > 0 ? exit_models_failed : exit_done, json, text};
 }
 
-Outcome prepare_scene(const detail::ScenePrepareOptions& options) {
-  const detail::PreparedScene prepared = detail::prepare_scene(options);
+Outcome prepare_scene(const ScenePrepareOptions& options) {
+  const PreparedScene prepared = prepare_scene_bodies(options, at_terminal());
   Json bodies = Json::array();
   std::string text = fmt::format("{}: {} of {} bodies are prepared\n", options.out.string(),
                                  prepared.bodies.size(), prepared.bodies_of_scene);
-  for (const detail::PreparedScene::Body& body : prepared.bodies) {
+  for (const PreparedScene::Body& body : prepared.bodies) {
     bodies.push_back({{"body", body.name},
                       {"folder", body.folder.string()},
                       {"triangles", body.triangles},

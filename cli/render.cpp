@@ -1,14 +1,13 @@
-#include "limber/detail/film/render.h"
-
 #include <fmt/format.h>
 
 #include "cli/kept_plan.h"
+#include "core/json_fields.h"
 
 namespace limber::cli {
 
 namespace {
 
-std::string text_of(const detail::TimeTold& time) {
+std::string text_of(const FilmTime& time) {
   std::string text = fmt::format(
       "{:.1f} s of film show {:.2f} s of the motion, at {}× its speed", time.seconds, time.motion_s,
       time.slowest == time.quickest ? fmt::format("{:.3g}", time.slowest)
@@ -19,12 +18,12 @@ std::string text_of(const detail::TimeTold& time) {
   return text + "\n";
 }
 
-std::string text_of(const detail::RenderedFilm& film) {
+std::string text_of(const RenderedFilm& film) {
   std::string text = fmt::format("{} of {} frames in {}: {} painted, {} kept, {} failed; {:.2f} CPU s\n",
                                  film.wanted, film.frames, film.folder.string(), film.painted,
                                  film.wanted - film.painted - film.failed, film.failed, film.cpu_s) +
                      text_of(film.time);
-  const auto [width, height] = film.size_px;
+  const auto [width, height] = film.size;
   if (film.film)
     text += fmt::format("film {}{}, contact sheet {}\n", film.film->string(),
                         width % 2 + height % 2 == 0 ? ""
@@ -42,24 +41,22 @@ std::string text_of(const detail::RenderedFilm& film) {
   return text;
 }
 
-int exit_code_of(const detail::RenderedFilm& film) {
-  return film.failed == 0 ? exit_done : exit_frames_failed;
-}
+int exit_code_of(const RenderedFilm& film) { return film.failed == 0 ? exit_done : exit_frames_failed; }
 
 }  // namespace
 
-Outcome render(const detail::RenderOptions& options) {
-  const detail::RenderedFilm film = detail::render(options);
-  return {exit_code_of(film), json_of_fields(told_of(film)), text_of(film)};
+Outcome render(const fs::path& folder, const FilmOptions& options) {
+  const RenderedFilm film = render_film(folder, options, at_terminal());
+  return {exit_code_of(film), json_of_fields(film), text_of(film)};
 }
 
-Outcome run(const detail::PlanOptions& plan_options, const detail::RenderOptions& render_options) {
-  const auto [kept, film] = detail::plan_and_film(plan_options, render_options);
+Outcome run(const PlanOptions& plan_options, const FilmOptions& film_options) {
+  const auto [kept, film] = plan_and_render(plan_options, film_options, at_terminal());
   Outcome both = outcome_of(kept);
   if (kept.up_to_date) both.text.clear();
   if (film.failed > 0) both.exit_code = exit_code_of(film);
   both.text += text_of(film);
-  both.json = {{"plan", both.json}, {"render", json_of_fields(told_of(film))}};
+  both.json = {{"plan", both.json}, {"render", json_of_fields(film)}};
   return both;
 }
 

@@ -1,5 +1,3 @@
-#include "limber/detail/report/report.h"
-
 #include <fmt/format.h>
 
 #include "cli/commands.h"
@@ -8,15 +6,15 @@ namespace limber::cli {
 
 namespace {
 
-const char* words_of(detail::FilmInPage film) {
+const char* words_of(FilmInPage film) {
   switch (film) {
-    case detail::FilmInPage::none:
+    case FilmInPage::none:
       break;
-    case detail::FilmInPage::embedded:
+    case FilmInPage::embedded:
       return "embedded";
-    case detail::FilmInPage::of_another_plan:
+    case FilmInPage::of_another_plan:
       return "left out: of another plan";
-    case detail::FilmInPage::too_large:
+    case FilmInPage::too_large:
       return "left out: large";
   }
   return "none";
@@ -25,7 +23,7 @@ const char* words_of(detail::FilmInPage film) {
 }  // namespace
 
 Outcome report(const fs::path& folder, const std::optional<fs::path>& file) {
-  const detail::WrittenReport written = detail::report(folder, file);
+  const WrittenReport written = write_report(folder, file, at_terminal());
   const char* const film = words_of(written.film);
   return {exit_done,
           {{"file", written.file.string()},

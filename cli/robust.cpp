@@ -8,14 +8,14 @@ namespace limber::cli {
 
 namespace {
 
-Json json_of(const detail::Fate& f) {
+Json json_of(const Fate& f) {
   return {{"world", f.world},
           {"reaches", f.reaches},
           {"end", f.end},
           {"distance_m", f.distance_m},
           {"speed_m_s", f.speed_m_s},
           {"duration_s", f.duration_s},
-          {"end_center_m", {f.end_center_m.x(), f.end_center_m.y(), f.end_center_m.z()}},
+          {"end_center_m", f.end_center_m},
           {"largest_volume_change_percent", 100 * f.volume_change},
           {"deepest_penetration_m", f.penetration_m},
           {"least_stretch", f.min_stretch},
@@ -27,10 +27,10 @@ Json json_of(const detail::Fate& f) {
           {"broken_promises", f.broken}};
 }
 
-Json json_of(const detail::Tally& tally) {
-  const detail::Fate& worst = tally.worst;
+Json json_of(const Tally& tally) {
+  const Fate& worst = tally.worst;
   Json rows = Json::array();
-  for (const detail::Fate& fate : tally.fates) rows.push_back(json_of(fate));
+  for (const Fate& fate : tally.fates) rows.push_back(json_of(fate));
   return {{"reached", tally.reached},
           {"share_reached", double(tally.reached) / double(tally.fates.size())},
           {"end_spread_m", tally.spread_m},
@@ -48,12 +48,11 @@ Json json_of(const detail::Tally& tally) {
           {"replays", rows}};
 }
 
-std::string text_of(const detail::Tally& tally, const detail::RobustOptions& options,
-                    const detail::Robustness& robust) {
+std::string text_of(const Tally& tally, const RobustOptions& options, const Robustness& robust) {
   std::string text =
       "  world  end                      from the goal  speed       lasts   volume  stretch      overlap   "
       "penetration  force    promises\n";
-  for (const detail::Fate& f : tally.fates)
+  for (const Fate& f : tally.fates)
     text += fmt::format(
         "  {:5}  {:23}  {:8.3f} m     {:.4f} m/s  {:5.2f} s  {:5.2f} %  {:.2f} … {:.2f}  {:.4f} m  {:.4f} m  "
         "   "
@@ -61,7 +60,7 @@ std::string text_of(const detail::Tally& tally, const detail::RobustOptions& opt
         f.world, f.end, f.distance_m, f.speed_m_s, f.duration_s, 100 * f.volume_change, f.min_stretch,
         f.largest_stretch, std::max(f.overlap_m, f.self_overlap_m), f.penetration_m, f.asked_n,
         f.broken.empty() ? "kept" : fmt::format("{} broken", f.broken.size()));
-  const detail::Fate& worst = tally.worst;
+  const Fate& worst = tally.worst;
   text += fmt::format(
       "{} of {} {} in the goal (materials ± {:g} %, forces ± {:g} %, turned by up to {:g} degrees, "
       "seed {})\n"
@@ -84,8 +83,8 @@ std::string text_of(const detail::Tally& tally, const detail::RobustOptions& opt
 
 }  // namespace
 
-Outcome robust(const detail::RobustOptions& options) {
-  const detail::Robustness robust = detail::robust(options);
+Outcome robust(const RobustOptions& options) {
+  const Robustness robust = test_robustness(options, at_terminal());
   Json json{{"perturbations", options.perturbations},   {"seed", options.seed},
             {"material_share", options.material_share}, {"force_share", options.force_share},
             {"force_deg", options.force_deg},           {"max_force_n", robust.max_force_n}};

@@ -8,20 +8,21 @@
 #include "cli/scene_text.h"
 #include "core/log.h"
 #include "core/progress.h"
-#include "limber/detail/film/watch.h"
+#include "limber/edits.h"
 
 namespace limber::cli {
 
 namespace {
 
-Json json_of(const detail::SceneFindings& found) {
+Json json_of(const SceneFindings& found) {
   Json json{{"scene", found.file.string()}};
-  if (!found.bodies.empty()) json["bodies"] = found.bodies;
+  for (const std::string& body : found.bodies_json)
+    json["bodies"].push_back(parse_json(body, found.file.string()));
   if (found.prepare_cpu_s) json["estimate"]["prepare_cpu_s"] = *found.prepare_cpu_s;
   if (found.contact_offset_m) json["contact_offset_m"] = *found.contact_offset_m;
   if (found.pairs) {
     json["overlaps"] = Json::array(), json["gaps_below_offset"] = Json::array();
-    for (const detail::NearPair& pair : *found.pairs) {
+    for (const NearPair& pair : *found.pairs) {
       Json both{{"body", pair.body}, {"other", pair.other}};
       if (pair.parted)
         both.update(
@@ -35,11 +36,12 @@ Json json_of(const detail::SceneFindings& found) {
   return json;
 }
 
-void add_start(const detail::StartFindings& start, const std::optional<fs::path>& still, Json& json) {
+void add_start(const StartFindings& start, const std::optional<fs::path>& still, Json& json) {
   json["dt_s"] = start.dt_s ? Json(*start.dt_s) : Json();
-  for (const detail::GoalTerm& term : start.goal)
+  for (const GoalTerm& term : start.goal)
     json["goal"].push_back({{"asked", term.asked}, {"found", term.found}, {"met", term.met}});
-  if (!start.rigid_passage.is_null()) json["rigid_passage"] = start.rigid_passage;
+  if (!start.rigid_passage_json.empty())
+    json["rigid_passage"] = parse_json(start.rigid_passage_json, "rigid_passage");
   Json& estimate = json["estimate"];
   if (const auto& tried = start.tried)
     estimate["plan"] = {{"tried_iterations", tried->iterations},
@@ -57,7 +59,7 @@ std::string line(const char* key, const std::string& words) {
   return fmt::format("  {:12} {}\n", key, words);
 }
 
-std::string text_of(const detail::NearPair& pair, double offset_m) {
+std::string text_of(const NearPair& pair, double offset_m) {
   const std::string both = fmt::format("{} and {}", pair.body, pair.other);
   return pair.parted
              ? line("overlap", fmt::format("{}: {:.3g} m deep, {:.3g} % of the robot's size{}", both,
@@ -69,7 +71,7 @@ std::string text_of(const detail::NearPair& pair, double offset_m) {
                                 both, pair.gap_m, offset_m));
 }
 
-std::string words_of(const std::optional<detail::TriedSearch>& tried) {
+std::string words_of(const std::optional<TriedSearch>& tried) {
   if (!tried) return "not known before bodies are prepared; --work DIR prepares and tries";
   if (tried->solved)
     return fmt::format("a search of {} iterations and {:.2g} s reaches the goal", tried->iterations,
@@ -81,11 +83,11 @@ std::string words_of(const std::optional<detail::TriedSearch>& tried) {
       tried->iterations, tried->wall_s, tried->of_all, tried->all_wall_s);
 }
 
-std::string text_of(const detail::SceneFindings& found, const detail::StartFindings& start,
+std::string text_of(const SceneFindings& found, const StartFindings& start,
                     const std::optional<fs::path>& still) {
   std::string text = line("time step", start.dt_s ? fmt::format("{:.3g} ms", 1e3 * *start.dt_s)
                                                   : "not known before cages are made; --work DIR makes them");
-  for (const detail::GoalTerm& term : start.goal)
+  for (const GoalTerm& term : start.goal)
     text += line("goal", fmt::format("{}: {}{}{}", term.asked, start.prepared ? "" : "about ", term.found,
                                      term.met ? ", met" : ""));
   text += line("to prepare",
@@ -110,15 +112,14 @@ std::string text_of(const detail::SceneFindings& found, const detail::StartFindi
 
 }  // namespace
 
-Outcome check_scene(const detail::SceneCheckOptions& options) {
-  const detail::SceneFindings found = detail::check_scene(options);
+Outcome check_scene(const SceneCheckOptions& options) {
+  const SceneFindings found = examine_scene(options, at_terminal());
   const bool good = found.problems.empty(), to_plan = found.lacks.empty();
   Json json = json_of(found);
   std::string text;
-  for (const Json& body : found.bodies) text += line_of_body(body);
+  for (const Json& body : json.value("bodies", Json::array())) text += line_of_body(body);
   if (found.pairs)
-    for (const detail::NearPair& pair : *found.pairs)
-      text += text_of(pair, found.contact_offset_m.value_or(0));
+    for (const NearPair& pair : *found.pairs) text += text_of(pair, found.contact_offset_m.value_or(0));
   if (found.start) {
     add_start(*found.start, options.still, json);
     text += text_of(found, *found.start, options.still);
@@ -141,11 +142,11 @@ namespace {
 constexpr std::chrono::milliseconds between_looks{200};
 }
 
-Outcome watch_still(detail::StillOptions options) {
+Outcome watch_still(StillOptions options) {
   for (;;) {
-    const std::vector<fs::path> files = detail::files_shown(options.scene);
+    const std::vector<fs::path> files = files_shown(options.scene, at_terminal());
     options.scene.scene = files.front().string();
-    detail::Edits edits(detail::stamps_of(files));
+    Edits edits(stamps_of(files));
     try {
       fmt::print("{}", cli::render_still(options).text);
       std::fflush(stdout);
@@ -155,12 +156,12 @@ Outcome watch_still(detail::StillOptions options) {
     do {
       throw_if_stopped();
       std::this_thread::sleep_for(between_looks);
-    } while (!edits.are_done(detail::stamps_of(files)));
+    } while (!edits.are_done(stamps_of(files)));
   }
 }
 
-Outcome render_still(const detail::StillOptions& options) {
-  const detail::WrittenStill still = detail::render_still(options);
+Outcome render_still(const StillOptions& options) {
+  const WrittenStill still = paint_still(options, at_terminal());
   return {exit_done,
           {{"still", still.file.string()},
            {"size", {still.size_px.first, still.size_px.second}},
@@ -168,8 +169,8 @@ Outcome render_still(const detail::StillOptions& options) {
           still.file.string() + "\n"};
 }
 
-Outcome write_storyboard(const detail::StoryboardOptions& options) {
-  const detail::WrittenStoryboard made = detail::write_storyboard(options);
+Outcome write_storyboard(const StoryboardOptions& options) {
+  const WrittenStoryboard made = paint_storyboard(options, at_terminal());
   return {exit_done,
           {{"storyboard", made.file.string()},
            {"size", {made.size_px.first, made.size_px.second}},

@@ -35,7 +35,6 @@ void DescribedCommands::add_scene_commands() {
       .add_option_function<std::string>(
           "--story",
           [&](const std::string& word) {
-            using detail::Story;
             new_options.story = word == "instrument" ? Story::instrument
                                 : word == "aside"    ? Story::aside
                                 : word == "tour"     ? Story::tour

@@ -1,5 +1,3 @@
-#include "limber/detail/plan/simulate.h"
-
 #include <fmt/format.h>
 
 #include "cli/kept_plan.h"
@@ -20,11 +18,11 @@ std::string text_of_following(const Json& follows, const fs::path& folder) {
 
 }  // namespace
 
-Outcome simulate(const detail::SimulateOptions& options) {
-  const detail::KeptPlan kept = detail::simulate(options);
-  return outcome_of(kept, options.follow.empty()
-                              ? text_of_beginning(kept, options.from)
-                              : text_of_following(kept.summary.at("follows"), options.follow));
+Outcome simulate(const SimulateOptions& options) {
+  return outcome_of(simulate_scene(options, at_terminal()), [&](const Json& summary) {
+    return options.follow.empty() ? text_of_beginning(summary, options.from)
+                                  : text_of_following(summary.at("follows"), options.follow);
+  });
 }
 
 }  // namespace limber::cli

@@ -15,10 +15,17 @@
 //   }
 #pragma once
 
+#include "limber/authoring.h"
 #include "limber/batch.h"
 #include "limber/bench.h"
 #include "limber/body_folder.h"
+#include "limber/edits.h"
 #include "limber/exit_codes.h"
+#include "limber/farm.h"
+#include "limber/film.h"
+#include "limber/info.h"
 #include "limber/mesh.h"
+#include "limber/motion.h"
+#include "limber/robust.h"
 #include "limber/scene.h"
 #include "limber/work_folder.h"

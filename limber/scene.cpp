@@ -295,7 +295,7 @@ Plan search(const Problem& problem, const Plan* earlier, const SolveOptions& opt
             const Context& context) {
   validate(options);
   return working_for(context, [&] {
-    detail::PlanOptions command;
+    PlanOptions command;
     command.seed = options.seed, command.iterations = options.iterations;
     command.time_limit_s = options.time_limit_s;
     command.shortcut_rounds = options.shortcut_rounds;

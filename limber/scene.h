@@ -39,6 +39,14 @@ class LIMBER_API Scene {
 LIMBER_API Scene read_scene(const std::string& file_or_name, const SceneOptions& = {});
 LIMBER_API std::vector<std::string> scene_names();
 
+// Which scene, edited how, with models from where: what work folders are made from.
+struct SceneSource {
+  std::string scene = {};                        // a file, or the name of a scene that comes with limber
+  std::vector<std::string> sets = {};            // as of SceneOptions
+  std::vector<std::filesystem::path> data = {};  // likewise
+  std::filesystem::path store = {};  // prepared bodies that models, scenes and machines share; empty: none
+};
+
 // Several states of a world. Node n of state s is at positions[3 (s · nodes + n)] and the two after it.
 struct States {
   int count = 0, nodes = 0;

@@ -1,13 +1,15 @@
-// What is done with a planned motion in its work folder (Plan::save, or the command's -o). docs/library.md.
+// What is done with a motion in its work folder (Plan::save, limber/motion.h, or the command's -o).
+// docs/verify.md, docs/files.md.
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
-#include "limber/error.h"
-#include "limber/export.h"
-#include "limber/watcher.h"
+#include "limber/scene.h"
 
 namespace limber {
 
@@ -20,36 +22,102 @@ struct Promise {
 // is taken. Throws InputError where it is no such folder.
 LIMBER_API std::vector<Promise> verify(const std::filesystem::path& folder, const std::string& scene = {},
                                        const Context& = {});
+
+// What no promise is made of.
+struct Finding {
+  std::string what, value;
+};
+
+struct VerifyOptions {
+  std::filesystem::path folder;
+  std::optional<std::filesystem::path> model;  // of a body's folder: the one that it must be of
+  std::optional<std::filesystem::path>
+      observables;      // of a work folder: also a CSV with the figures of every frame
+  SceneSource scene;    // the one that the plan must be of; none where its `scene` is empty
+  bool remake = false;  // of large bodies shells are made again, too
+  bool film = false;    // films, too
+  int repaint = 5;      // frames of each that are painted again
+};
+
+struct Verdict {
+  bool all_kept = true;
+  std::vector<Promise> promises;
+  std::vector<Finding> measured;
+  // Figures of the replayed motion, the text of a JSON object (docs/files.md); empty of a body, and of a plan
+  // that cannot be replayed.
+  std::string motion_json;
+  // What scene it is that all is derived from; likewise.
+  struct Scene {
+    std::string name, text_hash;
+    std::vector<std::string> sets;
+  };
+  std::optional<Scene> scene;
+};
+// The same with all that can be asked. Throws InputError where the folder is none of the two.
+LIMBER_API Verdict verify(const VerifyOptions&, const Context& = {});
+
 // Of a body's folder: also that it is of this model, read again with the scale, axes and label that the body
 // tells.
 LIMBER_API std::vector<Promise> verify_body(const std::filesystem::path& folder,
                                             const std::filesystem::path& model, const Context& = {});
 
-struct FilmOptions {
-  int width = 0, height = 0;  // pixels; 0: the scene's
-  std::string frames = {};    // "0-30,47-327:2"; empty: all
-  std::string camera = "main";
-  std::string name = {};               // of the film, as --as
-  std::vector<std::string> sets = {};  // of film, cameras and looks
-  std::filesystem::path video = {};    // .mp4, .webm or .gif; empty: film.mp4 in the folder
-  bool resume = false;                 // frames that are right already are kept
-};
-struct Film {
-  std::filesystem::path video;  // empty where not every frame is there
-  int frames_painted = 0, frames_failed = 0;
-};
-// Paints the frames, and the film where ffmpeg is installed. Throws InputError, DiskError.
-LIMBER_API Film render_film(const std::filesystem::path& folder, const FilmOptions& = {},
-                            const Context& = {});
+inline const std::vector<std::string> motion_formats{"gltf", "pc2", "usd", "vtu"};
 
-// formats: of "gltf", "pc2", "usd", "vtu". Of each the file to open; there may be more beside it.
+struct ExportOptions {
+  std::filesystem::path folder;
+  std::vector<std::string> formats;          // of motion_formats
+  std::optional<std::filesystem::path> out;  // default: export in the folder
+  std::string frames;                        // as of FilmOptions
+};
+
+// Tells its fields, by name and in order, to whoever asks, as ExportedMotion does: f("files", files).
+struct WrittenFiles {
+  std::filesystem::path open;  // the one to open
+  int files = 0;               // how many there are
+  std::uintmax_t bytes = 0;
+  template <class Fields>
+  void fields(Fields& f) {
+    f("open", open), f("files", files), f("bytes", bytes);
+  }
+};
+
+struct ExportedMotion {
+  std::vector<int> frames;  // those of the motion that were wanted
+  int frames_of_motion = 0;
+  std::string trajectory_hash;
+  std::filesystem::path folder;
+  std::vector<std::pair<std::string, std::string>> bodies =
+      {};  // by name: how each bends, "linear" or "phong"
+  std::vector<std::pair<std::string, WrittenFiles>> formats = {};  // by name
+  // As manifest.json has them.
+  template <class Fields>
+  void fields(Fields& f) {
+    std::uint64_t count = frames.size();
+    f("frames", count), f("frame_list", frames), f("trajectory_hash", trajectory_hash), f("folder", folder);
+    f("deformation", bodies), f("formats", formats);
+  }
+};
+// Throws InputError, DiskError.
+LIMBER_API ExportedMotion export_motion(const ExportOptions&, const Context& = {});
+// formats: of motion_formats. Of each the file to open; there may be more beside it.
 LIMBER_API std::vector<std::filesystem::path> export_motion(const std::filesystem::path& folder,
                                                             const std::vector<std::string>& formats,
                                                             const std::filesystem::path& out = {},
                                                             const Context& = {});
-// One HTML page; empty: report.html in the folder. The file that was written.
-LIMBER_API std::filesystem::path write_report(const std::filesystem::path& folder,
-                                              const std::filesystem::path& file = {}, const Context& = {});
+
+enum class FilmInPage { none, embedded, of_another_plan, too_large };
+
+struct WrittenReport {
+  std::filesystem::path file;
+  std::size_t bytes = 0;
+  FilmInPage film = FilmInPage::none;
+  bool all_kept = false;  // promises, checked anew
+};
+// One page in HTML that needs nothing else; nothing: report.html in the folder. Throws as verify() does, or
+// DiskError.
+LIMBER_API WrittenReport write_report(const std::filesystem::path& folder,
+                                      const std::optional<std::filesystem::path>& file = {},
+                                      const Context& = {});
 
 LIMBER_API std::string library_version();
 

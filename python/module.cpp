@@ -586,11 +586,14 @@ PYBIND11_MODULE(_limber, m) {
       [](const std::filesystem::path& folder, int width, int height, const std::string& frames,
          const std::string& camera, const std::string& name, const std::vector<std::string>& sets,
          const std::filesystem::path& video, bool resume, const py::object& progress, int threads) {
-        const limber::Film film = call(progress, threads, [&](const limber::Context& context) {
-          return limber::render_film(folder, {width, height, frames, camera, name, sets, video, resume},
-                                     context);
+        limber::FilmOptions options{
+            .frames = frames, .resume = resume, .camera = camera, .sets = sets, .name = name};
+        if (width != 0 || height != 0) options.size = std::to_string(width) + "x" + std::to_string(height);
+        if (!video.empty()) options.video = video;
+        const limber::RenderedFilm film = call(progress, threads, [&](const limber::Context& context) {
+          return limber::render_film(folder, options, context);
         });
-        return py::make_tuple(film.video, film.frames_painted, film.frames_failed);
+        return py::make_tuple(film.film.value_or(""), film.painted, film.failed);
       },
       "folder"_a, py::kw_only(), "width"_a, "height"_a, "frames"_a, "camera"_a, "name"_a, "sets"_a, "video"_a,
       "resume"_a, "progress"_a, "threads"_a);
@@ -608,7 +611,8 @@ PYBIND11_MODULE(_limber, m) {
       [](const std::filesystem::path& folder, const std::filesystem::path& file, const py::object& progress,
          int threads) {
         return call(progress, threads, [&](const limber::Context& context) {
-          return limber::write_report(folder, file, context);
+          return limber::write_report(folder, file.empty() ? std::nullopt : std::optional(file), context)
+              .file;
         });
       },
       "folder"_a, py::kw_only(), "file"_a, "progress"_a, "threads"_a);

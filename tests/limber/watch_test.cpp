@@ -1,5 +1,5 @@
 // When --watch reads files again, told by what it sees of them look by look.
-#include "limber/detail/film/watch.h"
+#include "limber/edits.h"
 
 #include <gtest/gtest.h>
 

@@ -4,6 +4,7 @@
 #include <deque>
 
 #include "core/error.h"
+#include "core/json_text.h"
 #include "core/lock.h"
 #include "core/log.h"
 #include "core/mesh_files.h"
@@ -94,9 +95,9 @@ class Check {
       } catch (const InputError& error) {
         found_.problems.push_back(error.what());
       }
-      found_.bodies.push_back(std::move(json));
+      found_.bodies_json.push_back(text_of(json));
     }
-    for (const scenes::BodySpec& body : scene_.scenery) found_.bodies.push_back(facts_of(body));
+    for (const scenes::BodySpec& body : scene_.scenery) found_.bodies_json.push_back(text_of(facts_of(body)));
     found_.prepare_cpu_s = cpu_s;
   }
 
@@ -272,7 +273,7 @@ class Check {
     const plan::Plan tried = plan::plan(system, settings);
     throw_if_stopped();
     const Diagnosis diagnosis = diagnose(start.world, system, tried);
-    found_.start->rigid_passage = diagnosis.json;
+    if (!diagnosis.json.is_null()) found_.start->rigid_passage_json = text_of(diagnosis.json);
     const double radius = diagnosis.robot_radius_m, passage = diagnosis.widest_passage_m;
     if (passage < 0)
       found_.warnings.push_back(

@@ -4,6 +4,7 @@
 #include <set>
 
 #include "core/hash.h"
+#include "core/json_fields.h"
 #include "core/lock.h"
 #include "core/log.h"
 #include "core/temporary_files.h"
@@ -93,23 +94,10 @@ ExportedMotion export_motion(const ExportOptions& options) {
     if (std::find(options.formats.begin(), options.formats.end(), format) != options.formats.end())
       exported.formats.emplace_back(format, write(motion, out));
   for (const scenes::BodySpec& body : planned.scene.bodies)
-    exported.bodies.emplace_back(body.name, body.deformation);
-  if (recorded) update_manifest(options.folder, "export", json_of(exported));
+    exported.bodies.emplace_back(body.name,
+                                 body.deformation == scenes::Deformation::phong ? "phong" : "linear");
+  if (recorded) update_manifest(options.folder, "export", json_of_fields(exported));
   return exported;
-}
-
-Json json_of(const ExportedMotion& exported) {
-  Json formats, deformations;
-  for (const auto& [format, written] : exported.formats)
-    formats[format] = {{"open", written.open.string()}, {"files", written.files}, {"bytes", written.bytes}};
-  for (const auto& [body, deformation] : exported.bodies)
-    deformations[body] = deformation == scenes::Deformation::phong ? "phong" : "linear";
-  return {{"frames", exported.frames.size()},
-          {"frame_list", exported.frames},
-          {"trajectory_hash", exported.trajectory_hash},
-          {"folder", exported.folder.string()},
-          {"deformation", deformations},
-          {"formats", formats}};
 }
 
 }  // namespace limber::detail

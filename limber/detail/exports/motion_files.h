@@ -9,6 +9,7 @@
 #include "fem/world.h"
 #include "limber/detail/body/body.h"
 #include "limber/detail/world/surface_at.h"
+#include "limber/work_folder.h"
 #include "scenes/scene.h"
 
 namespace limber::detail {
@@ -28,12 +29,6 @@ Points surface_at(const PlannedMotion&, int body, int frame);
 
 // What the scene shows of the colors that a body's model has; empty: the scene's color.
 const Appearance& appearance_shown(const PlannedMotion&, int body);
-
-struct WrittenFiles {
-  fs::path open;  // the one to open
-  int files = 0;  // how many there are
-  std::uintmax_t bytes = 0;
-};
 
 // Each writes into the folder, which is there, and throws DiskError, or Interrupted between two frames.
 

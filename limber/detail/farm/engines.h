@@ -22,9 +22,6 @@ std::vector<std::vector<std::string>> slurm_commands(const FarmFolder&);
 // Writes the script, sends the jobs and keeps their numbers. Throws InputError with sbatch's own words.
 void send_to_slurm(const FarmFolder&, int round);
 
-struct SlurmTask {
-  std::string job, id, state, why;  // "17", "17_3", "RUNNING", "Resources"
-};
 // Of those that have not ended. Throws InputError where squeue does not answer.
 std::vector<SlurmTask> slurm_tasks(const std::vector<std::string>& jobs);
 void cancel_slurm(const std::vector<std::string>& jobs);

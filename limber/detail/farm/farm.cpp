@@ -94,11 +94,6 @@ FarmSpec spec_to_submit(FarmOptions options) {
 
 }  // namespace
 
-std::string name_of(FarmStatus::State state) {
-  constexpr const char* names[] = {"done", "at work", "failed", "cancelled", "stopped"};
-  return names[std::size_t(state)];
-}
-
 FarmStatus farm_status(const fs::path& work_folder) {
   const FarmFolder farm(work_folder);
   FarmStatus status;

@@ -12,40 +12,9 @@
 #include "limber/detail/bench/bench.h"
 #include "limber/detail/film/render.h"
 #include "limber/detail/plan/plan.h"
+#include "limber/farm.h"
 
 namespace limber::detail {
-
-// In the order in which they are done: those of a scene; bodies, runs and table of a benchmark; models and
-// page of a batch. Units of a stage depend on the stages before, and not on one another.
-enum class Stage { bodies, search, plan, frames, film, report, runs, table, models, page };
-std::string name_of(Stage);
-// Throws InputError where it is none.
-Stage stage_named(const std::string&);
-inline const std::vector<std::string> stage_names{"bodies", "search", "plan",  "frames", "film",
-                                                  "report", "runs",   "table", "models", "page"};
-inline constexpr Stage last_stage = Stage::page;
-
-struct FarmOptions {
-  PlanOptions plan;    // of a scene, with its seeds and presets; not resumed, improved or begun elsewhere
-  RenderOptions film;  // of all frames
-  // Instead of a scene's plan and film: all runs of a benchmark, nothing merged or parted; `plan` has its
-  // folder
-  std::optional<BenchOptions> bench;
-  // Or instead the bodies of many models; `jobs` is not read, a worker has as many as threads
-  std::optional<BatchOptions> batch;
-  std::string engine;  // "slurm", "local", "openjd", "none"; empty: slurm where there is one, else local
-  int workers = 0;     // at once; 0: local as many as the machine has threads, else 8
-  int threads = 1;     // of a worker
-  int frames_per_task = 10;
-  int chunks = 0;                   // > 0: the film in so many parts instead
-  int runs_per_task = 1;            // of a benchmark
-  int models_per_task = 10;         // of a batch
-  std::vector<std::string> sbatch;  // words for sbatch
-  Stage until = Stage::report;      // the last that is wanted
-  bool dry_run = false;
-
-  const fs::path& out() const { return bench ? bench->out : batch ? batch->each.out : plan.out; }
-};
 
 struct Unit {
   Stage stage;

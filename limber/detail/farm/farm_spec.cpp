@@ -34,7 +34,7 @@ struct ResultOfScene {
   template <class Fields>
   void fields(Fields& f) {
     PlanOptions& plan = spec.options.plan;
-    RenderOptions& film = spec.options.film;
+    FilmOptions& film = spec.options.film;
     f("scene", plan.scene.scene), f("scene_hash", spec.scene_hash), f("set", plan.scene.sets);
     f("preset", plan.preset), f("seed", spec.first_seed), f.within("portfolio", plan.portfolio, 1, 1000);
     f("iterations", plan.iterations), f("shortcut", plan.shortcut_rounds), f("cost", plan.cost);
@@ -91,7 +91,7 @@ struct FarmFile {
     FarmOptions& options = spec.options;
     f("version", written_by), f("key", spec.key);
     with_result(spec, [&](auto result) { f("result", result); });
-    SceneOptions& scene = options.plan.scene;
+    SceneSource& scene = options.plan.scene;
     f("data", options.bench ? options.bench->data : scene.data);
     f("store", options.bench   ? options.bench->store
                : options.batch ? options.batch->each.store
@@ -176,7 +176,7 @@ FarmSpec read_spec(const fs::path& work) {
                     "SCENE -o {} does (or limber farm bench, limber farm prepare)",
                     file.string(), work.string(), work.string()));
   FarmSpec spec = spec_from(read_json(file), file);
-  spec.options.plan.out = spec.options.film.folder = work;
+  spec.options.plan.out = work;
   if (spec.options.bench) spec.options.bench->out = work;
   if (spec.options.batch) spec.options.batch->each.out = work;
   return spec;
@@ -193,15 +193,6 @@ void require_camera(const scenes::Scene& scene, const std::string& camera) {
 }
 
 }  // namespace
-
-std::string name_of(Stage stage) { return stage_names[std::size_t(stage)]; }
-
-Stage stage_named(const std::string& name) {
-  const auto found = std::find(stage_names.begin(), stage_names.end(), name);
-  if (found == stage_names.end())
-    throw InputError(fmt::format("{} is no stage; they are {}", name, fmt::join(stage_names, ", ")));
-  return Stage(found - stage_names.begin());
-}
 
 std::string hash_of_scenes(const FarmOptions& options) {
   if (options.batch) return content_hash("");
@@ -225,7 +216,7 @@ FarmSpec spec_of_bench(FarmOptions options) {
     scene = fs::absolute(scenes::find_scene(scene)).lexically_normal().string();
   for (fs::path& folder : bench.data) folder = fs::absolute(folder).lexically_normal();
   if (!bench.store.empty()) bench.store = fs::absolute(bench.store).lexically_normal();
-  bench.out = options.plan.out = options.film.folder = fs::absolute(bench.out).lexically_normal();
+  bench.out = options.plan.out = fs::absolute(bench.out).lexically_normal();
   options.until = Stage::table;
   set_workers(options);
   spec.program = program_hash();
@@ -262,7 +253,7 @@ std::string stamps_of(const std::vector<ListedModel>& models) {
 FarmSpec spec_of_batch(FarmOptions options) {
   BatchOptions& batch = *options.batch;
   require_agreeing(batch.each);
-  batch.each.out = options.plan.out = options.film.folder = fs::absolute(batch.each.out).lexically_normal();
+  batch.each.out = options.plan.out = fs::absolute(batch.each.out).lexically_normal();
   fs::path& store = batch.each.store;
   store = store.empty() ? batch.each.out / "store" : fs::absolute(store).lexically_normal();
   if (batch.listed.empty()) batch.listed = list_models(batch.models, {batch.each.out, store});
@@ -291,7 +282,7 @@ FarmSpec spec_of(FarmOptions options) {
   for (fs::path& folder : plan.scene.data) folder = fs::absolute(folder).lexically_normal();
   if (!plan.scene.store.empty()) plan.scene.store = fs::absolute(plan.scene.store).lexically_normal();
   plan.out = fs::absolute(plan.out).lexically_normal();
-  options.film.folder = plan.out, options.film.resume = true;
+  options.film.resume = true;
 
   const scenes::Scene scene = read_scene(plan);
   for (const scenes::BodySpec& body : scene.bodies) {

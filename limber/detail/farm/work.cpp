@@ -275,7 +275,7 @@ class Worker {
   }
 
   const PlanOptions& plan_options() const { return farm_.spec().options.plan; }
-  const RenderOptions& film_options() const { return farm_.spec().options.film; }
+  RenderOptions film_options() const { return {farm_.spec().options.film, farm_.work()}; }
 
   BenchRuns& bench_runs() {
     if (!bench_runs_) bench_runs_ = std::make_unique<BenchRuns>(*farm_.spec().options.bench);
@@ -336,7 +336,7 @@ class Worker {
       bench_runs().prepare(unit.scene);
       return {};
     }
-    const SceneOptions& options = plan_options().scene;
+    const SceneSource& options = plan_options().scene;
     if (unit.body.empty()) {
       prepare_beside(scene_, options.data, farm_.work());
       return {};
@@ -533,11 +533,11 @@ class Worker {
     const RenderedFilm film = render(film_options());
     if (!film.film)
       throw FramesFailed(
-          fmt::format("{} frames are missing, {} failed", film.frames - int(film.wanted), film.failed));
+          fmt::format("{} frames are missing, {} failed", film.frames - film.wanted, film.failed));
     UnitDone told;
     told.film = film.film->lexically_relative(farm_.work()).string();
     told.sheet = film.sheet->lexically_relative(farm_.work()).string();
-    told.frames = film.frames, told.painted = int(film.painted);
+    told.frames = int(film.frames), told.painted = int(film.painted);
     return told;
   }
 

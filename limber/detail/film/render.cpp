@@ -10,6 +10,7 @@
 #include "core/events.h"
 #include "core/hash.h"
 #include "core/job.h"
+#include "core/json_text.h"
 #include "core/lock.h"
 #include "core/log.h"
 #include "core/progress.h"
@@ -137,7 +138,7 @@ render::Image8 Filming::sheet() const {
 
 RenderedFilm Filming::told(const RenderOptions& options) const {
   return {.frames = shot->frames(),
-          .size_px = size_px,
+          .size = {size_px.first, size_px.second},
           .camera = options.camera,
           .sets = options.sets,
           .passes = options.passes,
@@ -259,8 +260,8 @@ RenderedFilm render(const RenderOptions& options) {
   for (const FailedFrame& failure : failures) log::warn("frame {}: {}", failure.frame, failure.why);
 
   RenderedFilm result = filming.told(options);
-  result.wanted = wanted.size();
-  result.painted = missing.size() - failures.size(), result.failed = failures.size();
+  result.wanted = std::ssize(wanted);
+  result.failed = std::ssize(failures), result.painted = std::ssize(missing) - result.failed;
   result.cpu_s = cpu_s;
   // Several that share the folder may come here at once.
   const FolderLock makes_film(files.folder, FolderLock::alone, FolderLock::waits);
@@ -278,29 +279,8 @@ RenderedFilm render(const RenderOptions& options) {
     if (const fs::path old = options.folder / ("film" + suffix + ".mp4"); fs::exists(old))
       result.old_film = old;
   }
-  update_manifest(options.folder, "render" + suffix, json_of_fields(told_of(result)));
+  update_manifest(options.folder, "render" + suffix, json_of_fields(result));
   return result;
-}
-
-FilmTold told_of(const RenderedFilm& film) {
-  return {.frames = film.frames,
-          .wanted = std::int64_t(film.wanted),
-          .painted = std::int64_t(film.painted),
-          .failed = std::int64_t(film.failed),
-          .size = {film.size_px.first, film.size_px.second},
-          .camera = film.camera,
-          .sets = film.sets,
-          .passes = film.passes,
-          .bits = film.bits,
-          .time = {film.time.seconds,
-                   film.time.motion_s,
-                   film.time.left_out_s,
-                   {film.time.slowest, film.time.quickest}},
-          .trajectory_hash = film.trajectory_hash,
-          .cpu_s = film.cpu_s,
-          .folder = film.folder,
-          .film = film.film,
-          .sheet = film.sheet};
 }
 
 namespace {
@@ -318,7 +298,7 @@ void film_otherwise(const fs::path& folder, const PlanFolder& planned, const sce
 
 }  // namespace
 
-PlannedFilm plan_and_film(const PlanOptions& options, RenderOptions film) {
+PlannedFilm plan_and_film(const PlanOptions& options, const FilmOptions& film) {
   const scenes::Scene scene = read_scene(options);
   if (film.frames.empty() && film.chunk.empty())
     render::require_film_possible(scene.film.frames_per_second, film.video.value_or("film.mp4"));
@@ -330,16 +310,19 @@ PlannedFilm plan_and_film(const PlanOptions& options, RenderOptions film) {
     const fs::path file = options.out / "plan.npz";
     log::info("{}: up to date", file.string());
     const PlanFolder kept = read_plan_folder(options.out);
-    both.plan = {.file = file, .summary = kept.summary, .reached = kept.plan.solved(), .up_to_date = true};
+    both.plan = {.file = file,
+                 .summary_json = text_of(kept.summary, 2),
+                 .reached = kept.plan.solved(),
+                 .up_to_date = true};
     if (kept.scene.text != scene.text || kept.scene.sets != scene.sets)  // it may be filmed otherwise
       film_otherwise(options.out, kept, scene);
   } else {
     both.plan = plan(options, scene);
   }
   lock.share();
-  film.folder = options.out;
-  film.resume = true;
-  both.film = render(film);
+  RenderOptions of_folder{film, options.out};
+  of_folder.resume = true;
+  both.film = render(of_folder);
   return both;
 }
 

@@ -3,73 +3,15 @@
 
 #include <fmt/format.h>
 
-#include <array>
-
 #include "core/json_fields.h"
 #include "limber/detail/film/shot.h"
 #include "limber/detail/plan/plan.h"
+#include "limber/film.h"
 
 namespace limber::detail {
 
-struct RenderOptions {
+struct RenderOptions : FilmOptions {
   fs::path folder;
-  std::string frames;   // "1-30,47-327:2"; empty: all
-  std::string chunk;    // "i/n"; empty: 1/1
-  bool resume = false;  // keep the frames that already show what they should
-  std::string size;     // "1920x1080"; empty: the scene's
-  std::string camera = "main";
-  std::vector<std::string> passes;  // of depth, normal, object, scalar
-  int bits = 8;                     // a channel, 8 or 16
-  std::vector<std::string> sets;    // of film, cameras and the looks of bodies
-  // Names frames-NAME/, film-NAME.mp4 and sheet-NAME.png; empty: the camera's, and none for "main".
-  std::string name;
-  std::optional<fs::path> video;  // default film.mp4 in the folder, made when every frame is there
-};
-
-// What manifest.json tells of a film.
-struct FilmTold {
-  struct Time {
-    double seconds = 0, motion_s = 0, left_out_s = 0;
-    std::array<double, 2> speed{};  // slowest, quickest
-    template <class Fields>
-    void fields(Fields& f) {
-      f("seconds", seconds), f("motion_s", motion_s), f("left_out_s", left_out_s), f("speed", speed);
-    }
-  };
-  std::int64_t frames = 0, wanted = 0, painted = 0, failed = 0;
-  std::array<int, 2> size{};
-  std::string camera;
-  std::vector<std::string> sets, passes;
-  int bits = 8;
-  Time time;
-  std::string trajectory_hash;
-  double cpu_s = 0;
-  fs::path folder;
-  std::optional<fs::path> film, sheet;
-  template <class Fields>
-  void fields(Fields& f) {
-    f("frames", frames), f("wanted", wanted), f("painted", painted), f("failed", failed), f("size", size);
-    f("camera", camera), f("sets", sets), f("passes", passes), f("bits", bits), f("time", time);
-    f("trajectory_hash", trajectory_hash), f("cpu_s", cpu_s), f("folder", folder);
-    f.if_there("film", film), f.if_there("sheet", sheet);
-  }
-};
-
-struct RenderedFilm {
-  int frames = 0;  // of the film
-  std::size_t wanted = 0, painted = 0, failed = 0;
-  std::pair<int, int> size_px;
-  std::string camera;
-  std::vector<std::string> sets, passes;  // as they were asked for
-  int bits = 8;
-  TimeTold time;
-  std::string trajectory_hash;
-  double cpu_s = 0;
-  fs::path folder;                      // of the frames
-  std::optional<fs::path> film, sheet;  // where every frame is there
-  // Where some lack: a film of before, and frames that show something else than this one's.
-  std::optional<fs::path> old_film;
-  int others = 0;
 };
 
 // Where the pictures of a frame are: 0007.png, and of its passes 0007.depth.png and so on.
@@ -119,13 +61,8 @@ std::vector<FailedFrame> paint_frames(const Filming&, const std::vector<int>& fr
 // and where several that share the folder find all frames in place, one makes it. Throws InputError,
 // DiskError, and Interrupted with the frames that are finished kept.
 RenderedFilm render(const RenderOptions&);
-FilmTold told_of(const RenderedFilm&);
 
 // Plans and films, as far as that is not done.
-struct PlannedFilm {
-  KeptPlan plan;
-  RenderedFilm film;
-};
-PlannedFilm plan_and_film(const PlanOptions&, RenderOptions);
+PlannedFilm plan_and_film(const PlanOptions&, const FilmOptions&);
 
 }  // namespace limber::detail

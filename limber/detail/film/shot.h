@@ -14,6 +14,7 @@
 #include "limber/detail/film/pane.h"
 #include "limber/detail/plan/plan_folder.h"
 #include "limber/detail/world/scene_world.h"
+#include "limber/film.h"
 #include "render/annotate.h"
 #include "render/camera.h"
 #include "render/image.h"
@@ -31,18 +32,9 @@ struct Output {
 // Raised when the same film comes out otherwise, so that it is painted anew (a test holds one by the other).
 inline constexpr int picture_generation = 9;
 
-inline const std::vector<std::string> pass_names{"depth", "normal", "object", "scalar"};
-
 struct Picture {
   std::variant<render::Image8, render::Raster8, render::Raster16> frame;
   std::map<std::string, std::variant<render::Raster8, render::Raster16>> passes;  // docs/files.md
-};
-
-// How a film tells its motion.
-struct TimeTold {
-  double seconds = 0, motion_s = 0;  // of film, and of the motion that they show
-  double left_out_s = 0;             // at the end, in which nothing is seen to move
-  double slowest = 0, quickest = 0;  // of the motion's own speed
 };
 
 std::string length_words(double length_m);  // "20 cm"
@@ -63,7 +55,7 @@ class Shot {
   // Frames before the motion, and those of it; what is left over comes after it.
   int frames_before() const { return before_; }
   int frames_of_motion() const { return of_motion_; }
-  TimeTold time_told() const;
+  FilmTime time_told() const;
   // {"depth_m": [near, far], "objects": ["", NAME…], "scalar": {…}, "contacts": […]}: what the levels of the
   // passes mean, and where in the pictures the robot is touched. docs/files.md.
   Json key_of_passes() const;

@@ -27,7 +27,7 @@ int Shot::frames() const { return int(moments_.size()); }
 double Shot::time_s(int frame) const { return moment_of(frame) / plan_.trajectory.frames_per_second; }
 
 // The speeds that are told are of the motion itself: film.speed times the pace.
-TimeTold Shot::time_told() const {
+FilmTime Shot::time_told() const {
   const scenes::FilmSpec& film = scene_.film;
   double least = std::numeric_limits<double>::infinity(), most = 0;
   for (const Moment& moment : moments_)

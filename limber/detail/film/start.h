@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "limber/detail/world/scene_world.h"
+#include "limber/film.h"
 
 namespace limber::detail {
 
@@ -37,16 +38,6 @@ void require_picture_possible(const fs::path& file, const char* what);
 double write_still(const Start&, const std::string& camera, std::pair<int, int> size_px,
                    const fs::path& file);
 
-// The start of a scene, before any plan.
-struct StillOptions {
-  SceneOptions scene;
-  std::string camera = "main", size;  // as of RenderOptions
-  std::optional<fs::path> out;        // a PNG; default: the scene's name
-};
-struct WrittenStill {
-  fs::path file;
-  std::pair<int, int> size_px;
-};
 WrittenStill render_still(const StillOptions&);
 
 }  // namespace limber::detail

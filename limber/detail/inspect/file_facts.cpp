@@ -2,6 +2,7 @@
 
 #include "core/error.h"
 #include "core/hash.h"
+#include "core/json_text.h"
 #include "core/mesh_files.h"
 #include "core/npz.h"
 #include "imaging/label_map.h"
@@ -101,37 +102,32 @@ Json info_of_body(const fs::path& folder) {
   return json;
 }
 
+FileFacts as(FileFacts::Kind kind, const Json& facts) { return {kind, text_of(facts, 2)}; }
+
 }  // namespace
 
 FileFacts facts_of_file(const fs::path& path) {
-  const auto scene = [](const fs::path& file) { return FileFacts{FileFacts::scene, facts_of_scene(file)}; };
+  const auto scene = [](const fs::path& file) { return as(FileFacts::scene, facts_of_scene(file)); };
   if (path.extension() == ".toml") return scene(path);
   if (!fs::exists(path) && path.extension().empty()) return scene(scenes::find_scene(path.string()));
   if (fs::is_directory(path)) {
     if (fs::exists(path / "scene.toml")) return scene(path / "scene.toml");
-    if (fs::exists(path / "plan.npz")) return {FileFacts::other, read_plan_folder(path).summary};
-    if (fs::exists(path / "report.json")) return {FileFacts::body, info_of_body(path)};
+    if (fs::exists(path / "plan.npz")) return as(FileFacts::other, read_plan_folder(path).summary);
+    if (fs::exists(path / "report.json")) return as(FileFacts::body, info_of_body(path));
     throw InputError(fmt::format(
         "{}: holds none of plan.npz, report.json, scene.toml; nothing here is limber's", path.string()));
   }
   const std::string extension = path.extension().string();
-  if (extension == ".msh") return {FileFacts::other, info_of_cage(read_msh(path))};
-  if (extension == ".npz") return {FileFacts::other, info_of_npz(path)};
-  if (extension == ".json") return {FileFacts::other, read_json(path)};
+  if (extension == ".msh") return as(FileFacts::other, info_of_cage(read_msh(path)));
+  if (extension == ".npz") return as(FileFacts::other, info_of_npz(path));
+  if (extension == ".json") return as(FileFacts::other, read_json(path));
   if (extension == ".png") {
     const auto png = render::inspect_png(path);
     if (!png) throw InputError(fmt::format("{}: is missing, no PNG, or cut short", path.string()));
-    return {FileFacts::other, {{"width", png->width}, {"height", png->height}, {"texts", png->texts}}};
+    return as(FileFacts::other, {{"width", png->width}, {"height", png->height}, {"texts", png->texts}});
   }
-  if (imaging::is_label_map(path)) return {FileFacts::label_map, info_of_label_map(path)};
-  return {FileFacts::other, info_of_model(path)};
-}
-
-std::vector<KnownSceneFacts> facts_of_known_scenes() {
-  std::vector<KnownSceneFacts> facts;
-  for (const scenes::KnownScene& known : scenes::known_scenes())
-    facts.push_back({known.name, known.file, scenes::read_scene_file(known.file).description});
-  return facts;
+  if (imaging::is_label_map(path)) return as(FileFacts::label_map, info_of_label_map(path));
+  return as(FileFacts::other, info_of_model(path));
 }
 
 }  // namespace limber::detail

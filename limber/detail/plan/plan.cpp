@@ -2,6 +2,7 @@
 
 #include "core/error.h"
 #include "core/hash.h"
+#include "core/json_text.h"
 #include "core/lock.h"
 #include "core/log.h"
 #include "core/progress.h"
@@ -206,7 +207,10 @@ KeptPlan plan(const PlanOptions& options) {
     // What a film shows otherwise is told by the text alone.
     if (kept.scene.text == scene.text && kept.scene.sets == scene.sets) {
       log::info("{}: up to date", file.string());
-      return {.file = file, .summary = kept.summary, .reached = kept.plan.solved(), .up_to_date = true};
+      return {.file = file,
+              .summary_json = text_of(kept.summary, 2),
+              .reached = kept.plan.solved(),
+              .up_to_date = true};
     }
   }
   return plan(options, scene);
@@ -231,7 +235,7 @@ Found find_plan(const scenes::Scene& scene, const FemSystem& system, const PlanO
 Found make_better(const scenes::Scene& scene, const FemSystem& system, const PlanOptions& options,
                   plan::Plan searched, const std::optional<plan::PortfolioReport>& searches,
                   const Json& earlier_summary) {
-  Found found{.plan = std::move(searched), .extra = {}, .how = {}};
+  Found found{.plan = std::move(searched), .extra = {}, .also_done = {}};
   plan::Plan& plan = found.plan;
   const PlanTold told = earlier_summary.is_null()
                             ? PlanTold{}
@@ -239,19 +243,16 @@ Found make_better(const scenes::Scene& scene, const FemSystem& system, const Pla
   const plan::ShortcutSettings shortcuts = shortcuts_of(scene, options, told.shortcut);
   for (const char* later : {"shortcut", "improve", "refine"})
     if (earlier_summary.contains(later)) found.extra[later] = earlier_summary.at(later);
-  if (searches) {
-    found.extra["portfolio"] = plan::json_of(*searches);
-    found.how.portfolio = searches;
-  }
-  if (plan.solved() && shortcuts.rounds > shortcuts.rounds_done) {
-    found.how.shortcut = plan::shorten(system, plan, shortcuts);
-    found.extra["shortcut"] = plan::json_of(*found.how.shortcut);
-  }
-  if (plan.solved() && options.improve) {
-    found.how.improve =
-        plan::improve(system, plan, {.cost = shortcuts.cost, .shortcut_rounds = shortcuts.rounds});
-    found.extra["improve"] = plan::json_of(*found.how.improve);
-  }
+  const auto tell = [&](const char* what, const auto& report) {
+    found.extra[what] = plan::json_of(report);
+    found.also_done.push_back(what);
+  };
+  if (searches) tell("portfolio", *searches);
+  if (plan.solved() && shortcuts.rounds > shortcuts.rounds_done)
+    tell("shortcut", plan::shorten(system, plan, shortcuts));
+  if (plan.solved() && options.improve)
+    tell("improve",
+         plan::improve(system, plan, {.cost = shortcuts.cost, .shortcut_rounds = shortcuts.rounds}));
   return found;
 }
 
@@ -293,7 +294,7 @@ KeptPlan plan(const PlanOptions& options, const scenes::Scene& scene) {
     throw_if_stopped();
   }
   KeptPlan kept = keep_plan(options.out, scene, bodies, world, system, plan, found.extra);
-  kept.how = std::move(found.how);
+  kept.also_done = std::move(found.also_done);
   if (stop_signal() != 0) {
     log::info("{}: the plan so far is kept; go on with --resume", file.string());
     throw_if_stopped();
@@ -351,7 +352,7 @@ KeptPlan keep_measured_plan(const fs::path& folder, const scenes::Scene& scene,
   update_manifest(folder, "plan", plan::without_timings(summary));
   const bool is_simulation = plan.simulation.has_value();
   return {.file = folder / "plan.npz",
-          .summary = std::move(summary),
+          .summary_json = text_of(summary, 2),
           .is_simulation = is_simulation,
           .reached = is_simulation ? plan.simulation->ending != plan::Simulation::diverged : plan.solved(),
           .measured = !is_unmeasured(plan)};

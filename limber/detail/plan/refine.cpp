@@ -90,7 +90,7 @@ KeptPlan refine(const RefineOptions& options) {
   json["tets"] = tets_of(bodies);
   KeptPlan kept = keep_plan(options.out, scene, bodies, world, system, plan, {{"refine", json}});
   throw_if_stopped();
-  kept.how.refine = report;
+  kept.also_done = {"refine"};
   return kept;
 }
 

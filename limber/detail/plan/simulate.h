@@ -5,16 +5,6 @@
 
 namespace limber::detail {
 
-struct SimulateOptions {
-  SceneOptions scene;
-  fs::path out;
-  std::optional<double> duration_s;  // > 0, from the start; nothing: 5 s, or as long as the plan followed
-  fs::path script;                   // more forces and motions; empty: the scene's alone
-  fs::path from;                     // a folder with a plan or a simulation; empty: the scene's start
-  std::optional<int> frame;          // of `from`
-  bool resume = false;               // go on from the simulation in `out`
-  fs::path follow;  // a folder with a plan that is followed by feedback; empty: no control acts
-};
 // Initial velocities, forces and motions that the scene tells; no search. Throws as plan().
 KeptPlan simulate(const SimulateOptions&);
 

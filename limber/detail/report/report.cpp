@@ -343,7 +343,7 @@ void tables(const Findings& f, Page& page) {
     if (const auto key = std::string(part) + "_cpu_s"; dynamics.contains(key))
       times.push_back({std::string("of the dynamics, searching and replaying: ") + part,
                        seconds(dynamics.at(key).get<double>())});
-  if (const auto film = fields_or_nothing<FilmTold>(read_manifest(f.folder).value("render", Json())))
+  if (const auto film = fields_or_nothing<RenderedFilm>(read_manifest(f.folder).value("render", Json())))
     times.push_back({"render, last run", seconds(film->cpu_s)});
   page.table({"stage", "CPU s"}, times);
   if (known)

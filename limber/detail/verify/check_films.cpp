@@ -19,7 +19,7 @@ namespace limber::detail {
 namespace {
 
 // The options that a film's entry tells.
-RenderOptions options_of(const fs::path& folder, const std::string& suffix, const FilmTold& entry) {
+RenderOptions options_of(const fs::path& folder, const std::string& suffix, const RenderedFilm& entry) {
   RenderOptions options;
   options.folder = folder;
   options.camera = entry.camera;
@@ -35,7 +35,7 @@ RenderOptions options_of(const fs::path& folder, const std::string& suffix, cons
 }
 
 // What the entry says otherwise than the film `is`, or could not be; empty: nothing.
-std::string false_word(const Json& entry, const FilmTold& told, FilmTold is) {
+std::string false_word(const Json& entry, const RenderedFilm& told, RenderedFilm is) {
   if (told.failed < 0 || told.painted < 0 || told.painted + told.failed > told.wanted ||
       told.wanted > told.frames)
     return "it counts more frames than there are";
@@ -148,7 +148,7 @@ std::string other_picture(const Filming& filming, Shot::Painter& painter, int fr
 
 // What was written beside the frames' folder is here, wherever that was then, and so is what has such a name
 // here: another folder's film is no word for this one's.
-fs::path found(const fs::path& folder, const FilmTold& entry, const fs::path& told) {
+fs::path found(const fs::path& folder, const RenderedFilm& entry, const fs::path& told) {
   const fs::path here = folder / told.filename();
   return told.parent_path() == entry.folder.parent_path() || fs::exists(here) ? here : told;
 }
@@ -192,13 +192,13 @@ std::vector<std::string> untold_passes(const Filming& filming) {
 
 void check_film(const fs::path& folder, const std::string& suffix, const Json& written, int repaint,
                 Promises& table) {
-  const FilmTold entry = read_fields<FilmTold>(
+  const RenderedFilm entry = read_fields<RenderedFilm>(
       written, "manifest.json",
       "it does not tell what a film is made by; an older limber's did not: render it again");
   RenderOptions options = options_of(folder, suffix, entry);
   const Filming filming(options);
   const std::string name = "film" + suffix + ": ";
-  const std::string wrong = false_word(written, entry, told_of(filming.told(options)));
+  const std::string wrong = false_word(written, entry, filming.told(options));
   table.row(name + "manifest.json tells of this film", wrong.empty(), wrong);
 
   const int count = filming.shot->frames();

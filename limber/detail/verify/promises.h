@@ -8,11 +8,6 @@
 
 namespace limber::detail {
 
-// What no promise is made of.
-struct Finding {
-  std::string what, value;
-};
-
 class Promises {
  public:
   void row(const std::string& promise, bool kept, const std::string& value) {

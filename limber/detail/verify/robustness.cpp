@@ -151,9 +151,9 @@ std::vector<Fate> replay(const Planned& planned, const RobustOptions& options, b
     fate.world = world_number;
     fate.reaches = course.result == plan::ControlRollout::rests_in_goal && goes_by;
     fate.end = goes_by ? name_of(course.result, plan.settings.settle.max_duration_s > 0) : "a via is missed";
-    fate.end_center_m = system.robot_center(course.end);
-    fate.distance_m =
-        (fate.end_center_m - system.goal_shift(course.end) - plan.settings.goal.center_of_mass_m).norm();
+    const Vec3 center_m = system.robot_center(course.end);
+    fate.end_center_m = {center_m.x(), center_m.y(), center_m.z()};
+    fate.distance_m = (center_m - system.goal_shift(course.end) - plan.settings.goal.center_of_mass_m).norm();
     fate.speed_m_s = system.mean_speed(course.end);
     fate.duration_s = course.costs.duration_s;
     fate.volume_change =
@@ -175,7 +175,7 @@ Tally tally_of(std::vector<Fate> fates, const Vec3& planned_end) {
   Fate& worst = tally.worst;
   for (const Fate& f : fates) {
     tally.reached += f.reaches, tally.keep_all += f.broken.empty();
-    const double apart = (f.end_center_m - planned_end).norm();
+    const double apart = (Vec3(f.end_center_m.data()) - planned_end).norm();
     tally.spread_m += apart * apart / double(fates.size());
     tally.farthest_m = std::max(tally.farthest_m, apart);
     worst.volume_change = std::max(worst.volume_change, f.volume_change);

@@ -1,54 +1,10 @@
 // A plan replayed in worlds that are a little different: a report, no verdict.
 #pragma once
 
-#include <map>
-#include <optional>
-#include <string>
-#include <vector>
-
-#include "core/file.h"
-#include "core/mesh.h"
+#include "limber/robust.h"
 
 namespace limber::detail {
 
-struct RobustOptions {
-  fs::path folder;
-  int perturbations = 16;
-  std::uint64_t seed = 1;
-  double material_share = 0.1;  // Young's modulus, density and friction of each body: ± this
-  double force_share = 0.1;     // each control's force: ± this,
-  double force_deg = 5;         // and turned by up to so much
-  bool follow = false;          // besides open loop
-};
-
-// What became of one perturbed replay.
-struct Fate {
-  int world = 0;
-  bool reaches = false;
-  const char* end = "";
-  double distance_m = 0, speed_m_s = 0, duration_s = 0;
-  Vec3 end_center_m = Vec3::Zero();
-  double volume_change = 0, penetration_m = 0;
-  double min_stretch = 1, largest_stretch = 1, overlap_m = 0, self_overlap_m = 0;
-  double asked_n = 0, force_n = 0;  // the largest that a control asked for, and that acted
-  std::vector<std::string> broken;  // of the promises that `limber verify` looks at
-};
-
-// The same worlds and errors, followed or open loop.
-struct Tally {
-  std::vector<Fate> fates;
-  int reached = 0, keep_all = 0;
-  double spread_m = 0, farthest_m = 0;
-  Fate worst;  // of each figure
-  std::map<std::string, int> broken;
-};
-
-struct Robustness {
-  Tally open_loop;
-  std::optional<Tally> followed;
-  double max_force_n = 0;  // that the plan's controls may ask for
-  bool settles = false;    // whether the robot is to come to rest
-};
 // Throws InputError where the folder holds no plan from its scene's start that reaches its goal.
 Robustness robust(const RobustOptions&);
 

@@ -66,7 +66,7 @@ Verified verify_plan(const fs::path& folder, const PlanFolder& planned,
   check_plan(folder, planned, bodies, world, figures, table);
   check_pictures(folder, planned, world, figures, table);
   return {std::move(table), figures,
-          Verified::Scene{scene.name, hex(hash_of(std::string_view(scene.text))), scene.sets}};
+          Verdict::Scene{scene.name, hex(hash_of(std::string_view(scene.text))), scene.sets}};
 }
 
 Verified verify(const VerifyOptions& options) {

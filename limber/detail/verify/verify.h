@@ -27,27 +27,13 @@ struct Verified {
   Promises promises;
   std::optional<MotionFigures>
       motion;  // of the replay; nothing of a body, and of a plan that cannot be replayed
-  // What scene it is that all is derived from; likewise.
-  struct Scene {
-    std::string name, text_hash;
-    std::vector<std::string> sets;
-  };
-  std::optional<Scene> scene;
+  std::optional<Verdict::Scene> scene;  // likewise
 };
 
 // Checks every promise of a work folder; `figures` are overwritten by those of the replay.
 Verified verify_plan(const fs::path& folder, const PlanFolder&, const std::vector<PreparedBody>&,
                      const fem::World&, MotionFigures& figures, const VerifyDepth& = {});
 
-struct VerifyOptions {
-  fs::path folder;
-  std::optional<fs::path> model;        // of a body's folder: the one that it must be of
-  std::optional<fs::path> observables;  // of a work folder: also a CSV with the figures of every frame
-  SceneOptions scene;                   // the one that the plan must be of; none where its `scene` is empty
-  bool remake = false;                  // of large bodies shells are made again, too
-  bool film = false;                    // films, too
-  int repaint = 5;                      // frames of each that are painted again
-};
 // Of a work folder, or of one that prepare has written. Throws InputError where it is neither.
 Verified verify(const VerifyOptions&);
 

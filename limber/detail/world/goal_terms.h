@@ -6,15 +6,10 @@
 #include <vector>
 
 #include "fem/world.h"
+#include "limber/authoring.h"
 #include "scenes/scene.h"
 
 namespace limber::detail {
-
-struct GoalTerm {
-  std::string asked;  // "centre of mass within 0.3 m of (3.2 1 1)"
-  bool met;
-  std::string found;
-};
 
 // Where the robot is taken to be: its centre of mass, or that of its first patch where that leads.
 Vec3 robot_place_m(const scenes::Scene&, const fem::World&, const State&);

@@ -6,16 +6,10 @@
 #include "fem/world.h"
 #include "limber/detail/body/body.h"
 #include "limber/detail/world/fem_system.h"
+#include "limber/scene.h"
 #include "scenes/scene.h"
 
 namespace limber::detail {
-
-struct SceneOptions {
-  std::string scene;              // a file, or the name of a scene that comes with limber
-  std::vector<std::string> sets;  // --set a.b=value
-  std::vector<fs::path> data;     // more folders to look for model files in
-  fs::path store = {};            // of bodies (limber/detail/body/body_store.h); empty: none
-};
 
 fs::path body_folder(const fs::path& work_folder, const scenes::BodySpec&);
 

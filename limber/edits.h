@@ -3,23 +3,24 @@
 #pragma once
 
 #include <cstdint>
+#include <filesystem>
 #include <vector>
 
-#include "limber/detail/world/scene_world.h"
+#include "limber/scene.h"
 
-namespace limber::detail {
+namespace limber {
 
 struct Stamp {
   std::int64_t bytes = -1, written_ns = 0;  // −1: there is no such file
   bool operator==(const Stamp&) const = default;
 };
-std::vector<Stamp> stamps_of(const std::vector<fs::path>&);
+LIMBER_API std::vector<Stamp> stamps_of(const std::vector<std::filesystem::path>&);
 
 // Those that a still of the scene shows: the scene first, its models and what these name; of a scene that
 // cannot be read the scene alone.
-std::vector<fs::path> files_shown(const SceneOptions&);
+LIMBER_API std::vector<std::filesystem::path> files_shown(const SceneSource&, const Context& = {});
 
-class Edits {
+class LIMBER_API Edits {
  public:
   // `read`: taken before the files were read.
   explicit Edits(std::vector<Stamp> read) : read_(read), last_(std::move(read)) {}
@@ -31,4 +32,4 @@ class Edits {
   std::vector<Stamp> read_, last_;
 };
 
-}  // namespace limber::detail
+}  // namespace limber
