@@ -20,7 +20,6 @@
 #include "core/log.h"
 #include "core/progress.h"
 #include "core/threads.h"
-#include "core/version.h"
 #include "core/words.h"
 
 namespace limber::cli {
@@ -90,7 +89,7 @@ int run_command_line(int argc, const char* const* argv) {
 
   CLI::App program{"limber: plans the motion of soft things among soft things, and films it"};
   program.name("limber");
-  program.set_version_flag("--version", std::string("limber ") + version);
+  program.set_version_flag("--version", "limber " + library_version());
   program.require_subcommand(1);
   program.footer(
       "Exit codes: 0 done; 1 a defect of limber; 2 bad input or usage; 3 no plan reached the goal (the best "

@@ -6,8 +6,7 @@
 
 #include <fmt/ranges.h>
 
-#include "core/version.h"
-
+#include "limber/work_folder.h"
 namespace limber::cli {
 
 namespace {
@@ -111,7 +110,7 @@ _limber() {{
 }}
 complete -o default -F _limber limber
 )",
-                     version, cases, values);
+                     library_version(), cases, values);
 }
 
 // ---- zsh ----
@@ -164,14 +163,15 @@ std::string zsh_completion(const CLI::App& program) {
   return fmt::format(
       "#compdef limber\n# limber {}: for zsh. As a file _limber in a folder of $fpath.\n{}_limber "
       "\"$@\"\n",
-      version, functions);
+      library_version(), functions);
 }
 
 // ---- fish ----
 
 std::string fish_completion(const CLI::App& program) {
-  std::string text = fmt::format(
-      "# limber {}: for fish. Where it is not installed: limber completion fish | source\n", version);
+  std::string text =
+      fmt::format("# limber {}: for fish. Where it is not installed: limber completion fish | source\n",
+                  library_version());
   const auto condition = [&](const CLI::App& command) {
     std::string all;
     for (const CLI::App* one = &command; one != &program; one = one->get_parent())
@@ -260,9 +260,9 @@ std::string manual_of(const CLI::App& program, const CLI::App& command) {
   std::string what = command.get_description();
   if (const std::size_t colon = what.find(": "); &command == &program && colon != what.npos)
     what = what.substr(colon + 2);
-  std::string text =
-      fmt::format(".TH {} 1 \"\" \"limber {}\" \"User Commands\"\n.SH NAME\n{} \\- {}\n.SH SYNOPSIS\n.B {}\n",
-                  roff(title), version, roff(page_name(command)), roff(what), roff(full_name(command)));
+  std::string text = fmt::format(
+      ".TH {} 1 \"\" \"limber {}\" \"User Commands\"\n.SH NAME\n{} \\- {}\n.SH SYNOPSIS\n.B {}\n",
+      roff(title), library_version(), roff(page_name(command)), roff(what), roff(full_name(command)));
   const std::vector<const CLI::App*> below = command.get_subcommands({});
   if (!below.empty()) text += ".I COMMAND\n";
   for (const CLI::Option* option : positionals_of(command))

@@ -7,6 +7,7 @@
 #include "cli/body_report.h"
 #include "cli/commands.h"
 #include "core/error.h"
+#include "core/file.h"
 #include "core/progress.h"
 
 namespace limber::cli {

@@ -6,6 +6,7 @@
 #include "cli/command_words.h"
 #include "cli/described_commands.h"
 #include "core/error.h"
+#include "core/file.h"
 #include "core/words.h"
 
 namespace limber::cli {

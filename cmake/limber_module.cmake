@@ -1,13 +1,12 @@
-# limber_module(NAME [COLD] SOURCES … [CGAL_SOURCES …] [USES module …] [OPENS module …] [OF_CORE header …] [ROOMS folder …]
+# limber_module(NAME [COLD] SOURCES … [CGAL_SOURCES …] [USES module …] [OF_CORE header …] [ROOMS folder …]
 #               [LINKS target …] [OWNS include-prefix …])
 #
-# A static library limber_NAME. USES are the modules whose public headers it may include (core always), OPENS those
-# whose detail/ it may include, too; OF_CORE, where it is given, all headers of core that it may include. ROOMS are the
+# A static library limber_NAME. USES are the modules whose public headers it may include (core always); OF_CORE, where it is given, all headers of core that it may include. ROOMS are the
 # folders of its detail/, each of which may include those before it. OWNS are the prefixes of third-party headers that
 # only this module's .cpp files may include. CGAL_SOURCES are compiled one at a time. COLD: no loop that users wait for, so
 # a release compiles it with -O2, a tenth quicker. The ctest `layering` reads what is said here and every #include in the tree.
 function(limber_module NAME)
-  cmake_parse_arguments(M "COLD" "" "SOURCES;CGAL_SOURCES;USES;OPENS;OF_CORE;ROOMS;LINKS;OWNS" ${ARGN})
+  cmake_parse_arguments(M "COLD" "" "SOURCES;CGAL_SOURCES;USES;OF_CORE;ROOMS;LINKS;OWNS" ${ARGN})
   add_library(limber_${NAME} STATIC ${M_SOURCES})
   if(M_COLD)
     target_compile_options(limber_${NAME} PRIVATE $<$<CONFIG:Release>:-O2>)
@@ -30,11 +29,10 @@ function(limber_module NAME)
   target_link_libraries(limber_${NAME} PUBLIC ${M_LINKS})
   set_property(GLOBAL APPEND PROPERTY LIMBER_MODULES ${NAME})
   set(uses "${used}")
-  set(opens "${M_OPENS}")
   set(of_core "${M_OF_CORE}")
   set(rooms "${M_ROOMS}")
   set(owns "${M_OWNS}")
-  foreach(what uses opens of_core rooms owns)
+  foreach(what uses of_core rooms owns)
     set_property(GLOBAL APPEND_STRING PROPERTY LIMBER_MAP "set(${what}_${NAME} ${${what}})\n")
   endforeach()
 endfunction()

@@ -18,21 +18,21 @@ namespace limber {
 enum class Story { away, instrument, aside, tour };
 
 struct NewSceneOptions {
-  std::filesystem::path from,
-      out;  // models in one frame: a folder, a label map, an atlas; the scene file to write
-  std::filesystem::path labels;  // names of a label map's labels; empty: as it has them
-  std::string robot;             // the model that it is about
+  std::filesystem::path from = {};    // models in one frame: a folder, a label map, an atlas
+  std::filesystem::path out = {};     // the scene file to write
+  std::filesystem::path labels = {};  // names of a label map's labels; empty: as it has them
+  std::string robot = {};             // the model that it is about
   Story story = Story::away;
-  std::vector<std::string> only;  // names without ending, labels, an atlas' names or ids; empty: all
-  std::vector<std::string> see_through, rigid;  // besides those whose names say so
-  double scale = 0.001;                         // metres a file unit
-  double shrink = 1;                            // at most so much of every organ's true size
-  int tets = 160;                               // of a soft cage
-  double fascia_hz =
-      0;  // of soft organs but the robot: hung in their places, under gravity; 0: held at their backs
+  std::vector<std::string> only = {};  // names without ending, labels, an atlas' names or ids; empty: all
+  std::vector<std::string> see_through = {}, rigid = {};  // besides those whose names say so
+  double scale = 0.001;                                   // metres a file unit
+  double shrink = 1;                                      // at most so much of every organ's true size
+  int tets = 160;                                         // of a soft cage
+  // Of soft organs but the robot: hung in their places, under gravity; 0: held at their backs.
+  double fascia_hz = 0;
   std::string up = "+z", front = "-y";
   // front, back, left, right, up, down; empty: front, or aside to where least is in the way.
-  std::string goal;
+  std::string goal = {};
   // Of a label map: as of ModelOptions.
   double label_gap = 0.2;
   int label_rounds = 10;
@@ -43,8 +43,8 @@ struct NewScene {
   std::filesystem::path file;
   std::size_t bodies = 0, scenery = 0;
   double scale = 1;  // of their true size
-  std::vector<std::pair<std::string, double>>
-      moved_m;  // bodies that are not at their true place, and how far
+  // Bodies that are not at their true place, and how far from it.
+  std::vector<std::pair<std::string, double>> moved_m;
   std::vector<std::string> notes;
   std::filesystem::path data;  // the folder that planning it must be told, or empty
   bool plannable = true;       // else it is simulated
@@ -53,12 +53,12 @@ struct NewScene {
 LIMBER_API NewScene make_scene(const NewSceneOptions&, const Context& = {});
 
 struct SceneCheckOptions {
-  SceneSource scene;
-  std::string preset;  // empty: the scene's
-  std::optional<std::filesystem::path>
-      work;  // a work folder: bodies are prepared there, and a search is tried
-  std::optional<std::filesystem::path> still;  // a PNG of the start
-  std::string camera = "main", size;
+  SceneSource scene = {};
+  std::string preset = {};  // empty: the scene's
+  // A work folder: bodies are prepared there, and a search is tried.
+  std::optional<std::filesystem::path> work = {};
+  std::optional<std::filesystem::path> still = {};  // a PNG of the start
+  std::string camera = "main", size = {};           // of the still, as of FilmOptions
 };
 
 // What a goal asks for, term by term.

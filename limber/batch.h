@@ -19,13 +19,13 @@ struct ListedModel {
 LIMBER_API bool is_of_many(const std::string& word);
 
 struct BatchOptions {
-  std::vector<std::string> models;  // files, folders, @lists
-  std::vector<ListedModel> listed;  // instead, where there are any: those that they stand for
-  ModelOptions each;                // its `model` is not read
-  int jobs = 0;                     // at once; 0: as many as there are threads
-  double time_limit_s = 600;        // of a model, CPU time; five times that by the clock
-  double memory_mb = 0;             // of a model; 0: three quarters of the machine's, shared by the jobs
-  bool retry_failed = false;        // those, too, that would only fail again
+  std::vector<std::string> models = {};  // files, folders, @lists
+  std::vector<ListedModel> listed = {};  // instead, where there are any: those that they stand for
+  ModelOptions each = {};                // its `model` is not read
+  int jobs = 0;                          // at once; 0: as many as there are threads
+  double time_limit_s = 600;             // of a model, CPU time; five times that by the clock
+  double memory_mb = 0;                  // of a model; 0: three quarters of the machine's, shared by the jobs
+  bool retry_failed = false;             // those, too, that would only fail again
 };
 
 // A model of a batch. `reason` is empty where it was prepared; else one of

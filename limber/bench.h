@@ -19,19 +19,19 @@ namespace limber {
 
 // Each run is planned as `limber plan` would.
 struct BenchOptions {
-  std::vector<std::string> scenes;  // files, or names of scenes that come with limber
-  std::vector<std::string> sets;    // "planner.settle_s=2": edits made before they are read
-  std::vector<std::filesystem::path> data;
-  std::filesystem::path store;       // as of SceneSource
-  std::string seeds = "1-30";        // "1-30,40,50-90:10"
-  std::vector<std::string> presets;  // empty: each scene's own
-  std::optional<std::int64_t> iterations;
+  std::vector<std::string> scenes = {};  // files, or names of scenes that come with limber
+  std::vector<std::string> sets = {};    // "planner.settle_s=2": edits made before they are read
+  std::vector<std::filesystem::path> data = {};
+  std::filesystem::path store = {};       // as of SceneSource
+  std::string seeds = "1-30";             // "1-30,40,50-90:10"
+  std::vector<std::string> presets = {};  // empty: each scene's own
+  std::optional<std::int64_t> iterations = {};
   double time_limit_s = std::numeric_limits<double>::infinity();  // of a run
   int in_flight = 0;                                              // as of PlanOptions
-  std::string chunk;                              // "i/n": the i-th of n parts of the runs; empty: all
-  std::vector<std::filesystem::path> merge;       // nothing is run: folders whose records make one table
-  std::filesystem::path out;                      // may be empty with `merge`
-  std::optional<std::filesystem::path> ompl_log;  // also OMPL's benchmark log
+  std::string chunk = {};                              // "i/n": the i-th of n parts of the runs; empty: all
+  std::vector<std::filesystem::path> merge = {};       // nothing is run: folders whose records make one table
+  std::filesystem::path out = {};                      // may be empty with `merge`
+  std::optional<std::filesystem::path> ompl_log = {};  // also OMPL's benchmark log
 };
 
 // Of the frames of solved runs those within so many per cent of a body's volume are counted.

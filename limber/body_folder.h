@@ -59,9 +59,9 @@ struct PreparedFolder {
 LIMBER_API PreparedFolder prepare_folder(const ModelOptions&, const Context& = {});
 
 struct BodyExportOptions {
-  std::filesystem::path folder;              // of a whole body
-  std::vector<std::string> formats;          // of export_formats
-  std::optional<std::filesystem::path> out;  // nothing: the folder itself
+  std::filesystem::path folder = {};              // of a whole body
+  std::vector<std::string> formats = {};          // of export_formats
+  std::optional<std::filesystem::path> out = {};  // nothing: the folder itself
   double density_kg_m3 = 1000;
 };
 struct ExportedBody {

@@ -23,22 +23,22 @@ inline const std::vector<std::string> stage_names{"bodies", "search", "plan",  "
 inline constexpr Stage last_stage = Stage::page;
 
 struct FarmOptions {
-  PlanOptions plan;  // of a scene, with its seeds and presets; not resumed, improved or begun elsewhere
-  FilmOptions film;  // of all frames
+  PlanOptions plan = {};  // of a scene, with its seeds and presets; not resumed, improved or begun elsewhere
+  FilmOptions film = {};  // of all frames
   // Instead of a scene's plan and film: all runs of a benchmark, nothing merged or parted; `plan` has its
   // folder
-  std::optional<BenchOptions> bench;
+  std::optional<BenchOptions> bench = {};
   // Or instead the bodies of many models; `jobs` is not read, a worker has as many as threads
-  std::optional<BatchOptions> batch;
-  std::string engine;  // "slurm", "local", "openjd", "none"; empty: slurm where there is one, else local
-  int workers = 0;     // at once; 0: local as many as the machine has threads, else 8
-  int threads = 1;     // of a worker
+  std::optional<BatchOptions> batch = {};
+  std::string engine = {};  // "slurm", "local", "openjd", "none"; empty: slurm where there is one, else local
+  int workers = 0;          // at once; 0: local as many as the machine has threads, else 8
+  int threads = 1;          // of a worker
   int frames_per_task = 10;
-  int chunks = 0;                   // > 0: the film in so many parts instead
-  int runs_per_task = 1;            // of a benchmark
-  int models_per_task = 10;         // of a batch
-  std::vector<std::string> sbatch;  // words for sbatch
-  Stage until = Stage::report;      // the last that is wanted
+  int chunks = 0;                        // > 0: the film in so many parts instead
+  int runs_per_task = 1;                 // of a benchmark
+  int models_per_task = 10;              // of a batch
+  std::vector<std::string> sbatch = {};  // words for sbatch
+  Stage until = Stage::report;           // the last that is wanted
   bool dry_run = false;
 
   const std::filesystem::path& out() const { return bench ? bench->out : batch ? batch->each.out : plan.out; }
@@ -96,7 +96,7 @@ LIMBER_API Cancelled cancel_farm(const std::filesystem::path& work_folder, const
 
 // A worker takes units of a folder until none is left for it.
 struct WorkOptions {
-  std::filesystem::path folder;
+  std::filesystem::path folder = {};
   Stage until = last_stage;  // this one and those before it
   int threads = 0;           // 0: as was submitted
   bool wait = false;         // for units that others do, too, and for those after them

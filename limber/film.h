@@ -84,9 +84,9 @@ LIMBER_API PlannedFilm plan_and_render(const PlanOptions&, const FilmOptions&, c
 
 // The start of a scene, before any plan.
 struct StillOptions {
-  SceneSource scene;
-  std::string camera = "main", size;         // as of FilmOptions
-  std::optional<std::filesystem::path> out;  // a PNG; nothing: the scene's name.png
+  SceneSource scene = {};
+  std::string camera = "main", size = {};         // as of FilmOptions
+  std::optional<std::filesystem::path> out = {};  // a PNG; nothing: the scene's name.png
 };
 struct WrittenStill {
   std::filesystem::path file;
@@ -98,9 +98,9 @@ LIMBER_API WrittenStill paint_still(const StillOptions&, const Context& = {});
 // One sheet of a scene before it is planned: what each camera sees at the start, at each goal and at the end,
 // with the ways that are to be gone.
 struct StoryboardOptions {
-  SceneSource scene;
-  std::string size;                          // of one picture; empty: 640 pixels wide, of the film's shape
-  std::optional<std::filesystem::path> out;  // a PNG; nothing: the scene's name-storyboard.png
+  SceneSource scene = {};
+  std::string size = {};  // of one picture; empty: 640 pixels wide, of the film's shape
+  std::optional<std::filesystem::path> out = {};  // a PNG; nothing: the scene's name-storyboard.png
 };
 struct WrittenStoryboard {
   std::filesystem::path file;

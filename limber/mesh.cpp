@@ -12,6 +12,7 @@
 #include "limber/detail/body/work_folder.h"
 #include "limber/detail/interface/arrays.h"
 #include "limber/detail/interface/body.h"
+#include "limber/detail/interface/ranges.h"
 #include "limber/detail/interface/working_for.h"
 
 namespace limber {
@@ -24,31 +25,9 @@ namespace {
 
 void require_mesh(const Mesh& mesh, const std::string& what) { validate(surface_of(mesh), what); }
 
-void require_mode(const std::string& mode) {
-  for (const char* known : {"lattice", "fast", "paper", "conform"})
-    if (mode == known) return;
-  throw InputError(
-      fmt::format("mode is \"{}\"; it must be one of \"lattice\", \"fast\", \"paper\", \"conform\"", mode));
-}
-
-// Before anything is read or made. The ranges are the command's.
-void require_in_range(const detail::PrepareSettings& s) {
-  const auto require = []<class Number>(const char* name, Number value, Number lower, Number upper) {
-    if (!(value >= lower && value <= upper))
-      throw InputError(fmt::format("{} is {}; it must be in [{}, {}]", name, value, lower, upper));
-  };
-  require("the count of hulls", s.shells, 1, 1000);
-  require("concavity", s.concavity, 0.0, 1.0);
-  require("threshold", s.threshold, 0.0, 1.0);
-  require("inflate", s.inflate, 0.0, 1.0);
-  require("max_hull_vertices", s.corners, 8, 10'000);
-  require("tets", s.tets, 24, 200'000);
-  require_mode(s.mode);
-}
-
 detail::PrepareSettings settings_of(const PrepareOptions& options) {
   const detail::PrepareSettings settings = detail::settings_of(options);
-  require_in_range(settings);
+  detail::require_in_range(settings);
   return settings;
 }
 
@@ -120,7 +99,7 @@ Decomposition decompose(const Mesh& mesh, const DecomposeOptions& options, const
                                            .exact = options.exact,
                                            .corners = options.max_hull_vertices,
                                            .only = {}};
-    require_in_range(settings);
+    detail::require_in_range(settings);
     require_mesh(mesh, "mesh");
     const meshing::Decomposition made = detail::make_shells(surface_of(mesh), settings);
     Decomposition d;
@@ -137,7 +116,7 @@ Cage build_cage(const Mesh& mesh, const std::vector<Mesh>& hulls, const CageOpti
                 const Context& context) {
   return working_for(context, [&] {
     const detail::PrepareSettings settings{.tets = options.tets, .mode = options.mode, .only = {}};
-    require_in_range(settings);
+    detail::require_in_range(settings);
     require_mesh(mesh, "mesh");
     const std::vector<ConvexShell> shells = detail::shells_of(hulls);
     for (std::size_t h = 0; h < shells.size(); ++h) validate(shells[h], fmt::format("hull {}", h));

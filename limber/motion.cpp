@@ -1,15 +1,31 @@
 #include "limber/motion.h"
 
+#include "limber/detail/interface/ranges.h"
 #include "limber/detail/interface/working_for.h"
 #include "limber/detail/plan/refine.h"
 #include "limber/detail/plan/simulate.h"
 #include "limber/detail/world/prepare_scene.h"
+#include "plan/settings.h"
 
 namespace limber {
 
+using detail::require_in;
 using detail::working_for;
 
+namespace {
+
+void require_limits(const std::optional<std::int64_t>& iterations, int in_flight) {
+  if (iterations) require_in("iterations", *iterations, 0, plan::most_iterations);
+  require_in("in_flight", in_flight, 0, 4096);
+}
+
+}  // namespace
+
 KeptPlan plan_scene(const PlanOptions& options, const Context& context) {
+  if (options.seed) require_in("seed", *options.seed, 0, std::int64_t{1} << 53);
+  require_in("portfolio", options.portfolio, 1, 1000);
+  require_limits(options.iterations, options.in_flight);
+  if (options.shortcut_rounds) require_in("shortcut_rounds", *options.shortcut_rounds, 0, 100'000);
   return working_for(context, [&] { return detail::plan(options); });
 }
 
@@ -18,6 +34,8 @@ KeptPlan simulate_scene(const SimulateOptions& options, const Context& context) 
 }
 
 KeptPlan refine_plan(const RefineOptions& options, const Context& context) {
+  require_in("tets_factor", options.tets_factor, 0.1, 1000);
+  require_limits(options.iterations, options.in_flight);
   return working_for(context, [&] { return detail::refine(options); });
 }
 

@@ -14,41 +14,43 @@
 namespace limber {
 
 struct PlanOptions {
-  SceneSource scene;
-  std::filesystem::path out;  // the work folder; it is made where it is missing
-  std::optional<std::int64_t> seed, iterations;
-  int portfolio = 1;   // searches, with this seed and those after it, of which the quickest wins
-  std::string preset;  // empty: the scene's
+  SceneSource scene = {};
+  std::filesystem::path out = {};  // the work folder; it is made where it is missing
+  std::optional<std::int64_t> seed = {}, iterations = {};
+  int portfolio = 1;        // searches, with this seed and those after it, of which the quickest wins
+  std::string preset = {};  // empty: the scene's
   double time_limit_s = std::numeric_limits<double>::infinity();
   int in_flight = 0;    // expansions computed ahead; 0: chosen from threads and lanes. The plan is the same
   bool resume = false;  // go on from the plan in `out`
-  std::optional<std::filesystem::path> stats;  // JSON lines: how the search went
-  std::filesystem::path from;  // a folder with a plan or a simulation; empty: the scene's start
-  std::optional<int> frame;    // of `from`; nothing: its last
+  std::optional<std::filesystem::path> stats = {};  // JSON lines: how the search went
+  std::filesystem::path from = {};  // a folder with a plan or a simulation; empty: the scene's start
+  std::optional<int> frame = {};    // of `from`; nothing: its last
 
-  std::optional<int> shortcut_rounds;  // nothing: the scene's
-  std::string cost = "duration";       // what shortcutting and improving make less of
-  bool improve = false;                // go on after the first solution
+  std::optional<int> shortcut_rounds = {};  // nothing: the scene's
+  std::string cost = "duration";            // what shortcutting and improving make less of
+  bool improve = false;                     // go on after the first solution
 };
 
 struct SimulateOptions {
-  SceneSource scene;
-  std::filesystem::path out;
-  std::optional<double> duration_s;  // > 0, from the start; nothing: 5 s, or as long as the plan followed
-  std::filesystem::path script;      // more forces and motions; empty: the scene's alone
-  std::filesystem::path from;        // a folder with a plan or a simulation; empty: the scene's start
-  std::optional<int> frame;          // of `from`
-  bool resume = false;               // go on from the simulation in `out`
-  std::filesystem::path follow;  // a folder with a plan that is followed by feedback; empty: no control acts
+  SceneSource scene = {};
+  std::filesystem::path out = {};
+  // > 0, from the start; nothing: 5 s, or as long as the plan that is followed.
+  std::optional<double> duration_s = {};
+  std::filesystem::path script = {};  // more forces and motions; empty: the scene's alone
+  std::filesystem::path from = {};    // a folder with a plan or a simulation; empty: the scene's start
+  std::optional<int> frame = {};      // of `from`
+  bool resume = false;                // go on from the simulation in `out`
+  // A folder with a plan that is followed by feedback; empty: no control acts.
+  std::filesystem::path follow = {};
 };
 
 struct RefineOptions {
-  std::filesystem::path folder, out;  // of the plan; of the finer bodies, another one
-  double tets_factor = 4;             // tets of each cage, about, as a multiple of the coarse one's
-  std::vector<std::string> sets;      // after those of the plan and of the factor
-  std::vector<std::filesystem::path> data;
-  std::filesystem::path store;  // as of SceneSource
-  std::optional<std::int64_t> iterations;
+  std::filesystem::path folder = {}, out = {};  // of the plan; of the finer bodies, another one
+  double tets_factor = 4;                       // tets of each cage, about, as a multiple of the coarse one's
+  std::vector<std::string> sets = {};           // after those of the plan and of the factor
+  std::vector<std::filesystem::path> data = {};
+  std::filesystem::path store = {};  // as of SceneSource
+  std::optional<std::int64_t> iterations = {};
   double time_limit_s = std::numeric_limits<double>::infinity();
   int in_flight = 0;
 };
@@ -74,9 +76,9 @@ LIMBER_API KeptPlan simulate_scene(const SimulateOptions&, const Context& = {});
 LIMBER_API KeptPlan refine_plan(const RefineOptions&, const Context& = {});
 
 struct ScenePrepareOptions {
-  SceneSource scene;
-  std::filesystem::path out;
-  std::vector<std::string> bodies;  // these alone; empty: all, and what the scene has beside them
+  SceneSource scene = {};
+  std::filesystem::path out = {};
+  std::vector<std::string> bodies = {};  // these alone; empty: all, and what the scene has beside them
 };
 struct PreparedScene {
   struct Body {

@@ -16,7 +16,7 @@
 namespace limber {
 
 struct RobustOptions {
-  std::filesystem::path folder;
+  std::filesystem::path folder = {};
   int perturbations = 16;
   std::uint64_t seed = 1;
   double material_share = 0.1;  // Young's modulus, density and friction of each body: ± this

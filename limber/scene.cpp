@@ -14,6 +14,7 @@
 #include "limber/detail/interface/arrays.h"
 #include "limber/detail/interface/body.h"
 #include "limber/detail/interface/problem.h"
+#include "limber/detail/interface/ranges.h"
 #include "limber/detail/interface/working_for.h"
 #include "plan/control_rollout.h"
 #include "plan/settings.h"
@@ -278,16 +279,13 @@ std::vector<std::array<double, 3>> Problem::robot_centers(const States& states) 
 
 namespace {
 
-// Before the search, which would be lost. The ranges are the command's.
+// Before the search, which would be lost.
 void validate(const SolveOptions& options) {
-  const auto require = []<class Number>(const char* name, Number value, Number upper) {
-    if (!(value >= 0 && value <= upper))
-      throw InputError(fmt::format("{} is {}; it must be in [0, {}]", name, value, upper));
-  };
-  if (options.seed) require("seed", *options.seed, largest_exact);
-  if (options.iterations) require("iterations", *options.iterations, plan::most_iterations);
-  require("time_limit_s", options.time_limit_s, std::numeric_limits<double>::infinity());
-  if (options.shortcut_rounds) require("shortcut_rounds", *options.shortcut_rounds, 100'000);
+  using detail::require_in;
+  if (options.seed) require_in("seed", *options.seed, 0, largest_exact);
+  if (options.iterations) require_in("iterations", *options.iterations, 0, plan::most_iterations);
+  require_in("time_limit_s", options.time_limit_s, 0, std::numeric_limits<double>::infinity());
+  if (options.shortcut_rounds) require_in("shortcut_rounds", *options.shortcut_rounds, 0, 100'000);
   plan::cost_kind_from(options.cost);
 }
 

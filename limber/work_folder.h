@@ -29,14 +29,14 @@ struct Finding {
 };
 
 struct VerifyOptions {
-  std::filesystem::path folder;
-  std::optional<std::filesystem::path> model;  // of a body's folder: the one that it must be of
-  std::optional<std::filesystem::path>
-      observables;      // of a work folder: also a CSV with the figures of every frame
-  SceneSource scene;    // the one that the plan must be of; none where its `scene` is empty
-  bool remake = false;  // of large bodies shells are made again, too
-  bool film = false;    // films, too
-  int repaint = 5;      // frames of each that are painted again
+  std::filesystem::path folder = {};
+  std::optional<std::filesystem::path> model = {};  // of a body's folder: the one that it must be of
+  // Of a work folder: also a CSV with the figures of every frame.
+  std::optional<std::filesystem::path> observables = {};
+  SceneSource scene = {};  // the one that the plan must be of; none where its `scene` is empty
+  bool remake = false;     // of large bodies shells are made again, too
+  bool film = false;       // films, too
+  int repaint = 5;         // frames of each that are painted again
 };
 
 struct Verdict {
@@ -64,10 +64,10 @@ LIMBER_API std::vector<Promise> verify_body(const std::filesystem::path& folder,
 inline const std::vector<std::string> motion_formats{"gltf", "pc2", "usd", "vtu"};
 
 struct ExportOptions {
-  std::filesystem::path folder;
-  std::vector<std::string> formats;          // of motion_formats
-  std::optional<std::filesystem::path> out;  // default: export in the folder
-  std::string frames;                        // as of FilmOptions
+  std::filesystem::path folder = {};
+  std::vector<std::string> formats = {};          // of motion_formats
+  std::optional<std::filesystem::path> out = {};  // default: export in the folder
+  std::string frames = {};                        // as of FilmOptions
 };
 
 // Tells its fields, by name and in order, to whoever asks, as ExportedMotion does: f("files", files).
@@ -86,8 +86,8 @@ struct ExportedMotion {
   int frames_of_motion = 0;
   std::string trajectory_hash;
   std::filesystem::path folder;
-  std::vector<std::pair<std::string, std::string>> bodies =
-      {};  // by name: how each bends, "linear" or "phong"
+  // By name: how each bends, "linear" or "phong".
+  std::vector<std::pair<std::string, std::string>> bodies = {};
   std::vector<std::pair<std::string, WrittenFiles>> formats = {};  // by name
   // As manifest.json has them.
   template <class Fields>

@@ -83,9 +83,9 @@ struct Good {
           prepared.surface, prepared.cage, {.cells = 8, .max_cells = 8, .max_nodes = 1000});
       write_body(bodies.back());
     }
-    detail::PlanOptions options;
+    PlanOptions options;
     options.scene.scene = scene_file.string(), options.out = work;
-    detail::plan(options);
+    plan_scene(options, at_terminal());
     planned = plan::read_plan(work / "plan.npz");
     manifest = read_json(work / "manifest.json");
     for (const char* file : {"sign.ply", "sign.json"}) scenery[file] = read_file(work / "scenery" / file);
@@ -202,15 +202,13 @@ void meet_changed_folder(std::string_view bytes) {
     return;
   }
   if (command < 5) {
-    detail::ExportOptions options;
-    options.folder = work, options.formats = {detail::motion_formats[std::size_t(command - 1)]};
-    detail::export_motion(options);
+    ExportOptions options;
+    options.folder = work, options.formats = {motion_formats[std::size_t(command - 1)]};
+    limber::export_motion(options, at_terminal());
   } else if (command == 5) {
-    detail::RenderOptions options;
-    options.folder = work, options.frames = {"0-0"}, options.size = {"32x32"};
-    detail::render(options);
+    render_film(work, {.frames = "0-0", .size = "32x32"}, at_terminal());
   } else if (command == 6) {
-    detail::robust({.folder = work, .perturbations = 1});
+    test_robustness({.folder = work, .perturbations = 1}, at_terminal());
   } else {
     const std::vector<detail::PreparedBody> bodies = detail::read_bodies_of(planned, work);
     const fem::World world = detail::build_world(planned.scene, bodies);

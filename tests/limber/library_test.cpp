@@ -2,6 +2,7 @@
 #include <gmock/gmock.h>
 
 #include <atomic>
+#include <functional>
 #include <thread>
 
 #include "core/mesh_files.h"
@@ -100,6 +101,50 @@ TEST_F(Library, WhatIsWrongIsNamed) {
                 deform({{0}, {{1, 0, 0, 0}}}, {{0, 1, 2, 9}}, cube().vertices);
               }),
               HasSubstr("the node 9"));
+}
+
+TEST_F(Library, OptionsOfWorkFoldersOutOfRangeAreRefused) {
+  const std::vector<std::pair<const char*, std::function<void()>>> calls{
+      {"portfolio", [&] { plan_scene({.scene = {"barriers1"}, .out = path("out"), .portfolio = 0}); }},
+      {"tets_factor", [&] { refine_plan({.folder = path("a"), .out = path("b"), .tets_factor = 0}); }},
+      {"bits", [&] { render_film(path("a"), {.bits = 7}); }},
+      {"\"normal\"", [&] { render_film(path("a"), {.passes = {"heat"}}); }},
+      {"repaint", [&] { verify({.folder = path("a"), .repaint = 0}); }},
+      {"no format", [&] { export_motion(ExportOptions{.folder = path("a")}); }},
+      {"\"sofa\"", [&] { export_body({.folder = path("a"), .formats = {"sofia"}}); }},
+      {"perturbations", [&] { test_robustness({.folder = path("a"), .perturbations = 0}); }},
+      {"in_flight", [&] { run_benchmark({.scenes = {"barriers1"}, .in_flight = -1, .out = path("b")}); }},
+      {"shrink", [&] { make_scene({.from = path("a"), .out = path("b"), .robot = "x", .shrink = 2}); }},
+      {"\"conform\"", [&] {
+         ModelOptions options;
+         options.model = path("a.obj"), options.out = path("b"), options.mode = "lettuce";
+         prepare_folder(options);
+       }}};
+  for (const auto& [what, call] : calls) EXPECT_THAT(complaint(call), HasSubstr(what));
+  EXPECT_TRUE(std::filesystem::is_empty(folder.path()));
+}
+
+// It would start itself, and itself again.
+TEST_F(Library, AnotherProgramIsToldToRunLimber) {
+  EXPECT_THAT(complaint([&] { prepare_models({.models = {path("")}}); }), HasSubstr("limber prepare"));
+  EXPECT_THAT(complaint([&] { submit_to_farm({}); }), HasSubstr("limber farm"));
+}
+
+TEST_F(Library_slow, AWorkFolderIsTheCommands) {
+  const Scene scene = small();  // writes its file
+  PlanOptions options;
+  options.scene.scene = path("small.toml"), options.out = path("library"), options.seed = 5;
+  const KeptPlan kept = plan_scene(options);
+  EXPECT_TRUE(kept.reached);
+  EXPECT_EQ(limber_program({"plan", path("small.toml"), "-o", path("command"), "--seed", "5"}).code, 0);
+  EXPECT_EQ(read_file(kept.file), read_file(path("command/plan.npz")));
+  EXPECT_THAT(kept.summary_json, HasSubstr(Plan::load(path("command")).trajectory_hash()));
+  const RenderedFilm film = render_film(path("library"), {.frames = "0-1", .size = "32x32"});
+  EXPECT_EQ(film.painted, 2);
+  EXPECT_TRUE(verify({.folder = path("library"), .film = true}).all_kept);
+  EXPECT_EQ(facts_of_file(path("library")).kind, FileFacts::other);
+  options.scene.scene = "small";  // no such scene
+  EXPECT_THAT(complaint([&] { plan_scene(options); }), HasSubstr("small"));
 }
 
 TEST_F(Library_slow, ABodyIsTheBytesThatTheCommandWrites) {
