@@ -59,9 +59,7 @@ void DescribedCommands::add_result_commands() {
   CLI::App& robust_command = *program.add_subcommand(
       "robust", "replays the plan with other materials and forces, and reports how often it still works");
   robust_command.add_option("DIR", robust_options.folder, "work folder with a plan")->required();
-  robust_command
-      .add_option("-n,--perturbations", robust_options.perturbations,
-                  "replays, 1 … 10000, in at most four worlds of other materials")
+  robust_command.add_option("-n,--perturbations", robust_options.perturbations, "replays, 1 … 10000")
       ->check(CLI::Range(1, 10000))
       ->capture_default_str();
   robust_command.add_option("--seed", robust_options.seed, "seed of the perturbations, 0 … 2^53")
@@ -83,6 +81,17 @@ void DescribedCommands::add_result_commands() {
       ->capture_default_str();
   robust_command.add_flag("--follow", robust_options.follow,
                           "also follow the plan's path by feedback in the same worlds under the same errors");
+  robust_command
+      .add_option(
+          "--replan", robust_options.replan_s,
+          "also follow it and look ahead every so many seconds of the motion, 0.01 … 60: where following "
+          "would not do, a new plan from the state reached takes its place")
+      ->check(within(0.01, 60.0))
+      ->type_name("SECONDS");
+  robust_command
+      .add_option("--worlds", robust_options.worlds, "so many worlds of other materials at most, 1 … 10000")
+      ->check(within(1, 10'000))
+      ->capture_default_str();
   add_global(robust_command, global), add_threads(robust_command, global);
   robust_command.callback([&] { chosen = [&] { return cli::robust(robust_options); }; });
 

@@ -90,9 +90,16 @@ Outcome robust(const RobustOptions& options) {
             {"force_deg", options.force_deg},           {"max_force_n", robust.max_force_n}};
   json.update(json_of(robust.open_loop));
   std::string text = text_of(robust.open_loop, options, robust);
+  if (robust.followed || robust.replanned) text = "open loop\n" + text;
   if (robust.followed) {
     json["followed"] = json_of(*robust.followed);
-    text = "open loop\n" + text + "followed\n" + text_of(*robust.followed, options, robust);
+    text += "followed\n" + text_of(*robust.followed, options, robust);
+  }
+  if (robust.replanned) {
+    json["replanned"] = json_of(*robust.replanned);
+    json["replanned"]["searches"] = robust.replanned->searches;
+    text += fmt::format("planned anew on the way, {} searches\n{}", robust.replanned->searches,
+                        text_of(*robust.replanned, options, robust));
   }
   return {exit_done, json, text};
 }

@@ -23,6 +23,10 @@ struct RobustOptions {
   double force_share = 0.1;     // each control's force: ± this,
   double force_deg = 5;         // and turned by up to so much
   bool follow = false;          // besides open loop
+  // > 0: besides, followed by who looks ahead so often, and where following would not do plans anew from the
+  // state reached, in the world as it was planned in; of plans with one goal. Seconds.
+  double replan_s = 0;
+  int worlds = 4;  // of other materials, at most; perturbations are spread over them
 };
 
 // What became of one perturbed replay.
@@ -36,12 +40,13 @@ struct Fate {
   double min_stretch = 1, largest_stretch = 1, overlap_m = 0, self_overlap_m = 0;
   double asked_n = 0, force_n = 0;  // the largest that a control asked for, and that acted
   std::vector<std::string> broken;  // of the promises that `limber verify` looks at
+  int searches = 0;                 // where it is planned anew: how often
 };
 
-// The same worlds and errors, followed or open loop.
+// The same worlds and errors, open loop, followed, or planned anew on the way.
 struct Tally {
   std::vector<Fate> fates;
-  int reached = 0, keep_all = 0;
+  int reached = 0, keep_all = 0, searches = 0;
   double spread_m = 0, farthest_m = 0;
   Fate worst;  // of each figure
   std::map<std::string, int> broken;
@@ -49,7 +54,7 @@ struct Tally {
 
 struct Robustness {
   Tally open_loop;
-  std::optional<Tally> followed;
+  std::optional<Tally> followed, replanned;
   double max_force_n = 0;  // that the plan's controls may ask for
   bool settles = false;    // whether the robot is to come to rest
 };

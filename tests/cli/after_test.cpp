@@ -93,14 +93,17 @@ TEST_F(Program_slow, APlanThatIsNotPerturbedIsItself) {
 
 TEST_F(Program_slow, AFollowedPlanIsItselfWhereNothingIsPerturbed) {
   ASSERT_EQ(limber_program({"plan", scene(), "-o", out()}).code, exit_done);
-  const Json exact = limber_program({"robust", out(), "--follow", "-n", "2", "--materials", "0", "--forces",
-                                     "0", "--turn", "0", "--json"})
+  const Json exact = limber_program({"robust", out(), "--follow", "--replan", "0.2", "-n", "2", "--materials",
+                                     "0", "--forces", "0", "--turn", "0", "--json"})
                          .json();
-  const Json& followed = exact.at("followed");
-  EXPECT_EQ(followed.at("reached"), 2);
-  EXPECT_EQ(followed.at("end_farthest_m"), 0);
-  EXPECT_EQ(followed.at("replays"), exact.at("replays"));
-  EXPECT_EQ(followed.at("keep_all_promises"), exact.at("keep_all_promises"));
+  for (const char* how : {"followed", "replanned"}) {
+    const Json& of = exact.at(how);
+    EXPECT_EQ(of.at("reached"), 2) << how;
+    EXPECT_EQ(of.at("end_farthest_m"), 0) << how;
+    EXPECT_EQ(of.at("replays"), exact.at("replays")) << how;
+    EXPECT_EQ(of.at("keep_all_promises"), exact.at("keep_all_promises")) << how;
+  }
+  EXPECT_EQ(exact.at("replanned").at("searches"), 0);
 }
 
 // Pushes that are 40 % too strong or too weak and turned by up to 30 degrees miss; who looks where it is does
@@ -109,7 +112,7 @@ TEST_F(Program_slow, FollowingReachesWhatOpenLoopMisses) {
   ASSERT_EQ(limber_program({"plan", scene(), "-o", out(), "--seed", "2"}).code, exit_done);
   std::vector<std::string> words{"robust", out(), "-n", "8", "--forces", "0.4", "--turn", "30", "--json"};
   Json open_loop = limber_program(words).json();
-  words.push_back("--follow");
+  words.insert(words.end(), {"--follow", "--replan", "0.3"});
   std::vector<Json> reports;
   for (const char* threads : {"1", "2"}) {
     std::vector<std::string> with_threads = words;
@@ -118,7 +121,8 @@ TEST_F(Program_slow, FollowingReachesWhatOpenLoopMisses) {
   }
   EXPECT_EQ(reports[0], reports[1]);
   const Json followed = reports[0].at("followed");
-  reports[0].erase("followed");
+  EXPECT_EQ(reports[0].at("replanned").at("reached"), 8);
+  reports[0].erase("followed"), reports[0].erase("replanned");
   EXPECT_EQ(reports[0], open_loop);
   EXPECT_LT(open_loop.at("reached"), 8);
   EXPECT_EQ(followed.at("reached"), 8);

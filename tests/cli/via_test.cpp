@@ -93,6 +93,9 @@ TEST_F(ViaProgram_slow, ReplaysThatMissTheViaAreCounted) {
         .json();
   };
   EXPECT_EQ(robust("0", "0").at("reached"), 8);
+  const Result replanned = limber_program({"robust", out(), "-n", "1", "--replan", "0.2"});
+  EXPECT_EQ(replanned.code, exit_bad_input);
+  EXPECT_NE(replanned.err.find("goals on the way"), std::string::npos) << replanned.err;
   const Json perturbed = robust("0.9", "90");
   int missed = 0;
   for (const Json& replay : perturbed.at("replays")) missed += replay.at("end") == "a via is missed";

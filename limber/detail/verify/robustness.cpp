@@ -14,14 +14,13 @@
 #include "limber/detail/world/fem_system.h"
 #include "limber/detail/world/scene_world.h"
 #include "plan/control_rollout.h"
-#include "plan/follow.h"
+#include "plan/replan.h"
 #include "plan/shortcut.h"
 
 namespace limber::detail {
 
 namespace {
 
-constexpr int max_worlds = 4;
 // Streams of random numbers: worlds, and after them perturbations of forces.
 constexpr std::uint64_t first_world_stream = std::uint64_t(1) << 61;
 
@@ -103,17 +102,26 @@ bool reaches_all_via(const plan::Plan& plan, const FemSystem& system, const plan
 struct Planned {
   const PlanFolder& folder;
   const std::vector<PreparedBody>& bodies;
+  const fem::World& world;
   plan::Guide guide;
 };
 
+enum class By { open_loop, following, replanning };
+
 // The perturbations [first, last) in one world, in lanes: followed, or open loop.
-std::vector<Fate> replay(const Planned& planned, const RobustOptions& options, bool follows,
+std::vector<Fate> replay(const Planned& planned, const RobustOptions& options, By by,
                          const scenes::Scene& scene, int world_number, int first, int last) {
   const plan::Plan& plan = planned.folder.plan;
   const fem::World world = build_world(scene, planned.bodies, State(plan.tree.states[0]).positions);
   const FemSystem system(world, goal_rules_of(scene));
   const plan::Follower follower(system, plan.settings, planned.guide);
   const plan::Guide& guide = follower.guide();
+  const auto from = [&](const fem::World& in) -> plan::Replanner::From {
+    return [&](const State& state) {
+      return std::make_unique<FemSystem>(in, planned.bodies, goal_rules_of(planned.folder.scene), state);
+    };
+  };
+  std::vector<std::unique_ptr<plan::Replanner>> replanners;
   std::vector<plan::ControlRollout> courses;
   std::vector<double> asked(std::size_t(last - first));
   for (int i = first; i < last; ++i) {
@@ -128,7 +136,18 @@ std::vector<Fate> replay(const Planned& planned, const RobustOptions& options, b
           piece < guide.control.size() ? of_control[std::size_t(guide.control[piece])] : of_control.back(),
           control);
     };
-    if (follows)
+    if (by == By::replanning) {
+      // Where a new plan is followed controls are not the old ones': the error of the last is theirs.
+      plan::Replanner& replanner = *replanners.emplace_back(
+          std::make_unique<plan::Replanner>(from(planned.world), from(world), course.from, plan.settings,
+                                            planned.guide, plan::ReplanOptions{.every_s = options.replan_s}));
+      course.next = [&replanner, &guide, &follower, acting](const State& state) -> std::optional<Control> {
+        const std::optional<Control> control = replanner.next(state);
+        if (!control) return std::nullopt;
+        return acting(replanner.plans_found() > 0 ? guide.control.size() : follower.piece_at(state),
+                      *control);
+      };
+    } else if (by == By::following)
       course.next = [&follower, acting](const State& state) -> std::optional<Control> {
         if (follower.is_over(state)) return std::nullopt;
         return acting(follower.piece_at(state), follower.next(state));
@@ -150,6 +169,7 @@ std::vector<Fate> replay(const Planned& planned, const RobustOptions& options, b
     Fate& fate = fates.emplace_back();
     fate.world = world_number;
     fate.reaches = course.result == plan::ControlRollout::rests_in_goal && goes_by;
+    if (by == By::replanning) fate.searches = replanners[i]->searches();
     fate.end = goes_by ? name_of(course.result, plan.settings.settle.max_duration_s > 0) : "a via is missed";
     const Vec3 center_m = system.robot_center(course.end);
     fate.end_center_m = {center_m.x(), center_m.y(), center_m.z()};
@@ -174,7 +194,7 @@ Tally tally_of(std::vector<Fate> fates, const Vec3& planned_end) {
   Tally tally;
   Fate& worst = tally.worst;
   for (const Fate& f : fates) {
-    tally.reached += f.reaches, tally.keep_all += f.broken.empty();
+    tally.reached += f.reaches, tally.keep_all += f.broken.empty(), tally.searches += f.searches;
     const double apart = (Vec3(f.end_center_m.data()) - planned_end).norm();
     tally.spread_m += apart * apart / double(fates.size());
     tally.farthest_m = std::max(tally.farthest_m, apart);
@@ -202,30 +222,36 @@ Robustness robust(const RobustOptions& options) {
         fmt::format("{}: its plan does not reach the goal, so there is nothing to perturb; plan on with "
                     "limber plan --resume",
                     options.folder.string()));
+  if (options.replan_s > 0 && !planned.plan.settings.via.empty())
+    throw InputError(fmt::format(
+        "{}: its plan has goals on the way, and --replan is of plans with one goal; leave --replan out",
+        options.folder.string()));
   const auto [bodies, world] = read_world_of(planned, options.folder);
   const FemSystem system(world, goal_rules_of(planned.scene));
   const plan::Trajectory& path = planned.plan.trajectory;
-  const Planned own{planned, bodies, plan::guide_of(system, planned.plan.settings, path)};
+  const Planned own{planned, bodies, world, plan::guide_of(system, planned.plan.settings, path)};
   const Vec3 planned_end = system.robot_center(path.end);
 
-  const int n = options.perturbations, worlds = std::min(n, max_worlds);
-  const auto tally = [&](bool follows) {
+  const int n = options.perturbations, worlds = std::min(n, options.worlds);
+  const auto tally = [&](By by) {
     std::vector<Fate> fates;
     for (int w = 0; w < worlds; ++w) {
       throw_if_stopped();
       const scenes::Scene scene = with_other_materials(
           planned.scene, options.material_share, Rng(options.seed, first_world_stream + std::uint64_t(w)));
       const std::vector<Fate> of_world =
-          replay(own, options, follows, scene, w, w * n / worlds, (w + 1) * n / worlds);
+          replay(own, options, by, scene, w, w * n / worlds, (w + 1) * n / worlds);
       fates.insert(fates.end(), of_world.begin(), of_world.end());
     }
     return tally_of(std::move(fates), planned_end);
   };
-  Robustness result{.open_loop = tally(false),
+  Robustness result{.open_loop = tally(By::open_loop),
                     .followed = {},
+                    .replanned = {},
                     .max_force_n = planned.plan.settings.max_force_n,
                     .settles = planned.plan.settings.settle.max_duration_s > 0};
-  if (options.follow) result.followed = tally(true);
+  if (options.follow) result.followed = tally(By::following);
+  if (options.replan_s > 0) result.replanned = tally(By::replanning);
   return result;
 }
 
