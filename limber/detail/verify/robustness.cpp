@@ -108,7 +108,7 @@ struct Planned {
 
 enum class By { open_loop, following, replanning };
 
-// The perturbations [first, last) in one world, in lanes: followed, or open loop.
+// The perturbations [first, last) in one world, in lanes.
 std::vector<Fate> replay(const Planned& planned, const RobustOptions& options, By by,
                          const scenes::Scene& scene, int world_number, int first, int last) {
   const plan::Plan& plan = planned.folder.plan;
