@@ -190,21 +190,22 @@ Eigen::Matrix3d lean(int frame) {
   return m;
 }
 
-// Of veils: the body in the middle of the picture, or so near that it fills the picture.
-enum class Veil { none, whole, close };
+// Of transparent surfaces: the body in the middle of the picture, or so near that it fills the picture.
+enum class Transparent { none, whole, close };
 
-// A body, its coarse level and a box beside it. As a veil, it has two organs in it that are veils, too, and
-// the camera is nearer.
+// A body, its coarse level and a box beside it. As a transparent surface, it has two organs in it that are
+// transparent surfaces, too, and the camera is nearer.
 class Stage {
  public:
   Stage(const SurfaceMesh& body, const SurfaceMesh& coarse, const RenderSettings& look,
-        Veil veil = Veil::none)
+        Transparent transparent = Transparent::none)
       : body_(body),
         coarse_(coarse),
         box_(box_mesh({0.62, -0.3, 0}, {1.12, 0.3, 0.7})),
         renderer_(look),
-        camera_(frame_automatically(veil == Veil::none ? look.stage : bounding_box(body.positions),
-                                    toward_eye, double(look.width) / look.height)),
+        camera_(
+            frame_automatically(transparent == Transparent::none ? look.stage : bounding_box(body.positions),
+                                toward_eye, double(look.width) / look.height)),
         normals_(vertex_normals(body.positions, body.triangles)),
         coarse_normals_(vertex_normals(coarse.positions, coarse.triangles)),
         prolong_(prolongation(body.positions, coarse.positions)) {
@@ -213,8 +214,8 @@ class Stage {
     coarse_look.seen = false;
     fine_look.translucency = 0.8, fine_look.scatter_m = 0.05, fine_look.grain = 0.16,
     fine_look.grain_m = 0.03;
-    if (veil == Veil::close) camera_.eye = 0.55 * camera_.eye + 0.45 * camera_.target;
-    if (veil != Veil::none) {
+    if (transparent == Transparent::close) camera_.eye = 0.55 * camera_.eye + 0.45 * camera_.target;
+    if (transparent != Transparent::none) {
       fine_look.opacity = 0.3, fine_look.sheet = true;
       coarse_look.casts_shadow = false;
       for (const double x : {-0.1, 0.08}) {
@@ -334,15 +335,15 @@ void run(const std::string& model, const std::vector<int>& sizes, int frames, in
       if (!out.empty()) write_file(out / (name + ".png"), png);
     }
   }
-  for (const Veil veil : {Veil::whole, Veil::close}) {
-    Stage stage(source, coarse, look_of(1920, 1080, false), veil);
+  for (const Transparent transparent : {Transparent::whole, Transparent::close}) {
+    Stage stage(source, coarse, look_of(1920, 1080, false), transparent);
     stage.png(0, none, unused);
     StageTimes stages;
     std::string png;
     for (int f = 0; f < frames; ++f) png = stage.png(f, none, stages);
-    const char* name = veil == Veil::whole ? "veils" : "veils-close";
+    const char* name = transparent == Transparent::whole ? "transparent" : "transparent-close";
     fmt::print("{}, {} triangles over two organs of 14 k: {:.0f} beside the rest, {}\n", name,
-               source.triangles.rows(), 1000 * stages.veils_s / frames, hex(hash_of(png)));
+               source.triangles.rows(), 1000 * stages.transparent_s / frames, hex(hash_of(png)));
     if (!out.empty()) write_file(out / fmt::format("{}.png", name), png);
   }
   if (repeat > 0) {

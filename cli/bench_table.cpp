@@ -51,7 +51,7 @@ std::string text_of_benchmark(const BenchReport& report) {
          fmt::format("{:.2f}", g.largest_self_overlap_percent),
          g.median_gap_percent ? fmt::format("{:.2f} {:.2f}", *g.median_gap_percent, g.largest_gap_percent)
                               : "-",
-         fmt::format("{:.2f} {:.2f}", g.least_stretch, g.largest_stretch), fmt::format("{}", g.inverted_tets),
+         fmt::format("{:.2f} {:.2f}", g.min_stretch, g.largest_stretch), fmt::format("{}", g.inverted_tets),
          fmt::format("{:.1f}", g.largest_force_n)});
     for (const auto& [name, body] : g.volume) {
       volumes.push_back({g.scene, g.preset, name, fmt::format("{:.2f}", body.largest_percent)});

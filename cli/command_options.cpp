@@ -27,7 +27,7 @@ void add_global(CLI::App& command, GlobalOptions& options) {
   command.add_flag("-v,--verbose", options.verbose, "more on stderr");
 }
 
-void add_label_surfaces(CLI::App& command, double& gap, int& rounds, double& least_island) {
+void add_label_surfaces(CLI::App& command, double& gap, int& rounds, double& min_island) {
   command
       .add_option(
           "--label-gap", gap,
@@ -38,7 +38,7 @@ void add_label_surfaces(CLI::App& command, double& gap, int& rounds, double& lea
       ->check(CLI::Range(0, 1000))
       ->capture_default_str();
   command
-      .add_option("--least-island", least_island,
+      .add_option("--least-island", min_island,
                   "voxels; pieces of a label that have fewer are left out, 0 … 1e9")
       ->check(within(0.0, 1e9))
       ->capture_default_str();

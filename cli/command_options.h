@@ -36,7 +36,7 @@ void add_edits(CLI::App& command, std::vector<std::string>& sets, std::vector<fs
 // `otherwise`: what is told of the default.
 void add_store(CLI::App& command, fs::path& store, const char* otherwise);
 // How surfaces of a label map's labels are made.
-void add_label_surfaces(CLI::App& command, double& gap, int& rounds, double& least_island);
+void add_label_surfaces(CLI::App& command, double& gap, int& rounds, double& min_island);
 // A scene by file or name, its edits, and the store of its bodies.
 void add_scene(CLI::App& command, SceneSource&);
 // Of one search: PlanOptions, BenchOptions or RefineOptions.

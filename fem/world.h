@@ -82,8 +82,8 @@ struct WorldSpec {
   Vec3 gravity_m_s2 = Vec3::Zero();  // on every node that is not fixed, where its body has no other
   double max_dt_s = 0;               // 0: automatic; a scene may only lower the step
   Points goal_shape_m;  // (N × 3) to which interpolation draws the robot, wherever; empty: its rest shape
-  // A soft body all of whose nodes are slower, and would gain less than this in a second, comes to a stand;
-  // one that stands goes on standing until a node would gain as much in a tenth of a second. Where its box
+  // A soft body all of whose nodes are slower, and would gain less than this in a second, comes to rest;
+  // one at rest stays so until a node would gain as much in a tenth of a second. Where its box
   // meets another's or a wall, whose rounding shakes single nodes, their mean counts for that
   // (docs/dynamics.md, "Rest and sleep"). 0: only where nothing would move.
   double rest_speed_m_s = 0;

@@ -9,7 +9,7 @@ namespace limber {
 
 Benchmark run_benchmark(const BenchOptions& options, const Context& context) {
   using detail::require_in;
-  if (options.iterations) require_in("iterations", *options.iterations, 0, plan::most_iterations);
+  if (options.iterations) require_in("iterations", *options.iterations, 0, plan::iteration_limit);
   require_in("in_flight", options.in_flight, 0, 4096);
   return detail::working_for(context, [&] { return detail::bench(options); });
 }

@@ -81,7 +81,7 @@ struct BenchGroup {
   std::optional<Quartiles> motion_s;
   double largest_penetration_percent = 0, largest_overlap_percent = 0, largest_self_overlap_percent = 0;
   std::optional<double> median_gap_percent;  // of the runs' medians; nothing where nothing presses in any
-  double largest_gap_percent = 0, least_stretch = 1, largest_stretch = 0;
+  double largest_gap_percent = 0, min_stretch = 1, largest_stretch = 0;
   std::int64_t inverted_tets = 0;
   double largest_force_n = 0;
   std::vector<std::pair<std::string, VolumeFigures>> volume;  // by body
@@ -95,7 +95,7 @@ struct BenchGroup {
     f("largest_overlap_percent", largest_overlap_percent);
     f("largest_self_overlap_percent", largest_self_overlap_percent);
     f("median_gap_percent", median_gap_percent), f("largest_gap_percent", largest_gap_percent);
-    f("least_stretch", least_stretch), f("largest_stretch", largest_stretch);
+    f("least_stretch", min_stretch), f("largest_stretch", largest_stretch);
     f("inverted_tets", inverted_tets), f("largest_force_n", largest_force_n), f("volume", volume);
     f("programs", programs);
   }

@@ -15,7 +15,7 @@ using detail::working_for;
 namespace {
 
 void require_limits(const std::optional<std::int64_t>& iterations, int in_flight) {
-  if (iterations) require_in("iterations", *iterations, 0, plan::most_iterations);
+  if (iterations) require_in("iterations", *iterations, 0, plan::iteration_limit);
   require_in("in_flight", in_flight, 0, 4096);
 }
 

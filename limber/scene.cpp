@@ -190,12 +190,12 @@ Problem::Range Problem::nodes_of(int body) const {
 }
 
 States Problem::start(int copies) const {
-  constexpr double most_bytes = 16e9;
+  constexpr double max_bytes = 16e9;
   const double bytes = double(copies) * 6 * sizeof(float) * nodes();
-  if (copies < 0 || bytes > most_bytes)
-    throw InputError(fmt::format(
-        "copies is {}; it must be in [0, {}], so that states take at most {:g} GB", copies,
-        std::int64_t(most_bytes / (6 * sizeof(float) * std::max(1, nodes()))), 1e-9 * most_bytes));
+  if (copies < 0 || bytes > max_bytes)
+    throw InputError(fmt::format("copies is {}; it must be in [0, {}], so that states take at most {:g} GB",
+                                 copies, std::int64_t(max_bytes / (6 * sizeof(float) * std::max(1, nodes()))),
+                                 1e-9 * max_bytes));
   States states;
   states.nodes = nodes();
   const State start = impl_->system.start();
@@ -283,7 +283,7 @@ namespace {
 void validate(const SolveOptions& options) {
   using detail::require_in;
   if (options.seed) require_in("seed", *options.seed, 0, largest_exact);
-  if (options.iterations) require_in("iterations", *options.iterations, 0, plan::most_iterations);
+  if (options.iterations) require_in("iterations", *options.iterations, 0, plan::iteration_limit);
   require_in("time_limit_s", options.time_limit_s, 0, std::numeric_limits<double>::infinity());
   if (options.shortcut_rounds) require_in("shortcut_rounds", *options.shortcut_rounds, 0, 100'000);
   plan::cost_kind_from(options.cost);

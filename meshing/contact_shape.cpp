@@ -303,7 +303,7 @@ ContactShape make_contact_shape(const SurfaceMesh& surface, const TetMesh& cage,
           detail::sample_surface(surface, seen, winding,
                                  {.missed_m = settings.missed_depth * r.characteristic_m,
                                   .min_m = settings.min_spacing * std::max(r.characteristic_m, size / 3),
-                                  .most_m = settings.max_spacing * size,
+                                  .max_m = settings.max_spacing * size,
                                   .max_flat_m = settings.max_flat_spacing * size,
                                   .offset_m = offset},
                                  most);

@@ -14,7 +14,7 @@ namespace {
 constexpr float far = 1e18f;
 constexpr double rigid_over_soft = 10;
 constexpr double inside_rigid = 1000;  // price of a metre: never better than a way round, yet a number
-constexpr std::size_t most_sheets = 200;
+constexpr std::size_t max_sheets = 200;
 constexpr double bend = 3;  // of a strand's radius: bent so, its outside is stretched by a third
 
 // Lower envelope of parabolas, along one line of a grid.
@@ -128,7 +128,7 @@ void Guidance::set_sheets(const Windings& start) {
   for (std::size_t h = 0; h < space_.holes.size(); ++h)
     most.push_back(std::max(space_.holes[h].pieces, pieces_in(start, int(h))));
   sheets_ = {{}};
-  for (std::size_t s = 0; s < sheets_.size() && sheets_.size() <= most_sheets; ++s)
+  for (std::size_t s = 0; s < sheets_.size() && sheets_.size() <= max_sheets; ++s)
     for (int letter = -int(most.size()); letter <= int(most.size()); ++letter) {
       const Windings& word = sheets_[s];
       if (letter == 0 || (!word.empty() && word.back() == -letter)) continue;
@@ -137,7 +137,7 @@ void Guidance::set_sheets(const Windings& start) {
       longer.push_back(letter);
       sheets_.push_back(std::move(longer));
     }
-  if (sheets_.size() > most_sheets) sheets_ = {{}}, space_.holes.clear();
+  if (sheets_.size() > max_sheets) sheets_ = {{}}, space_.holes.clear();
   for (std::size_t s = 0; s < sheets_.size(); ++s) sheet_of_[sheets_[s]] = int(s);
   near_hole_.assign(price_.size(), false);
   for (std::size_t c = 0; c < price_.size(); ++c)

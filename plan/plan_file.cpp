@@ -236,7 +236,7 @@ class Reader {
       const std::int64_t due = i == 0 ? steps[0] : steps[std::size_t(t.parents[i])] + t.controls[i].steps;
       require(steps[i] >= 0 && steps[i] <= max_counted && steps[i] == due,
               fmt::format("node {} is at step {}, its control ends at step {}", i, steps[i], due));
-      require(t.iterations[i] >= -1 && t.iterations[i] <= most_iterations,
+      require(t.iterations[i] >= -1 && t.iterations[i] <= iteration_limit,
               fmt::format("node {} is of iteration {}", i, t.iterations[i]));
     }
   }
@@ -331,8 +331,8 @@ Statistics statistics_from_json(const Reader& reader, const Json& json, int edit
   Statistics s;
   s.iterations = count("iterations");
   reader.require(
-      s.iterations <= most_iterations,
-      fmt::format("statistics.iterations is {}; it must be at most {}", s.iterations, most_iterations));
+      s.iterations <= iteration_limit,
+      fmt::format("statistics.iterations is {}; it must be at most {}", s.iterations, iteration_limit));
   s.diverged = count("diverged"), s.rejected = count("rejected");
   if (json.contains("refused")) s.refused = count("refused");  // since edition 2 of the world
   s.rollout_steps = count("rollout_steps");

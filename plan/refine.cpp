@@ -292,7 +292,7 @@ Plan refine(const System& system, const Settings& settings, const Reference& ref
 
   Plan begun = chain(system, settings, followed.controls, followed.states);
   Settings more = settings;
-  more.max_iterations = std::min(most_iterations, more.max_iterations + begun.statistics.iterations);
+  more.max_iterations = std::min(iteration_limit, more.max_iterations + begun.statistics.iterations);
   Plan plan = plan::plan(system, more, std::move(begun));
   report.iterations = plan.statistics.iterations - std::int64_t(followed.states.size());
   report.search_cpu_s = spent();

@@ -36,7 +36,7 @@ void require_in(const Range& range, double value, const std::string& name) {
 // were called.
 template <class AnySettings, class Visitor>
 void describe(AnySettings& s, const Visitor& visit) {
-  visit("/max_iterations", s.max_iterations, Range{0, double(most_iterations)});
+  visit("/max_iterations", s.max_iterations, Range{0, double(iteration_limit)});
   visit("/goal_bias", s.goal_bias, fraction);
   visit("/weights/body", s.weights.body, at_least_zero);
   visit("/weights/control_point", s.weights.control_point, at_least_zero);

@@ -61,12 +61,12 @@ struct SearchOptions {
   bool end_hopeless = false;  // a rollout that gets nowhere, or leads away, ends there
 };
 
-inline constexpr std::int64_t most_iterations = 1'000'000'000;
+inline constexpr std::int64_t iteration_limit = 1'000'000'000;
 inline constexpr double min_frames_per_second = 1e-3, max_frames_per_second = 10000;
 
 struct Settings {
   std::uint64_t seed = 1;
-  std::int64_t max_iterations = 1000;  // in total, those of an earlier plan included; at most most_iterations
+  std::int64_t max_iterations = 1000;  // in total, those of an earlier plan included; at most iteration_limit
   std::vector<Via> via;  // reached before `goal`, in this order; each begins a leg of the search
   Goal goal;
   double goal_bias = 0.1;  // share of expansions drawn towards the goal, in [0, 1]

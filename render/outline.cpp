@@ -11,7 +11,7 @@ namespace {
 
 constexpr double opacity = 0.8;
 constexpr double speck = 0.014;  // of the picture's height, and
-constexpr int least_speck_px = 6;
+constexpr int min_speck_px = 6;
 // Cosines of the turn between neighbours of two pixels' distance: no line, and a full one.
 constexpr float smooth_turn = 0.80F, sharp_turn = 0.55F;
 
@@ -38,7 +38,7 @@ std::vector<float> widened(const std::vector<float>& values, int width, int heig
 
 // Lines that hang together and reach less far than this are no edge of anything: in a crease that is finer
 // than the pixels the normals of neighbors differ here and there.
-void remove_specks(std::vector<float>& lines, int width, int height, int least_px) {
+void remove_specks(std::vector<float>& lines, int width, int height, int min_px) {
   std::vector<bool> known(lines.size(), false);
   std::vector<std::size_t> one;
   for (std::size_t first = 0; first < lines.size(); ++first) {
@@ -58,7 +58,7 @@ void remove_specks(std::vector<float>& lines, int width, int height, int least_p
           one.push_back(next);
         }
     }
-    if (std::max(right - left, bottom - top) + 1 >= least_px) continue;
+    if (std::max(right - left, bottom - top) + 1 >= min_px) continue;
     for (const std::size_t i : one) lines[i] = 0;
   }
 }
@@ -91,7 +91,7 @@ std::vector<float> outlines_of(const Passes& passes, double step_m) {
       look(at(std::max(0, x - 1), y), at(x, y), at(std::min(width - 1, x + 1), y));
       look(at(x, std::max(0, y - 1)), at(x, y), at(x, std::min(height - 1, y + 1)));
     }
-  remove_specks(lines, width, height, std::max(least_speck_px, int(std::lround(speck * height))));
+  remove_specks(lines, width, height, std::max(min_speck_px, int(std::lround(speck * height))));
   return lines;
 }
 

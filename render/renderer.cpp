@@ -118,7 +118,7 @@ std::string sample_defines(const RenderSettings& settings) {
 }
 
 // How the lists of layers are shared: four samples of a pixel have one list (a rasterizer of four samples a
-// pixel then draws veils), else each sample has its own.
+// pixel then draws transparent surfaces), else each sample has its own.
 std::string list_defines(const RenderSettings& settings, const std::optional<SamplePlaces>& four) {
   std::string defines = fmt::format("#define SAMPLES_A_LIST {}\n", four ? 4 : 1);
   if (!four) return defines + "#define LIST ivec2(gl_FragCoord.xy)\n#define SAMPLE 1u\n";
@@ -174,13 +174,14 @@ Renderer::Impl::Impl(const RenderSettings& l)
   glEnableVertexAttribArray(1);
 }
 
-bool Renderer::Impl::has_veils() const {
+bool Renderer::Impl::has_transparent() const {
   return std::any_of(meshes.begin(), meshes.end(),
                      [](const Mesh& m) { return m.drawn() && m.transparent(); });
 }
 
-// Stage after stage. Where there are veils, lines are drawn with them: what of a line lies before a veil goes
-// into the veil's lists. Passes and picture come from one drawing, so they agree sample by sample.
+// Stage after stage. Where there are transparent surfaces, lines are drawn with them: what of a line lies
+// before a transparent surface goes into the transparent surface's lists. Passes and picture come from one
+// drawing, so they agree sample by sample.
 void Renderer::Impl::draw(const Camera& from, const RowReader& read, Passes* passes, StageTimes* times) {
   render::validate(from);
   context.make_current();
@@ -200,9 +201,9 @@ void Renderer::Impl::draw(const Camera& from, const RowReader& read, Passes* pas
   done(&StageTimes::ground_s);
   draw_opaque(passes != nullptr);
   done(&StageTimes::opaque_s);
-  if (has_veils()) {
-    draw_veils();
-    done(&StageTimes::veils_s);
+  if (has_transparent()) {
+    draw_transparent();
+    done(&StageTimes::transparent_s);
   } else {
     draw_lines(LinePass::draw_all);
     done(&StageTimes::lines_s);
@@ -329,8 +330,8 @@ void Renderer::set_scalars(int number, const Eigen::VectorXd& values) {
   impl_->mesh_with(number, values.size(), false).card.set_scalars(values);
 }
 
-// Of veils alone: one that became opaque would lack what opaque meshes get when they are added (its places at
-// rest, for the relief).
+// Of transparent surfaces alone: one that became opaque would lack what opaque meshes get when they are added
+// (its places at rest, for the relief).
 void Renderer::set_opacity(int number, double opacity) {
   MeshLook& look = impl_->mesh_with(number, 0, true).look;
   LIMBER_CHECK(look.opacity < 1 && 0 <= opacity && opacity < 1, look.name, look.opacity, opacity);
@@ -374,7 +375,7 @@ void Renderer::Impl::add_caps() {
       made.solid = true;
       meshes.push_back(std::move(made));
       ++caps;
-      if (look.opacity == 1) continue;  // a veil's is hardly seen without its rim
+      if (look.opacity == 1) continue;  // a transparent surface's is hardly seen without its rim
       lines.push_back(
           {{.color_srgb = rim_shade * meshes[m].look.color_srgb, .width_px = rim_px, .opacity = 0.9},
            rim_of(cap)});

@@ -58,7 +58,7 @@ struct MeshLook {
   // Light that enters and comes out elsewhere: round the edge of the unlit side, and through thin parts.
   double translucency = 0;  // 0 … 1
   double scatter_m =
-      0.03;  // > 0; behind so much of the stuff 1/e of that light is left, less of the colours it lacks
+      0.03;  // > 0; behind so much of the material 1/e of that light is left, less of the colours it lacks
   double sheen = 0;  // 0 … 1; fibres that light up towards grazing angles
   // A fine relief that goes with the mesh: a function of the place at rest.
   double grain = 0;       // 0 … 1; its slope
@@ -78,7 +78,7 @@ using Plane = Eigen::Vector4d;
 constexpr int max_clip_planes = 6;
 
 // What the picture shows, apart from how it looks: of each pixel the sample nearest to the eye. Of opaque
-// meshes only; ground, lines and veils are left out. Row 0 is the top.
+// meshes only; ground, lines and transparent surfaces are left out. Row 0 is the top.
 struct Passes {
   int width = 0, height = 0;
   std::vector<float> depth_m;  // along the view axis; infinity where there is nothing
@@ -93,7 +93,7 @@ Points edges_of(const Box&);
 
 // CPU seconds of the process, stage by stage.
 struct StageTimes {
-  double shadow_map_s = 0, ground_s = 0, opaque_s = 0, lines_s = 0, veils_s = 0, finish_s = 0;
+  double shadow_map_s = 0, ground_s = 0, opaque_s = 0, lines_s = 0, transparent_s = 0, finish_s = 0;
 };
 
 // One drawing context. A renderer stays in the thread that makes it; several work in several threads.
@@ -122,7 +122,8 @@ class Renderer {
   // of sky and ground, not the key light. Empty: none.
   void set_occlusion(int mesh, const Eigen::VectorXd&);
   void set_scalars(int mesh, const Eigen::VectorXd&);  // one a vertex, for Passes
-  // Of a veil: the look's opacity from now on, 0 ≤ … < 1. At 0 the picture is as without the mesh.
+  // Of a transparent surface: the look's opacity from now on, 0 ≤ … < 1. At 0 the picture is as without the
+  // mesh.
   void set_opacity(int mesh, double);
 
   // What of the mesh and its edges lies where n·p + d < 0 for one of the planes is cut off, and casts no

@@ -55,7 +55,7 @@ SurfaceMesh make_tube(const TubeModel&);
 TetMesh make_tube_cage(const TubeModel&, const Eigen::Vector3i& cells);
 
 bool is_closed(const std::vector<Vec3>& path_m);  // ends where it begins: a ring
-double least_bend_radius_m(const TubeModel&);     // of its middle line
+double min_bend_radius_m(const TubeModel&);       // of its middle line
 double length_m(const TubeModel&);                // likewise
 
 // nx × ny × nz cells of five tets each, cut in alternate ways so that neighbours share their faces: 3 × 3 × 3

@@ -64,7 +64,7 @@ class Curve {
     return f;
   }
   // The least radius of the circles through three neighbouring samples.
-  double least_radius() const {
+  double min_radius() const {
     double least = std::numeric_limits<double>::infinity();
     const std::size_t last = frames_.size() - 1;
     for (std::size_t i = closed_ ? 0 : 1; i < last; ++i) {
@@ -241,7 +241,7 @@ int vertices_round(const TubeModel& tube) {
 }  // namespace
 
 bool is_closed(const std::vector<Vec3>& path) { return path.size() > 2 && path.front() == path.back(); }
-double least_bend_radius_m(const TubeModel& tube) { return Curve(tube.path_m).least_radius(); }
+double min_bend_radius_m(const TubeModel& tube) { return Curve(tube.path_m).min_radius(); }
 double length_m(const TubeModel& tube) { return Curve(tube.path_m).length(); }
 
 SurfaceMesh make_tube(const TubeModel& tube) {

@@ -143,16 +143,16 @@ struct WayOut {
   Real height[4];     // of the point above the faces, in lengths of the normals
 };
 
-// When a body stands still, [lane].
+// When a body is at rest, [lane].
 template <class Real>
 struct Rest {
   Real max_speed2;                     // largest |v|² of a node, before and after
-  Real max_gain2, max_gain2_of_still;  // largest |Δv|², where it moved, and where it stood still
+  Real max_gain2, max_gain2_of_still;  // largest |Δv|², where it moved, and where it was at rest
   // The same where it may touch something: contact's rounding shakes single nodes, so of each by this, and of
   // their mean by so much.
   Real max_shake2, max_mean_gain2, max_mean_gain2_of_still;
   const Real *asleep, *speed2_before, *touches;
-  Real* stands;  // out: v is 0 now and x as before; `asleep` and `stands` are 0 or 1
+  Real* at_rest;  // out: v is 0 now and x as before; `asleep` and `at_rest` are 0 or 1
 };
 
 // Tets whose singular values are to lie between two limits, here squared.

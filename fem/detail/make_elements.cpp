@@ -48,7 +48,8 @@ std::vector<double> tet_volumes(const TetMesh& mesh) {
 }
 
 // τ in k_d = τ k, seconds: 2ζ/ω₁ with ω₁ = π √(E/ρ)/V^⅓, the lowest longitudinal mode of a cube that has
-// the body's volume and all of this tet's stuff. That mode then has the damping ratio ζ that was asked for.
+// the body's volume and all of this tet's material. That mode then has the damping ratio ζ that was asked
+// for.
 double damping_time(const Body& body, int tet) {
   const double speed = std::sqrt(body.youngs_modulus_from_tet_pa[tet] / body.density_from_tet_kg_m3[tet]);
   const double frequency = M_PI * speed / std::cbrt(body.rest_volume_m3);
@@ -101,9 +102,9 @@ void make_springs(const Body& body, ElementTables<double>& tables) {
     tables.volumes.elements.push_back(
         {{q[0], q[1], q[2], q[3]}, {6 * v, k * scale, inverted * scale, tau * k * scale}});
   }
-  // Shares are fitted as if the body were all of one stuff: where parts meet, an affine strain has to leave
-  // a pull, and a fit would take that for a fault of the mesh. Then an edge gets its share times the mean
-  // modulus of its tets, by volume.
+  // Shares are fitted as if the body were all of one material: where parts meet, an affine strain has to
+  // leave a pull, and a fit would take that for a fault of the mesh. Then an edge gets its share times the
+  // mean modulus of its tets, by volume.
   const double young = body.youngs_modulus_from_tet_pa[0], mu = lame_of(body, 0).mu;
   std::vector<double> mu_volume;
   for (const double v : volumes) mu_volume.push_back(mu * v);

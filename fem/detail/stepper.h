@@ -59,7 +59,7 @@ class Stepper {
   void pull_towards_goal(int lane);
   void follow_forces(int lane);
   void find_sleepers();
-  bool may_stand(std::size_t body) const;
+  bool may_rest(std::size_t body) const;
   void add_contact_forces();
   void find_pushes();
   void add_stretch_limits();
@@ -99,8 +99,8 @@ class Stepper {
   Numbers inner_travel_;
   std::vector<bool> wears_inside_;
   // Sleep (docs/dynamics.md), all [body][lane], 0 or 1: is as it was a step ago; takes no part in this step;
-  // stood still in this step. And [pair of bodies][lane]: their boxes met a step ago.
-  Numbers unchanged_, asleep_, stands_;
+  // was at rest in this step. And [pair of bodies][lane]: their boxes met a step ago.
+  Numbers unchanged_, asleep_, at_rest_;
   Numbers touches_;                               // its box meets another's or a wall
   std::vector<bool> met_;                         // or a ligament ties them, always
   std::vector<bool> tied_;                        // [pair of bodies]

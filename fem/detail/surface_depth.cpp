@@ -54,7 +54,7 @@ void SurfaceContacts<Real>::find_in(const LaneView<Real>& view, int from, int in
     const Real* place = places_[row_of_sample(sample)].at;
     const Real own_bulge = sample_bulge(view, from, sample);
     int best = -1;
-    Real best_weight[4], best_least = -std::numeric_limits<Real>::max();
+    Real best_weight[4], best_min = -std::numeric_limits<Real>::max();
     for (; i < awake && near.candidates[awake_[i]].point == sample; ++i) {
       const int tet = near.candidates[awake_[i]].tet;
       const Real bulge = own_bulge + bulge_of(view, into, tet);
@@ -63,8 +63,8 @@ void SurfaceContacts<Real>::find_in(const LaneView<Real>& view, int from, int in
       Real weight[4];
       if (!barycentric(view, tet, place, weight) || !near_core(view, tet, place, weight, bulge)) continue;
       const Real least = std::min(std::min(weight[0], weight[1]), std::min(weight[2], weight[3]));
-      if (!(least > best_least)) continue;
-      best = tet, best_least = least;
+      if (!(least > best_min)) continue;
+      best = tet, best_min = least;
       std::copy_n(weight, 4, best_weight);
     }
     if (best >= 0) measure(view, from, into, sample, best, best_weight);

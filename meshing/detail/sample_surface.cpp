@@ -77,7 +77,7 @@ class SpacingMap {
     constexpr double rounding = 1e-9;
     const double flat = 0.1 * limits_.missed_m, least = limits_.min_m * limits_.min_m,
                  farthest = limits_.max_flat_m * limits_.max_flat_m;
-    double min_squared = limits_.most_m * limits_.most_m, bend = 0;
+    double min_squared = limits_.max_m * limits_.max_m, bend = 0;
     grid_.any_cell(at.position, limits_.max_flat_m, [&](int index) {
       const Cell& cell = cells_[std::size_t(index)];
       if (cell.begin == cell.end) return false;
@@ -264,7 +264,7 @@ std::vector<SurfaceSample> sample_surface(const SurfaceMesh& surface, const Seen
     return hidden == yes;
   };
   for (double scale = 1;; scale *= 1.1) {
-    PointGrid grid(box, spacing.most_m);
+    PointGrid grid(box, spacing.max_m);
     std::vector<SurfaceSample> samples;
     for (std::size_t i = 0; i < spots.size() && int(samples.size()) <= most; ++i) {
       const SurfaceSpot& s = spots[i];

@@ -10,7 +10,7 @@ namespace limber::meshing::detail {
 struct SampleSpacing {
   double missed_m;    // depth that may be missed between two samples of a face that bends
   double min_m;       // spacing nowhere below
-  double most_m;      // nor above where the surface bends
+  double max_m;       // nor above where the surface bends
   double max_flat_m;  // nor in flat faces
   double offset_m;    // as in seen_surface
 };

@@ -39,8 +39,8 @@ Vec3 toward_soft_box(const RenderSettings& settings) {
 
 // ---- what cuts a mesh ----
 
-// What is below the ground is cut off, too, where the eye sees it from above. The undersides of veils, which
-// are seen through them, stay whole where they stand on it and sink in a little.
+// What is below the ground is cut off, too, where the eye sees it from above. The undersides of transparent
+// surfaces, which are seen through them, stay whole where they stand on it and sink in a little.
 std::vector<Plane> Renderer::Impl::planes_of(const Mesh& mesh) const {
   std::vector<Plane> planes = mesh.planes;
   Plane plane = ground_plane;
@@ -96,10 +96,10 @@ Paint paint_of(const Mesh& mesh, const DrawnMesh::Batch* batch) {
 }  // namespace
 
 // The program of a mesh, or of the part of it that one material covers, in use and with all its uniforms.
-// `defines` says what is drawn (passes, veils); the rest follows from the mesh. Lengths that the shader
-// compares with the shadow map are handed over in its units: 1 is the side of the map across the light, and
-// its range of depth along the light. Texture units: 0 and 2 the shadow map (compared, and as it is), 1 the
-// ground's sky, 3 where light enters, 4 relief, 5 image, 6 image of normals.
+// `defines` says what is drawn (passes, transparent surfaces); the rest follows from the mesh. Lengths that
+// the shader compares with the shadow map are handed over in its units: 1 is the side of the map across the
+// light, and its range of depth along the light. Texture units: 0 and 2 the shadow map (compared, and as it
+// is), 1 the ground's sky, 3 where light enters, 4 relief, 5 image, 6 image of normals.
 const Program& Renderer::Impl::use_mesh(const Mesh& mesh, const std::string& defines,
                                         const DrawnMesh::Batch* batch) {
   const std::vector<Plane> planes = planes_of(mesh);
@@ -121,8 +121,8 @@ const Program& Renderer::Impl::use_mesh(const Mesh& mesh, const std::string& def
   p.set("shadow_offset_m", 2.0 * shadow_texel_m);
   p.set("shadow_from_normal", shadow_from_normal);
   p.set("shadow_softness", shadow_softness);
-  p.set("least_shadow", 1.9 / shadow_size);
-  p.set("most_shadow", max_shadow);
+  p.set("min_shadow", 1.9 / shadow_size);
+  p.set("max_shadow", max_shadow);
   p.set("ground_x", Vec3(ground.plane_from_world.row(0)));
   p.set("ground_y", Vec3(ground.plane_from_world.row(1)));
   p.set("ground_lower", sky_shade.lower);
@@ -160,7 +160,7 @@ const Program& Renderer::Impl::use_mesh(const Mesh& mesh, const std::string& def
     p.set("scatter", Vec3(mesh.look.scatter_m / shadow_depth_m * reach));
     p.set("scatter_radius", 1.5 * mesh.look.scatter_m / (shadow_texel_m * shadow_size));
     p.set("entry_depth", 3);
-    // A colour that the stuff lacks gets three tenths as far as the one it has most of.
+    // A colour that the material lacks gets three tenths as far as the one it has most of.
     entry_map->bind(3);
     glBindSampler(3, targets.blended);
   }

@@ -6,8 +6,9 @@
 //   lay out        look_through                        view, near and far plane     detail/shadow_maps.cpp
 //   shadow maps    draw_shadow_map, shade_ground_maps  what the key light reaches   detail/shadow_maps.cpp
 //   opaque bodies  draw_opaque                         colours, depth, passes       detail/draw_bodies.cpp
-//   veils, lines   draw_veils, draw_lines              laid over the colours        detail/draw_veils.cpp
-//   finish         finish_passes, finish               pixels                       detail/finish_picture.cpp
+//   transparent surfaces, lines   draw_transparent, draw_lines              laid over the colours
+//   detail/draw_transparent.cpp finish         finish_passes, finish               pixels
+//   detail/finish_picture.cpp
 // Method and sources: docs/rendering.md. Until the tone map all light is linear; radiance 1 is what a white,
 // matt surface square to the key light sends.
 #pragma once
@@ -50,7 +51,8 @@ struct Mesh {
   Triangles triangles = {};                                  // of what is cut; as has_inside() says of them:
   std::optional<bool> solid = {};
 
-  // A veil: drawn into the lists of layers (detail/draw_veils.cpp), not with the opaque bodies.
+  // A transparent surface: drawn into the lists of layers (detail/draw_transparent.cpp), not with the opaque
+  // bodies.
   bool transparent() const { return look.opacity < 1; }
   bool drawn() const { return look.seen && look.opacity > 0; }
   bool grained() const { return look.grain > 0 && !transparent(); }
@@ -131,10 +133,11 @@ struct Renderer::Impl {
   struct Rectangle {               // of samples; rows go upward
     int left, top, right, bottom;  // right and bottom are beyond
   };
-  Rectangle place_of_veils() const;
-  void put_veils(int first_row, int rows);
-  void draw_veils();
-  // Where there are veils: first what lies before one is put into the lists, then the rest is drawn.
+  Rectangle extent_of_transparent() const;
+  void put_transparent(int first_row, int rows);
+  void draw_transparent();
+  // Where there are transparent surfaces: first what lies before one is put into the lists, then the rest is
+  // drawn.
   enum class LinePass { draw_all, put, draw_rest };
   void draw_lines(LinePass);
   void finish(const RowReader&);
@@ -151,7 +154,7 @@ struct Renderer::Impl {
   template <class WithProgram>
   void draw_mesh(const Mesh&, const std::string& defines, const WithProgram&);
   void use_depth(const Mat4& clip_from, const std::vector<Plane>&);
-  bool has_veils() const;
+  bool has_transparent() const;
   // Checks the number, and that there is a value for each of its vertices.
   Mesh& mesh_with(int number, Eigen::Index values, bool may_be_empty);
 
@@ -164,8 +167,9 @@ struct Renderer::Impl {
   Variants layers_programs{detail::whole_picture_vertex_shader, detail::layers_fragment_shader};
   std::string samples;  // defines by which a shader reads the samples of a pixel
   Targets targets;
-  const std::optional<SamplePlaces> four_samples;  // of veils' rasterizer, where one list serves a pixel
-  const std::string with_lists;                    // defines and texts by which a shader uses the lists
+  const std::optional<SamplePlaces>
+      four_samples;              // of transparent surfaces' rasterizer, where one list serves a pixel
+  const std::string with_lists;  // defines and texts by which a shader uses the lists
   LayerLists lists;
   unsigned empty_array, line_array, line_buffer;  // the first for whole pictures, whose shader has no input
   std::vector<Mesh> meshes;

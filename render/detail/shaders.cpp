@@ -26,7 +26,7 @@ layout(location = 0) in vec3 position_in;
 layout(location = 1) in vec3 normal_in;
 #ifdef TINTED
 layout(location = 2) in vec4 tint_in;
-#ifdef VEILED
+#ifdef TRANSPARENT
 centroid
 #endif
 out vec4 tint;
@@ -56,11 +56,11 @@ uniform float shadow_offset_m;   // along the normal: about a texel of the shado
 uniform vec4 planes[PLANES];     // what is below one is cut off
 out float gl_ClipDistance[PLANES];
 #endif
-#ifdef VEILED
+#ifdef TRANSPARENT
 centroid
 #endif
 out vec3 position, normal, shadow_place;
-#ifdef VEILED
+#ifdef TRANSPARENT
 noperspective centroid out float depth;
 #endif
 void main() {
@@ -70,7 +70,7 @@ void main() {
   vec3 offset = shadow_offset_m * (dot(normal_in, toward_key) < 0.0 ? -normal_in : normal_in);
   shadow_place = (shadow_from_world * vec4(position_in + offset, 1.0)).xyz;
   gl_Position = clip_from_world * vec4(position_in, 1.0);
-#ifdef VEILED
+#ifdef TRANSPARENT
   depth = 0.5 + 0.5 * gl_Position.z / gl_Position.w;
 #endif
 #ifdef TINTED
@@ -97,16 +97,16 @@ void main() {
 // Key: Lambert and GGX with Schlick's approximations (Karis, SIGGRAPH 2013 course). Ambient: a sky above, the
 // ground below.
 const char* const mesh_fragment_shader = R"(
-#ifdef VEILED
+#ifdef TRANSPARENT
 centroid                         // a pixel is shaded once, where the triangle covers it
 #endif
 in vec3 position, normal, shadow_place;
-#ifdef VEILED
+#ifdef TRANSPARENT
 noperspective centroid in float depth;  // beyond the triangle, a far side would come before its near one along an outline
 uniform float stand_back;               // as glPolygonOffset's factor
 #endif
 #ifdef TINTED
-#ifdef VEILED
+#ifdef TRANSPARENT
 centroid
 #endif
 in vec4 tint;                    // colour, and the share of the sky that is open
@@ -158,11 +158,11 @@ uniform float scatter_radius;    // the same depth across, in units of the map
 uniform sampler2D entry_depth;   // where the key light first meets anything
 #endif
 uniform mat3 shadow_from_normal;
-uniform float shadow_softness, least_shadow, most_shadow;  // radius of the half-shade, in units of the map: for each unit of depth; limits
+uniform float shadow_softness, min_shadow, max_shadow;  // radius of the half-shade, in units of the map: for each unit of depth; limits
 uniform sampler2DShadow shadow_map;
 uniform sampler2D shadow_depth;  // the same, not compared
 uniform sampler2D ground_sky_map;
-#ifndef VEILED
+#ifndef TRANSPARENT
 layout(location = 0) out vec4 color;
 #elif SAMPLES_A_LIST == 1
 layout(early_fragment_tests) in;
@@ -187,13 +187,13 @@ vec2 around() {
   return normalize(vec2(abs(turn - 2.0) - 1.0, 1.0 - abs(abs(turn - 1.0) - 2.0)));
 }
 
-#ifdef VEILED
-// Four bilinear taps: 4 × 4 texels, of even weight but for a soft rim. A veil has many layers, and shadows on it are faint.
+#ifdef TRANSPARENT
+// Four bilinear taps: 4 × 4 texels, of even weight but for a soft rim. A transparent surface has many layers, and shadows on it are faint.
 float key_visibility(vec3 n) {
   float sum = 0.0;
   for (int y = -1; y <= 1; y += 2)
     for (int x = -1; x <= 1; x += 2)
-      sum += texture(shadow_map, vec3(shadow_place.xy + 0.6 * least_shadow * vec2(x, y), shadow_place.z));
+      sum += texture(shadow_map, vec3(shadow_place.xy + 0.6 * min_shadow * vec2(x, y), shadow_place.z));
   return 0.25 * sum;
 }
 #else
@@ -207,7 +207,7 @@ float key_visibility(vec3 n) {
   vec2 slope = -s.xy / min(s.z, -0.15 * length(s));
   slope *= min(1.0, 6.0 / max(length(slope), 1e-6));
   vec2 along = around();
-  float search = clamp(shadow_softness * shadow_place.z, least_shadow, most_shadow);
+  float search = clamp(shadow_softness * shadow_place.z, min_shadow, max_shadow);
   float above = 0.0, blockers = 0.0;
   for (int i = 0; i < searching; ++i) {
     vec2 way = search * sqrt((float(i) + 0.5) / float(searching)) * along;
@@ -216,7 +216,7 @@ float key_visibility(vec3 n) {
     above += blocks * height, blockers += blocks;
     along = golden * along;
   }
-  float radius = clamp(shadow_softness * above / max(blockers, 1.0), least_shadow, most_shadow), sum = 0.0;
+  float radius = clamp(shadow_softness * above / max(blockers, 1.0), min_shadow, max_shadow), sum = 0.0;
   for (int i = 0; i < taps; ++i) {
     vec2 way = radius * sqrt((float(i) + 0.5) / float(taps)) * along;
     sum += texture(shadow_map, vec3(shadow_place.xy + way, shadow_place.z + dot(slope, way)));
@@ -293,7 +293,7 @@ void main() {
   vec3 key = (diffuse + fresnel * (a2 / (d * d) * visibility)) * (n_key * key_visibility(smooth_n)) * key_light;
 #ifdef TRANSLUCENT
   // Thickness by the first surface that the light meets (Green, GPU Gems 16); what comes out does so on all sides, most
-  // where the light grazes. A colour that the stuff holds back gets less far.
+  // where the light grazes. A colour that the material holds back gets less far.
   // Light spreads sideways as far as it gets, so the mean over a disc counts.
   vec3 through = vec3(0.0);
   vec2 aside = scatter_radius * around();
@@ -344,7 +344,7 @@ void main() {
 #ifdef FLAT_INSIDE
   if (!gl_FrontFacing) light = 0.5 * albedo * (sky_light + 0.5 * key_light);
 #endif
-#ifdef VEILED
+#ifdef TRANSPARENT
   float covered = sheet == 1 ? 1.0 - pow(1.0 - opacity, 1.0 / n_v) : opacity;  // Beer and Lambert
 #if SAMPLES_A_LIST == 1
   put(ivec2(gl_FragCoord.xy), 1u, vec4(light * covered, covered), gl_FragCoord.z);
@@ -424,21 +424,21 @@ const char* const line_fragment_shader = R"(
 noperspective in float across;
 uniform vec4 line_color;    // straight
 uniform float half_width;   // samples
-#ifdef VEILED
+#ifdef TRANSPARENT
 layout(early_fragment_tests) in;
-uniform int putting;        // 1: what lies before a veil is put into its list; 0: the rest is drawn
+uniform int putting;        // 1: what lies before a transparent surface is put into its list; 0: the rest is drawn
 #endif
 out vec4 color;
 void main() {
   float cover = line_color.a * clamp(half_width + 0.5 - abs(across), 0.0, 1.0);
   color = vec4(line_color.rgb * cover, cover);
-#ifdef VEILED
-  // Just before the nearest veil behind it. Lines that are there already have the depth of their veil.
-  float veil = 2.0;
+#ifdef TRANSPARENT
+  // Just before the nearest transparent surface behind it. Lines that are there already have the depth of their transparent surface.
+  float behind = 2.0;
   for (uint i = heads[list(LIST)]; i != 0u; i = after(i))
-    if (covers(i, SAMPLE) && fragments[i - 1u].depth > gl_FragCoord.z) veil = min(veil, fragments[i - 1u].depth);
-  if (putting == 1 && veil < 2.0 && cover > 0.0) put(LIST, SAMPLE, color, veil);
-  if (veil < 2.0) color = vec4(0.0);
+    if (covers(i, SAMPLE) && fragments[i - 1u].depth > gl_FragCoord.z) behind = min(behind, fragments[i - 1u].depth);
+  if (putting == 1 && behind < 2.0 && cover > 0.0) put(LIST, SAMPLE, color, behind);
+  if (behind < 2.0) color = vec4(0.0);
 #endif
 }
 )";

@@ -103,7 +103,7 @@ TubeModel read_tube(const Node& table, const std::string& what) {
              what +
                  ".path_m ends where it begins, and such a ring is solid; leave wall_m out, or move its last "
                  "point");
-  const double length = length_m(model), bend = least_bend_radius_m(model);
+  const double length = length_m(model), bend = min_bend_radius_m(model);
   if (!(length > model.diameter_m))
     complain(path, fmt::format("{} is {:.3g} m long, no longer than it is thick; move its points apart", what,
                                length));

@@ -195,7 +195,9 @@ constexpr Key all_keys[] = {
      "bone 0.65, fabric 0.9, skin 0.55",
      "", ""},
     {"bodies[].triangles", Type::integer, from_to(100, 10'000'000), 0, may_lack,
-     "scenery: its surface is simplified to about so many, for film; veils cost by the triangle", "", ""},
+     "scenery: its surface is simplified to about so many, for film; transparent surfaces cost by the "
+     "triangle",
+     "", ""},
     {"bodies[].metallic", Type::number, share, 0, "0.0", "1: reflects in its own colour and scatters nothing",
      "", ""},
 

@@ -181,7 +181,7 @@ TEST_F(Story_slow, APaneStandsWhereAWallIsTouchedAndNowhereElse) {
     shown += changed > 0;
   }
   EXPECT_GT(shown, 20);
-  // A veil of no pass.
+  // A transparent surface of no pass.
   const render::Raster16 object = render::read_png_16(frame(fmt::format("{:04}.object.png", 40)));
   for (const std::uint16_t level : object.levels) ASSERT_TRUE(level == 0 || level == 257);
   // The floor is drawn already.

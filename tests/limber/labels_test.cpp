@@ -13,7 +13,7 @@
 namespace limber::detail {
 namespace {
 
-// A ball that flies behind a wall and past three others, before a veil.
+// A ball that flies behind a wall and past three others, before a transparent surface.
 constexpr const char* text = R"(name = "names"
 [world]
 bounds_m = [[-3, -3, -2], [3, 3, 2]]

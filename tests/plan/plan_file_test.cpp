@@ -325,7 +325,7 @@ TEST_F(PlanFileTest, NumbersThatNoPlanHasAreInputErrors) {
       {"node 1 is at step", [](Plan& p) { ++p.tree.controls[1].steps; }},
       {"node 1 is of iteration", [](Plan& p) { p.tree.iterations[1] = std::int64_t(1) << 62; }},
       {"statistics.iterations", [](Plan& p) { p.statistics.iterations = std::int64_t(1) << 62; }},
-      {"statistics.iterations", [](Plan& p) { p.statistics.iterations = most_iterations + 1; }},
+      {"statistics.iterations", [](Plan& p) { p.statistics.iterations = iteration_limit + 1; }},
       {"statistics.diverged", [](Plan& p) { p.statistics.diverged = -1; }},
       {"best_distance_m", [](Plan& p) { p.best_distance_m = -1; }},
       {"max_iterations", [](Plan& p) { p.settings.max_iterations = std::int64_t(1) << 62; }},

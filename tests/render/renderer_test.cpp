@@ -424,7 +424,7 @@ Eigen::Vector4d over(const Eigen::Vector4d& front, const Eigen::Vector4d& back) 
   return front + (1 - front[3]) * back;
 }
 
-TEST(Renderer, AVeilShowsItsFrontAndItsBackLayer) {
+TEST(Renderer, ATransparentSurfaceShowsItsFrontAndItsBackLayer) {
   const SurfaceMesh ball = sphere_mesh({0, 0, 0}, 0.5, 30);
   for (const bool multisampling : {false, true}) {
     RenderSettings look = small_look();
@@ -436,9 +436,10 @@ TEST(Renderer, AVeilShowsItsFrontAndItsBackLayer) {
   }
 }
 
-// Two veils that pass through each other, a third behind them and something opaque: as if each were drawn
-// alone and the four pictures laid over one another, nearest first, whatever the order they were added in.
-TEST(Renderer, VeilsAreSortedWithinEachPixel) {
+// Two transparent surfaces that pass through each other, a third behind them and something opaque: as if each
+// were drawn alone and the four pictures laid over one another, nearest first, whatever the order they were
+// added in.
+TEST(Renderer, TransparentSurfacesAreSortedWithinEachPixel) {
   const MeshLook red{"red", {0.9, 0.2, 0.1}, 0.5, 0, 0.4}, green{"green", {0.2, 0.8, 0.1}, 0.5, 0, 0.3},
       blue{"blue", {0.1, 0.2, 0.9}, 0.5, 0, 0.45}, solid{"solid", {0.7, 0.7, 0.7}};
   const SurfaceMesh falling = quad_mesh({-1, -0.5, -1}, {1, 0.5, -1}, {1, 0.5, 1}, {-1, -0.5, 1}),
@@ -469,7 +470,7 @@ TEST(Renderer, VeilsAreSortedWithinEachPixel) {
 
 // Of two sheets that meet in an edge and lie on one side of it, the nearer hides the farther up to the edge,
 // in the pixels of which the middle lies beyond it too.
-TEST(Renderer, AlongAVeilsOutlineItsNearSideIsInFront) {
+TEST(Renderer, AlongATransparentSurfacesOutlineItsNearSideIsInFront) {
   const Vec3 left(-1, 0, -0.13), right(1, 0, 0.21), up(0, 0, 1);
   for (const bool multisampling : {false, true}) {
     RenderSettings look = small_look();
@@ -495,9 +496,9 @@ TEST(Renderer, AlongAVeilsOutlineItsNearSideIsInFront) {
   }
 }
 
-// A veil that enters something opaque is seen up to there, to a sample: where the line of entry passes
-// between the samples of a pixel, half of them show it.
-TEST(Renderer, AVeilIsSeenUpToWhereItEntersSomethingOpaque) {
+// A transparent surface that enters something opaque is seen up to there, to a sample: where the line of
+// entry passes between the samples of a pixel, half of them show it.
+TEST(Renderer, ATransparentSurfaceIsSeenUpToWhereItEntersSomethingOpaque) {
   const Camera camera = camera_from({0, -5, 0});
   const MeshLook veil{"veil", {0.2, 0.9, 0.3}, 0.5, 0, 0.4}, solid{"solid", {0.7, 0.3, 0.3}};
   for (const auto& [supersampling, multisampling] :
@@ -516,7 +517,7 @@ TEST(Renderer, AVeilIsSeenUpToWhereItEntersSomethingOpaque) {
     add(renderer, slanting, veil);
     add(renderer, upright_quad(0), solid);
     const Image image = renderer.draw(camera);
-    const auto seen = [&](int x) {  // share of the veil's samples
+    const auto seen = [&](int x) {  // share of the transparent surface's samples
       const Eigen::Vector4d none = rgba(behind, x, 120), all = over(rgba(before, x, 120), none);
       return (rgba(image, x, 120) - none).dot(all - none) / (all - none).squaredNorm();
     };
@@ -527,7 +528,7 @@ TEST(Renderer, AVeilIsSeenUpToWhereItEntersSomethingOpaque) {
 }
 
 // Each one is seen, also where they are too many to be held for the whole picture at once.
-TEST(Renderer, EveryLayerOfVeilsCounts) {
+TEST(Renderer, EveryTransparentLayerCounts) {
   constexpr double opacity = 0.03;
   for (const int layers : {2, 11, 30}) {
     Renderer renderer(small_look());
@@ -540,9 +541,9 @@ TEST(Renderer, EveryLayerOfVeilsCounts) {
   }
 }
 
-// Three veils, a line before, between or behind them, drawn across something opaque: as if each were drawn
-// alone and the pictures laid over one another. Where no line is, nothing changes.
-TEST(Renderer, AVeilWhoseOpacityIsSetIsAsIfMadeSoAndOfNoneIsNotThere) {
+// Three transparent surfaces, a line before, between or behind them, drawn across something opaque: as if
+// each were drawn alone and the pictures laid over one another. Where no line is, nothing changes.
+TEST(Renderer, ATransparentSurfaceWhoseOpacityIsSetIsAsIfMadeSoAndOfNoneIsNotThere) {
   const Camera camera = camera_from({0, -5, 0});
   const SurfaceMesh ball = sphere_mesh(Vec3::Zero(), 0.6, 24),
                     pane = quad_mesh({-1, -2, -1}, {1, -2, -1}, {1, -2, 1}, {-1, -2, 1});
@@ -561,7 +562,7 @@ TEST(Renderer, AVeilWhoseOpacityIsSetIsAsIfMadeSoAndOfNoneIsNotThere) {
   EXPECT_EQ(picture(0.7, 0), picture({}, {}));
 }
 
-TEST(Renderer, ALineBetweenVeilsIsVeiledByThoseBeforeItAlone) {
+TEST(Renderer, ALineBetweenTransparentSurfacesIsDimmedByThoseBeforeItAlone) {
   const Camera camera = camera_from({0, -5, 0});
   const LineLook line_look{{0.9, 0.1, 0.1}, 8, 0.7};
   const auto line_at = [](double y) {
@@ -589,7 +590,7 @@ TEST(Renderer, ALineBetweenVeilsIsVeiledByThoseBeforeItAlone) {
       return renderer.draw(camera);
     };
     const Image without = with_line({});
-    for (int before = 0; before < 4; ++before) {  // veils before the line
+    for (int before = 0; before < 4; ++before) {  // transparent surfaces before the line
       const double y = before - 0.5;
       Renderer line_alone(look);
       line_alone.add_lines(line_at(y), line_look);
@@ -608,7 +609,7 @@ TEST(Renderer, ALineBetweenVeilsIsVeiledByThoseBeforeItAlone) {
   }
 }
 
-TEST(Renderer, ALineBehindAVeilIsVeiledAndOneBeforeItIsNot) {
+TEST(Renderer, ALineBehindATransparentSurfaceIsDimmedAndOneBeforeItIsNot) {
   RenderSettings look = small_look();
   look.transparent_background = true;
   const MeshLook veil{"veil", {0, 0, 1}, 1, 0, 0.45};
@@ -795,8 +796,9 @@ TEST(Renderer, TheFaceOfACutIsWhereTheSurfaceIsWoundRound) {
     }
 }
 
-// A ray through a cut veil passes two layers, the face and what is behind it, as through the whole one.
-TEST(Renderer, AVeilThatIsCutIsClosedToo) {
+// A ray through a cut transparent surface passes two layers, the face and what is behind it, as through the
+// whole one.
+TEST(Renderer, ATransparentSurfaceThatIsCutIsClosedToo) {
   const RenderSettings look = small_look();
   const Camera camera = camera_from({0, -4, 0});
   const SurfaceMesh ball = sphere_mesh({0, 0, 0}, 0.5, 60);
@@ -967,7 +969,7 @@ TEST(Renderer, SeveralThreadsDrawTheSameBytes) {
   for (const Image& image : images) EXPECT_TRUE(image.rgba == expected.rgba);
 }
 
-// Of something solid, something with colours, and veils.
+// Of something solid, something with colours, and transparent surfaces.
 std::string picture_hash() {
   const SurfaceMesh sphere = sphere_mesh({0, 0, 0.5}, 0.5, 60),
                     small = sphere_mesh({0.5, -0.3, 0.2}, 0.2, 30);
@@ -1019,8 +1021,9 @@ TEST(Renderer, BadLooksAreRefused) {
   EXPECT_THROW(renderer.add_mesh(box.triangles, box.positions, {"box"}), InputError);
 }
 
-// Through a veil its underside is seen: whole, not in flecks, where that dips in and out of the ground.
-TEST(Renderer, AVeilsUndersideStaysWholeWhereItSinksIntoTheGround) {
+// Through a transparent surface its underside is seen: whole, not in flecks, where that dips in and out of
+// the ground.
+TEST(Renderer, ATransparentSurfacesUndersideStaysWholeWhereItSinksIntoTheGround) {
   RenderSettings look = small_look();
   look.ground_height_m = 0;
   look.stage = Box{Vec3(-2, -2, 0), Vec3(2, 2, 2)};

@@ -47,7 +47,7 @@ struct RunRecord {
   double deepest_penetration_percent = 0;
   double deepest_overlap_of_robot_size = 0, deepest_self_overlap_of_robot_size = 0;
   Gap gap_at_contact;
-  double least_stretch = 1, largest_stretch = 1, largest_force_n = 0;
+  double min_stretch = 1, largest_stretch = 1, largest_force_n = 0;
   int threads = 1;
   std::string host;
   RunIdentity identity;
@@ -60,7 +60,7 @@ struct RunRecord {
     f("deepest_penetration_percent", deepest_penetration_percent);
     f("deepest_overlap_of_robot_size", deepest_overlap_of_robot_size);
     f("deepest_self_overlap_of_robot_size", deepest_self_overlap_of_robot_size);
-    f("gap_at_contact", gap_at_contact), f("least_stretch", least_stretch);
+    f("gap_at_contact", gap_at_contact), f("least_stretch", min_stretch);
     f("largest_stretch", largest_stretch), f("inverted_tets", inverted_tets);
     f("largest_force_n", largest_force_n), f("threads", threads), f("host", host);
     f("identity", identity);

@@ -83,7 +83,7 @@ BenchGroup report_of_group(const Runs& runs) {
     const RunRecord::Gap& gap = run->gap_at_contact;
     if (gap.pairs_and_frames > 0) medians.push_back(100 * gap.median_of_robot_size.value_or(0));
     group.largest_gap_percent = std::max(group.largest_gap_percent, 100 * gap.worst_of_robot_size);
-    group.least_stretch = std::min(group.least_stretch, run->least_stretch);
+    group.min_stretch = std::min(group.min_stretch, run->min_stretch);
     group.inverted_tets += run->inverted_tets;
   }
   if (!medians.empty()) group.median_gap_percent = quartiles(medians)[1];

@@ -12,10 +12,10 @@ struct FileIdentity {
     std::string name;
     double gap = 0;
     int rounds = 0;
-    double least_island = 0;
+    double min_island = 0;
     template <class Fields>
     void fields(Fields& f) {
-      f("name", name), f("gap", gap), f("rounds", rounds), f("least_island", least_island);
+      f("name", name), f("gap", gap), f("rounds", rounds), f("least_island", min_island);
     }
   };
   std::string file_hash;

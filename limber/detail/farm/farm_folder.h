@@ -157,7 +157,9 @@ class FarmFolder {
 struct Best {
   std::int64_t iterations;
   std::uint64_t seed;
-  std::int64_t most_of(std::uint64_t for_seed) const { return for_seed < seed ? iterations : iterations - 1; }
+  std::int64_t iterations_to_beat(std::uint64_t for_seed) const {
+    return for_seed < seed ? iterations : iterations - 1;
+  }
 };
 std::optional<Best> best_search(const FarmFolder&);
 

@@ -17,7 +17,7 @@ namespace limber::detail {
 namespace {
 
 constexpr int between_workers_us = 20000;
-constexpr int most_crashes = 50;                // of all workers together; a unit gives up long before
+constexpr int max_crashes = 50;                 // of all workers together; a unit gives up long before
 constexpr double patience_with_stopped_s = 20;  // with those that are told to stop: a search is kept
 constexpr double between_counts_s = 0.5;
 
@@ -82,7 +82,7 @@ class Workers {
     const bool crashed = code > exit_signal && code != exit_signal + SIGTERM && code != exit_signal + SIGINT;
     if (!crashed) return;
     log::warn("worker {} was ended by the signal {}; another goes on", w + 1, code - exit_signal);
-    if (++crashes_ > most_crashes)
+    if (++crashes_ > max_crashes)
       throw InputError(
           fmt::format("workers were killed or crashed {} times; see {}", crashes_, farm_.logs().string()));
     start(w);

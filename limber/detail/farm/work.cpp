@@ -33,8 +33,8 @@ namespace limber::detail {
 
 namespace {
 
-constexpr int most_taken = 5;   // a unit whose owners were killed that often kills them
-constexpr int most_rounds = 3;  // in which missing frames are sent once more
+constexpr int max_taken = 5;   // a unit whose owners were killed that often kills them
+constexpr int max_rounds = 3;  // in which missing frames are sent once more
 constexpr int between_turns_us = 100000;
 constexpr double between_saves_s = 300;  // of a search
 constexpr double between_asks_s = 0.5;
@@ -85,7 +85,7 @@ class SearchWatcher final : public EndWatcher {
  private:
   bool is_over() override {
     const std::optional<Best> best = best_search(farm_);
-    return (best && iterations_ >= best->most_of(seed_)) || elapsed_s(began_) > between_saves_s;
+    return (best && iterations_ >= best->iterations_to_beat(seed_)) || elapsed_s(began_) > between_saves_s;
   }
   const std::uint64_t seed_;
   std::atomic<std::int64_t> iterations_{0};
@@ -172,10 +172,10 @@ class Worker {
         known_done_.insert(unit.name);
         continue;
       }
-      if (owner && owner->taken >= most_taken) {
+      if (owner && owner->taken >= max_taken) {
         farm_.mark_failed(unit, {"crash",
                                  fmt::format("{} processes that did it were killed or crashed; see {}",
-                                             most_taken, farm_.logs().string()),
+                                             max_taken, farm_.logs().string()),
                                  exit_defect});
         return Step::did_one;
       }
@@ -199,7 +199,7 @@ class Worker {
   // long at it.
   Step send_again() {
     const int rounds = farm_.jobs().rounds;
-    if (rounds < most_rounds && slurm_is_there()) {
+    if (rounds < max_rounds && slurm_is_there()) {
       log::warn("some of it is missing; it is sent once more");
       send_to_slurm(farm_, rounds + 1);
       return Step::sent;
@@ -380,7 +380,7 @@ class Worker {
     std::optional<plan::Plan> searched = search_to_go_on_with(unit, settings);
     while (true) {
       const std::optional<Best> best = best_search(farm_);
-      settings.max_iterations = best ? std::min(most, best->most_of(unit.seed)) : most;
+      settings.max_iterations = best ? std::min(most, best->iterations_to_beat(unit.seed)) : most;
       const std::int64_t done = searched ? searched->statistics.iterations : 0;
       if (settings.max_iterations < most && done >= settings.max_iterations) {
         fs::remove(file, none);
@@ -397,7 +397,7 @@ class Worker {
       const bool at_end = searched->ending == plan::Ending::iterations && settings.max_iterations == most;
       if (!searched->solved() && !at_end && best_search(farm_)) {
         const std::optional<Best> now = best_search(farm_);
-        if (searched->statistics.iterations >= now->most_of(unit.seed)) continue;  // beaten
+        if (searched->statistics.iterations >= now->iterations_to_beat(unit.seed)) continue;  // beaten
       }
       plan::write_plan(file, *searched, Json::object());
       if (searched->solved() || at_end) {
@@ -445,7 +445,7 @@ class Worker {
     for (const Unit& unit : farm_.units(Stage::search)) {
       const bool won = best && unit.seed == best->seed;
       const std::int64_t iterations = won    ? best->iterations
-                                      : best ? std::max<std::int64_t>(0, best->most_of(unit.seed))
+                                      : best ? std::max<std::int64_t>(0, best->iterations_to_beat(unit.seed))
                                              : most;
       report.searches.push_back({unit.seed, iterations, won});
       report.iterations += iterations;

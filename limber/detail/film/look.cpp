@@ -50,14 +50,14 @@ Light light_of(scenes::FilmLook look) {
   LIMBER_CHECK(false, int(look));
 }
 
-struct Stuff {
+struct Substance {
   double translucency, scatter;  // of the body's size
   double sheen;
   double grain, wavelength;  // of the body's size
   bool woven;
 };
 
-Stuff stuff_of(scenes::BodyLook look) {
+Substance substance_of(scenes::BodyLook look) {
   switch (look) {
     case scenes::BodyLook::plain:
       return {0, 0.03, 0, 0, 0.01, false};
@@ -88,19 +88,19 @@ void set_light(render::RenderSettings& look, const scenes::FilmSpec& film) {
 }
 
 render::MeshLook look_of(const scenes::BodySpec& body, double size_m) {
-  const Stuff stuff = stuff_of(body.look);
+  const Substance substance = substance_of(body.look);
   return {.name = body.name,
           .color_srgb = body.color_srgb,
           .roughness = body.roughness,
           .metallic = body.metallic,
           .opacity = body.opacity,
           .sheet = true,
-          .translucency = stuff.translucency,
-          .scatter_m = stuff.scatter * size_m,
-          .sheen = stuff.sheen,
-          .grain = stuff.grain,
-          .grain_m = stuff.wavelength * size_m,
-          .woven = stuff.woven};
+          .translucency = substance.translucency,
+          .scatter_m = substance.scatter * size_m,
+          .sheen = substance.sheen,
+          .grain = substance.grain,
+          .grain_m = substance.wavelength * size_m,
+          .woven = substance.woven};
 }
 
 }  // namespace limber::detail

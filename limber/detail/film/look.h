@@ -10,7 +10,7 @@ namespace limber::detail {
 void set_light(render::RenderSettings&, const scenes::FilmSpec&);
 
 // size_m: of the body's surface at rest, corner to corner of its box; reliefs and the depth to which light
-// gets are shares of it, so that a toy and an organ are seen to be of the same stuff.
+// gets are shares of it, so that a toy and an organ are seen to be of the same material.
 render::MeshLook look_of(const scenes::BodySpec&, double size_m);
 
 }  // namespace limber::detail

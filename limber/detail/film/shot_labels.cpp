@@ -26,13 +26,13 @@ namespace limber::detail {
 namespace {
 
 constexpr int sight_width = 480, max_sights = 48, max_ends = 400, max_moments = 12;
-constexpr double sight_every_s = 0.3, least_act_s = 2, fade_s = 0.3;  // of the film
-constexpr double most_hidden = 0.15;                                  // of an act that is not parted
-constexpr int least_pixels = 6;        // of a body that is seen, in a small picture
-constexpr double deep_enough = 0.03;   // of the picture's height, within what is seen of a body
-constexpr double aside_price = 0.5;    // of an end as far as the picture is wide from its name
-constexpr double over_others = 0.25;   // what an end on a veil before something opaque is worth
-constexpr double widest_words = 0.26;  // of the picture
+constexpr double sight_every_s = 0.3, min_act_s = 2, fade_s = 0.3;  // of the film
+constexpr double max_hidden = 0.15;                                 // of an act that is not parted
+constexpr int min_pixels = 6;         // of a body that is seen, in a small picture
+constexpr double deep_enough = 0.03;  // of the picture's height, within what is seen of a body
+constexpr double aside_price = 0.5;   // of an end as far as the picture is wide from its name
+constexpr double over_others = 0.25;  // what an end on a transparent surface before something opaque is worth
+constexpr double widest_words = 0.26;                                     // of the picture
 constexpr double letter_share = 1 / 58.0, small_letter_share = 1 / 36.0;  // of its height: words are not less
 constexpr double readable_px = 8;  // than readable while they are small
 
@@ -62,7 +62,7 @@ std::vector<Eigen::Index> spread_over_area(const SurfaceMesh& mesh, int count) {
 struct Shot::Labeling {
   struct Named {
     int number;  // of bodies and scenery
-    bool veil;
+    bool transparent;
     double size_m;
     std::vector<Eigen::Index> ends;  // triangles
     std::vector<render::Plane> cuts;
@@ -165,9 +165,9 @@ struct Shot::Labeling {
         }
     for (const Named& label : labels) {
       render::Sight own = opaque;
-      if (label.veil && spec_of(label.number).opacity > 0)
+      if (label.transparent && spec_of(label.number).opacity > 0)
         lay(own, camera, label.number, positions_of(label.number));
-      const std::vector<int>& clear = label.veil ? clearances(own) : clear_of_opaque;
+      const std::vector<int>& clear = label.transparent ? clearances(own) : clear_of_opaque;
       made.pixels.push_back(int(std::count(own.object.begin(), own.object.end(), label.number)));
       std::vector<Look>& looks = made.at.emplace_back();
       for (const Eigen::Index t : label.ends) {
@@ -175,7 +175,7 @@ struct Shot::Labeling {
         const Vec3 place = middle_of(positions_of(label.number), t, mesh_of(label.number).triangles);
         const Vec3 pixel = pixel_from_world(camera, place, width(), height());
         look.pixel = scale * pixel.head<2>();
-        if (made.pixels.back() < least_pixels || pixel.z() <= 0 || cut_off(label, place)) continue;
+        if (made.pixels.back() < min_pixels || pixel.z() <= 0 || cut_off(label, place)) continue;
         const int x = int(std::floor(pixel.x())), y = int(std::floor(pixel.y()));
         if (x < 0 || x >= width() || y < 0 || y >= height()) continue;
         const std::size_t at = own.at(x, y);
@@ -187,7 +187,7 @@ struct Shot::Labeling {
                         [&](const auto& box) { return lies_in(box, look.pixel); }))
           continue;
         look.worth = std::min(1.0, clear[at] / (deep_enough * height()));
-        if (label.veil && opaque.object[at] >= 0) look.worth *= over_others;
+        if (label.transparent && opaque.object[at] >= 0) look.worth *= over_others;
       }
     }
     return made;
@@ -261,7 +261,7 @@ struct Shot::Labeling {
     int all = 0, hidden = 0;
     for (int s = first; s <= last; ++s)
       for (std::size_t l = 0; l < labels.size(); ++l) {
-        if (sights[std::size_t(s)].pixels[l] < least_pixels) continue;
+        if (sights[std::size_t(s)].pixels[l] < min_pixels) continue;
         ++all;
         bool shown = act.places[l] && seen(l, act.end[l], s) &&
                      clear_of_words(*act.places[l], pixel(l, act.end[l], s));
@@ -280,7 +280,7 @@ struct Shot::Labeling {
     Act whole = act_of(first, last);
     const double seconds =
         double(frames[std::size_t(last)] - frames[std::size_t(first)]) / shot.scene_.film.frames_per_second;
-    if (whole.hidden <= most_hidden || seconds < 2 * least_act_s || last - first < 3) return {whole};
+    if (whole.hidden <= max_hidden || seconds < 2 * min_act_s || last - first < 3) return {whole};
     const int middle = (first + last + 1) / 2;
     std::vector<Act> acts = acts_between(first, middle - 1);
     for (Act& act : acts_between(middle, last)) acts.push_back(std::move(act));

@@ -99,7 +99,7 @@ ModelOptions words_of(const FileIdentity& identity, const fs::path& file) {
   words.scale = identity.scale, words.y_up = identity.y_up;
   if (const auto& label = identity.label) {
     words.label = label->name, words.label_gap = label->gap;
-    words.label_rounds = label->rounds, words.min_island = label->least_island;
+    words.label_rounds = label->rounds, words.min_island = label->min_island;
   }
   return words;
 }

@@ -1,17 +1,17 @@
-// Veils (bodies of opacity below 1) and lines, laid over what is opaque.
+// Transparent surfaces (bodies of opacity below 1) and lines, laid over what is opaque.
 //
 // All that a pixel shows half transparent goes into a list of its own, with its depth and the samples that it
 // covers: Carpenter's A-buffer (1984), as linked lists on the card (Yang et al. 2010; detail/layer_lists.h).
-// Each list is then laid over the samples front to back. So any number of veils, inside or through one
-// another, is in order in each sample, and triangles are drawn once. (Depth peeling, which draws all of them
-// twice a layer, took twice as long.) A triangle is shaded once a pixel, by a rasterizer of four samples a
-// pixel that draws into nothing; the shader itself asks which samples something opaque hides. (Shading each
-// sample took twice as long.) That is so with four samples a pixel; with another number of them each sample
-// has a list of its own and is shaded.
+// Each list is then laid over the samples front to back. So any number of transparent surfaces, inside or
+// through one another, is in order in each sample, and triangles are drawn once. (Depth peeling, which draws
+// all of them twice a layer, took twice as long.) A triangle is shaded once a pixel, by a rasterizer of four
+// samples a pixel that draws into nothing; the shader itself asks which samples something opaque hides.
+// (Shading each sample took twice as long.) That is so with four samples a pixel; with another number of them
+// each sample has a list of its own and is shaded.
 //
 // Lines are quads of constant width on the screen with a soft edge (detail/line_quads.h). Where there are
-// veils, what of a line lies before one is put into the list just before the nearest veil behind it.
-// Method: docs/rendering.md, 7 and 9.
+// transparent surfaces, what of a line lies before one is put into the list just before the nearest
+// transparent surface behind it. Method: docs/rendering.md, 7 and 9.
 //
 // Colours are premultiplied, so what lies in front is added as color + (1 − alpha) · what is behind.
 #define GL_GLEXT_PROTOTYPES
@@ -28,9 +28,9 @@ using detail::line_corner_floats;
 using detail::line_quads;
 using detail::Screen;
 
-// All samples that veils may cover: the rectangle round their boxes on the screen; all of the picture where a
-// box reaches behind the eye, whose corners there have no place on the screen.
-Renderer::Impl::Rectangle Renderer::Impl::place_of_veils() const {
+// All samples that transparent surfaces may cover: the rectangle round their boxes on the screen; all of the
+// picture where a box reaches behind the eye, whose corners there have no place on the screen.
+Renderer::Impl::Rectangle Renderer::Impl::extent_of_transparent() const {
   const SampleGrid grid = sample_grid(settings);
   Eigen::Array2d lower(1, 1), upper(-1, -1);  // of the screen, −1 … 1
   for (const Mesh& mesh : meshes)
@@ -52,8 +52,9 @@ Renderer::Impl::Rectangle Renderer::Impl::place_of_veils() const {
           std::min(sample(upper.y(), grid.height) + 1, grid.height)};
 }
 
-// Puts what the veils show in these rows of lists into them, whatever is not hidden by the opaque.
-void Renderer::Impl::put_veils(int first_row, int rows) {
+// Puts what the transparent surfaces show in these rows of lists into them, whatever is not hidden by the
+// opaque.
+void Renderer::Impl::put_transparent(int first_row, int rows) {
   const bool a_pixel = four_samples.has_value();
   glBindFramebuffer(GL_FRAMEBUFFER, a_pixel ? targets.four_samples_frame() : targets.samples_frame);
   if (a_pixel) glViewport(0, 0, settings.width, settings.height);
@@ -63,7 +64,7 @@ void Renderer::Impl::put_veils(int first_row, int rows) {
   for (const Mesh& mesh : meshes) {
     if (!mesh.drawn() || !mesh.transparent()) continue;
     if (!a_pixel) stand_back_for_edges(mesh, settings.multisampling ? 1 : settings.supersampling);
-    draw_mesh(mesh, "#define VEILED\n" + with_lists, [&](const Program& program) {
+    draw_mesh(mesh, "#define TRANSPARENT\n" + with_lists, [&](const Program& program) {
       lists.set_uniforms(program);
       if (!a_pixel) return;
       program.set("opaque_depth", 7);
@@ -80,22 +81,22 @@ void Renderer::Impl::put_veils(int first_row, int rows) {
   glViewport(0, 0, grid.width, grid.height);
 }
 
-// Veils, and the lines before some of them, by lists of layers: each list is put over the samples front to
-// back.
+// Transparent surfaces, and the lines before some of them, by lists of layers: each list is put over the
+// samples front to back.
 //
 // Lists are made for a band of rows at a time, for OpenGL allows no buffer as large as many layers of a large
 // picture need (128 MB here: 8 million layers of pixels). How many layers a band has is known only after
 // they were put. Where they found no room, the buffer is made larger and the band drawn again; where it
 // cannot be larger, the band is halved.
-void Renderer::Impl::draw_veils() {
-  const Rectangle place = place_of_veils();
+void Renderer::Impl::draw_transparent() {
+  const Rectangle place = extent_of_transparent();
   glEnable(GL_SCISSOR_TEST);
   const int height = lists.rows(), row_samples = sample_grid(settings).height / height;
   int rows = lists.max_rows();
   for (int row = 0; row < height;) {
     rows = std::min(rows, height - row);
     lists.clear(row, rows);
-    put_veils(row, rows);
+    put_transparent(row, rows);
     const int top = row * row_samples, bottom = (row + rows) * row_samples;
     glScissor(0, top, sample_grid(settings).width, bottom - top);
     glColorMask(GL_FALSE, GL_FALSE, GL_FALSE, GL_FALSE);
@@ -138,7 +139,8 @@ void Renderer::Impl::draw_lines(LinePass pass) {
   glEnable(GL_BLEND);
   glBlendFunc(GL_ONE, GL_ONE_MINUS_SRC_ALPHA);
   glDepthMask(GL_FALSE);
-  const Program& p = line_programs.with(pass == LinePass::draw_all ? "" : "#define VEILED\n" + with_lists);
+  const Program& p =
+      line_programs.with(pass == LinePass::draw_all ? "" : "#define TRANSPARENT\n" + with_lists);
   p.use();
   if (pass != LinePass::draw_all) {
     lists.set_uniforms(p);
