@@ -1,3 +1,11 @@
+// Courses of controls: run, cut where something is due, brought to rest, and raced against one another.
+//
+//     controls ──► reach (interpolation until in the goal) ──► settle (until at rest) ──► ended
+//
+// What always holds: pieces are cut at frames, at looks for rest and, where a stop can end them, after a
+// while by the clock; a cut changes no state (fem: 100 steps are 40 and then 60), so the course is a function
+// of itself. A race ends a course once one that rests in the goal is cheaper, which changes who is looked at
+// and never who wins.
 #include "plan/control_rollout.h"
 
 #include <algorithm>
@@ -50,6 +58,7 @@ class Runner {
   double cost() const { return cost_in(course_.costs, options_.cost); }
   bool rests_in_goal() const { return ended() && course_.result == ControlRollout::rests_in_goal; }
 
+  // The next piece: to the end of the control, to the next frame, or as far as is allowed.
   void next(Rollout& rollout, int max_steps) const {
     rollout.from = &state_;
     rollout.control = control_;
@@ -57,6 +66,7 @@ class Runner {
         int(std::min<std::int64_t>({steps_left_, step_of_next_frame() - state_.step, max_steps}));
   }
 
+  // What became of it. First what it cost, then whether the state may be one of a plan, then what follows.
   void take(Rollout& rollout) {
     if (!rollout.ok) return end(ControlRollout::diverged);
     const int steps = rollout.control.steps;
@@ -96,6 +106,7 @@ class Runner {
     begin_control();
   }
 
+  // Controls of no step have ends, too: states and costs are one for each control.
   void begin_control() {
     const std::size_t done = course_.states.size();
     if (course_.next)
@@ -109,6 +120,7 @@ class Runner {
     if (steps_left_ == 0) end_of_piece();
   }
 
+  // Reaching follows the goal, and goes on for as long as the course may last.
   void begin_reach() {
     if (in_goal() || course_.reach_force_n == 0) return begin_settle();
     LIMBER_CHECK(course_.last_step < std::numeric_limits<std::int64_t>::max(), course_.last_step);
@@ -128,6 +140,7 @@ class Runner {
     settle_on();
   }
 
+  // Rest is looked for every 0.05 s. Where no settle is asked for, being in the goal is enough.
   void settle_on() {
     const bool rests = system_.mean_speed(state_) < settings_.settle.mean_speed_m_s,
                holds = system_.goal_holds(state_);

@@ -1,3 +1,13 @@
+// The grid's distances, its prices, its sheets, and Dijkstra's search from the goal.
+//
+// What always holds: the cost-to-go is a function of workspace, goal and prices, and equal costs go by the
+// number of the cell, so it is the same on any machine. No price is infinite: a robot that touches a wall has
+// a way out.
+//
+// A sheet is a copy of the grid for one reduced word of passages through holes: the graph is the grid
+// augmented by homotopy (Bhattacharya, Likhachev and Kumar, Autonomous Robots 2012). A way that unwinds what
+// it winds ends on the sheet on which it began. With one sheet a strand's end that turns back seems near
+// (docs/planning.md, "Windings").
 #include "plan/guidance.h"
 
 #include <algorithm>
@@ -17,7 +27,8 @@ constexpr double inside_rigid = 1000;  // price of a metre: never better than a 
 constexpr std::size_t max_sheets = 200;
 constexpr double bend = 3;  // of a strand's radius: bent so, its outside is stretched by a third
 
-// Lower envelope of parabolas, along one line of a grid.
+// Squared distances along one line of a grid: the lower envelope of the parabolas (x − q)² + f(q), each of
+// which is lowest from where it crosses the one before. Lines of x, then y, then z make distances in space.
 class LineTransform {
  public:
   explicit LineTransform(int longest)
@@ -71,6 +82,7 @@ std::vector<float> distance_in_cells(const Eigen::Vector3i& n, const std::vector
   return d;
 }
 
+// A strand goes round things in a bend, and not sharper than its radius lets it.
 Guidance::Guidance(const Workspace& space, const Vec3& goal, double soft_price, const Windings& start)
     : space_(space), goal_(goal) {
   LIMBER_CHECK(space.cells.minCoeff() > 0 && space.what.size() == std::size_t(space.cells.prod()),
@@ -87,6 +99,7 @@ Vec3 Guidance::center_of(int cell) const {
   return space_.box.lower + space_.cell_m * place;
 }
 
+// Of the nearest place in the box, where it is outside.
 int Guidance::cell_at(const Vec3& p) const {
   Eigen::Vector3i c;
   for (int i = 0; i < 3; ++i)
@@ -94,6 +107,9 @@ int Guidance::cell_at(const Vec3& p) const {
   return (c.z() * space_.cells.y() + c.y()) * space_.cells.x() + c.x();
 }
 
+// With c the clearance of a place and r the robot's radius, what of r is lacking is s = (r − c)/r, at most 2;
+// a metre costs 1 + price (s² of what is soft + 10 s² of what is rigid). So free places cost 1, and soft ones
+// can be pressed into at a price that grows with how much has to give way.
 void Guidance::set_prices(double soft_price) {
   std::vector<bool> soft(space_.what.size()), open(space_.what.size()), rigid(space_.what.size());
   for (std::size_t c = 0; c < space_.what.size(); ++c) {
@@ -148,6 +164,7 @@ void Guidance::set_sheets(const Windings& start) {
     }
 }
 
+// From the place to the middle of its cell the strand's end may pass through a hole, too.
 int Guidance::node_at(const Vec3& place, Windings windings) const {
   const int cell = cell_at(place);
   if (space_.holes.empty()) return cell;
@@ -238,6 +255,7 @@ Vec3 Guidance::ahead(const Vec3& place, double way_m, const Windings& windings) 
 
 double Guidance::price(const Vec3& place) const { return double(price_[std::size_t(cell_at(place))]); }
 
+// Of the cells within half the robot's radius, of one at least.
 void Guidance::raise(const Vec3& place, double by) {
   const double reach = std::max(0.5 * space_.robot_radius_m, space_.cell_m);
   for (int c = 0; c < int(price_.size()); ++c)

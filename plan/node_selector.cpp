@@ -1,3 +1,16 @@
+// Choosing a node: by distance or time to a random point (as LaValle and Kuffner's RRT does, IJRR 2001), or,
+// for draws that are guided, by the rank of a promise. The promise of a node, seconds, less is better, is
+//
+//     time to the goal over the grid + time_weight × time it took + child_price × children,
+//
+// the first by bang-bang thrust along the cheapest way and a stop of what moves across it. With children it
+// gets worse, so no node is tried for ever.
+//
+// What always holds: a choice is a function of the draw and of the nodes told of so far, in their order. Ties
+// go to the first node. Prices are learnt in a copy of the grid that is this object's own, from controls that
+// are in the tree.
+//
+// A guided draw takes the rank r with a probability that falls as 1/r.
 #include "plan/node_selector.h"
 
 #include <algorithm>
@@ -31,6 +44,7 @@ NodeSelector::NodeSelector(const System& system, const Settings& settings, const
                                    settings.search_options.soft_price);
 }
 
+// The strongest push there may be, on all of the robot's mass.
 Drive NodeSelector::strongest() const {
   const double carriers = system_.carriers() ? 2 : 1;
   return {
@@ -69,6 +83,7 @@ void NodeSelector::add(const Tree& tree, int of_tree) {
     learn(tree.controls[std::size_t(of_tree)], parent, node);
 }
 
+// By distance such a node is infinitely far, by time infinitely dear, and it has no rank.
 void NodeSelector::refuse(int of_tree) {
   const int node = of_tree - root_;
   LIMBER_CHECK(node > 0 && !refused_[std::size_t(node)], node);
@@ -94,6 +109,8 @@ void NodeSelector::rank_all() {
   std::sort(ranking_.begin(), ranking_.end());
 }
 
+// Along the way ahead the drive speeds up and brakes; what moves across it is to be stopped besides. Both are
+// for one point mass, so they are a promise and no bound.
 double NodeSelector::seconds_to_go(const Guidance& guidance, const Vec3& place, const Vec3& velocity,
                                    const Windings& windings) const {
   const double radius = guidance.workspace().robot_radius_m;
@@ -104,6 +121,7 @@ double NodeSelector::seconds_to_go(const Guidance& guidance, const Vec3& place, 
          time_to_stop(across, strongest());
 }
 
+// The formula at the top. Of two carriers the mean of both.
 double NodeSelector::heuristic(int node) const {
   const NodeMotion& at = motions_[std::size_t(node)];
   double to_go = 0;
@@ -139,6 +157,8 @@ void NodeSelector::learn(const Control& control, int parent, int node) {
 
 double NodeSelector::cost(const Sample& d, int of_tree) const { return cost_of(d, of_tree - root_); }
 
+// Metres squared, or seconds of a point mass in open space (plan/steering.h), seen from the goal where that
+// moves.
 double NodeSelector::cost_of(const Sample& d, int node) const {
   if (refused_[std::size_t(node)]) return std::numeric_limits<double>::infinity();
   if (settings_.search_options.metric == Metric::distance)
@@ -158,6 +178,7 @@ double NodeSelector::cost_of(const Sample& d, int node) const {
   return seconds + time_to_go(way, at.velocity - frame, strongest());
 }
 
+// All nodes in order, each first by a bound that is quickly told; with two carriers there is none.
 int NodeSelector::nearest_in_time(const Sample& d) const {
   int best = 0;
   double least = cost_of(d, 0);
@@ -192,6 +213,8 @@ Selection NodeSelector::aim(const Sample& d, int of_tree) const {
   return {of_tree, cost(d, of_tree), control(d, of_tree - root_)};
 }
 
+// Guided: ahead on each carrier's own way, and a little aside. Else the goal's pose, or a random point
+// between the carriers, who keep their distance at rest along a random direction.
 std::array<Vec3, 2> NodeSelector::carrier_targets(const Sample& d, int node) const {
   const NodeMotion& at = motions_[std::size_t(node)];
   std::array<Vec3, 2> targets;
@@ -210,6 +233,8 @@ std::array<Vec3, 2> NodeSelector::carrier_targets(const Sample& d, int node) con
   return targets;
 }
 
+// Guided: a push towards a place one to five radii ahead, or interpolation once that place is the goal. Else
+// towards the random point, or, where the laws do not steer, as Algorithm 1 draws it.
 Control NodeSelector::control(const Sample& d, int node) const {
   const NodeMotion& at = motions_[std::size_t(node)];
   if (d.manipulation == Manipulation::control_point && system_.carriers())

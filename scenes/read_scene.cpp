@@ -94,6 +94,7 @@ Scene read(const std::string& toml, const std::string& name_for_messages,
 
 }  // namespace
 
+// Complaints that are not collected are thrown by the first.
 Scene read_scene(const std::string& toml, const std::string& name_for_messages,
                  const std::vector<std::string>& sets, const ScriptText& script) {
   return read(toml, name_for_messages, sets, script, Complaints());

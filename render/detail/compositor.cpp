@@ -1,3 +1,15 @@
+// A row of the picture: samples averaged, then put over what is behind them.
+//
+//     pixel = Σ samples / n + (1 − α) × behind,
+//     behind = floor faded into the far ground, hazed into the horizon; or sky; or two colours of a
+//     background.
+//
+// The floor is not rasterized: where a pixel's ray meets it follows from the camera, and how much light
+// arrives there from two maps (ground_shade.h). Four pixels are taken at a time, and only those that no mesh
+// covers.
+//
+// What always holds: rows do not depend on one another, and √ is the exact one (Eigen's begins with an estimate that
+// differs between makes of CPU), so a picture has the same bytes on any machine.
 #include "render/detail/compositor.h"
 
 #include <Eigen/Geometry>
@@ -103,6 +115,7 @@ class Lookup {
 Compositor::Compositor(const Backdrop& backdrop, const Camera& camera, int width, int height)
     : backdrop_(backdrop), camera_(camera), width_(width), height_(height) {}
 
+// Samples that are 0 in all parts are most of the picture, and passed by.
 void Compositor::row(int y, const std::uint16_t* samples, int per_side, float* rgba) const {
   const std::size_t texels = std::size_t(width_) * std::size_t(per_side);
   const std::uint16_t* lowest = samples + 4 * texels * std::size_t(height_ - 1 - y) * std::size_t(per_side);
@@ -121,6 +134,9 @@ void Compositor::row(int y, const std::uint16_t* samples, int per_side, float* r
   put_over_ground(y, rgba);
 }
 
+// With o + s d the ray of a pixel, d = first + x × step: it meets the ground at s = eye height / −d·up. There
+// the floor fades by 1 − t² (3 − 2t), t from 0 to 1 between both ends of the fade, and the haze is r²/(r² +
+// haze²).
 void Compositor::put_over_ground(int y, float* rgba) const {
   const Backdrop& b = backdrop_;
   const double tangent = std::tan(0.5 * camera_.fov_deg * std::numbers::pi / 180);

@@ -1,3 +1,12 @@
+// Shadows on the ground, by bands of height (the idea: ground_shade.h). In order: a map that holds all that
+// the stage can cast; triangles projected along the light and put into bands, a cell's height between two;
+// each band blurred by its height; the sum.
+//
+// What always holds: a cell is marked by the most that any caster holds back there, and not by a sum, so a
+// body of many layers casts no darker shadow than its outline, and the order of casters does not count.
+//
+// The blur is three box filters (Wells, Efficient Synthesis of Gaussian Filters by Cascaded Uniform Filters,
+// 1986): its cost does not depend on how wide it is.
 #include "render/detail/ground_shade.h"
 
 #include <Eigen/Geometry>

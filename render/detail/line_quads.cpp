@@ -1,3 +1,7 @@
+// Each segment is cut in clip space, by the near plane and by the planes that open bodies, before it is
+// divided by w: an end behind the eye has no place on the screen. Then the quad is made in samples of the
+// screen, along ± the normal of what is left, and goes back to clip space with the w of each end, so that
+// depths stay those of the line.
 #include "render/detail/line_quads.h"
 
 #include <algorithm>
@@ -37,7 +41,7 @@ void line_quads(const Points& ends, const Screen& screen, double width_samples,
     const Eigen::Vector4d a = clip_first + left.from * (clip_second - clip_first),
                           b = clip_first + left.to * (clip_second - clip_first);
     const Eigen::Vector2d along = (b.head<2>() / b.w() - a.head<2>() / a.w()).cwiseProduct(half);
-    if (!(along.norm() > 1e-9)) continue;
+    if (!(along.norm() > 1e-9)) continue;  // it points at the eye
     const Eigen::Vector2d across = Eigen::Vector2d(-along.y(), along.x()).normalized() * reach;
     const auto corner = [&](const Eigen::Vector4d& end, double side) {
       const Eigen::Vector2d moved = end.head<2>() + side * across.cwiseQuotient(half) * end.w();
