@@ -8,8 +8,8 @@
 // arrives there from two maps (ground_shade.h). Four pixels are taken at a time, and only those that no mesh
 // covers.
 //
-// What always holds: rows do not depend on one another, and √ is the exact one (Eigen's begins with an estimate that
-// differs between makes of CPU), so a picture has the same bytes on any machine.
+// What always holds: rows do not depend on one another, and √ is the exact one (Eigen's begins with an
+// estimate that differs between makes of CPU), so a picture has the same bytes on any machine.
 #include "render/detail/compositor.h"
 
 #include <Eigen/Geometry>
