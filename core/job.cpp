@@ -22,9 +22,10 @@ bool is_at_terminal(const Context& context) { return context.watcher == &nobody;
 Job::Job(const Context& context)
     : watcher_(context.watcher),
       threads_(context.threads == 0 ? tbb::info::default_concurrency() : context.threads) {
-  if (context.threads < 0)
-    throw InputError(
-        fmt::format("threads is {}; it must be 0 (as many as the machine has) or more", context.threads));
+  constexpr int max_threads = 256;  // the command's, too
+  if (context.threads < 0 || context.threads > max_threads)
+    throw InputError(fmt::format("threads is {}; it must be in [0, {}], 0: as many as the machine has",
+                                 context.threads, max_threads));
 }
 
 void Job::progress(const std::string& stage, std::int64_t done, std::int64_t total, const std::string& note) {

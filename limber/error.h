@@ -1,5 +1,5 @@
-// What limber throws. Trouble goes to whoever can fix it: who calls (InputError, DiskError), or us
-// (InternalError).
+// What limber throws, beside std::bad_alloc where memory ends. Trouble goes to whoever can fix it: who calls
+// (InputError, DiskError), or us (InternalError).
 #pragma once
 
 #include <stdexcept>

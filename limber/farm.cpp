@@ -7,13 +7,17 @@
 #include "core/error.h"
 #include "limber/detail/farm/farm.h"
 #include "limber/detail/farm/work.h"
+#include "limber/detail/interface/ranges.h"
 #include "limber/detail/interface/working_for.h"
 
 namespace limber {
 
 using detail::working_for;
 
-std::string name_of(Stage stage) { return stage_names[std::size_t(stage)]; }
+std::string name_of(Stage stage) {
+  detail::require_in("the stage's number", int(stage), 0, int(stage_names.size()) - 1);
+  return stage_names[std::size_t(stage)];
+}
 
 Stage stage_named(const std::string& name) {
   const auto found = std::find(stage_names.begin(), stage_names.end(), name);

@@ -1,5 +1,7 @@
 #include "limber/mesh.h"
 
+#include <cmath>
+
 #include "core/error.h"
 #include "core/hash.h"
 #include "core/json_text.h"
@@ -79,6 +81,29 @@ std::vector<ConvexShell> detail::shells_of(const std::vector<Mesh>& hulls) {
   return shells;
 }
 
+namespace {
+
+void require_finite(const Vertices& nodes) {
+  for (std::size_t n = 0; n < nodes.size(); ++n)
+    for (const double x : nodes[n])
+      if (!std::isfinite(x)) throw InputError(fmt::format("node {} has a coordinate that is not finite", n));
+}
+
+// No vertex may lie beyond a face by more than rounding.
+void require_convex(const ConvexShell& hull, const std::string& what) {
+  const Vec3 size = hull.vertices.colwise().maxCoeff() - hull.vertices.colwise().minCoeff();
+  const double slack = 1e-5 * size.norm();
+  for (Eigen::Index t = 0; t < hull.triangles.rows(); ++t) {
+    const auto corner = [&](int k) { return Vec3(hull.vertices.row(hull.triangles(t, k)).transpose()); };
+    const Vec3 out = (corner(1) - corner(0)).cross(corner(2) - corner(0)).normalized();
+    if (((hull.vertices * out).array() - out.dot(corner(0))).maxCoeff() > slack)
+      throw InputError(fmt::format(
+          "{}: is not convex: a vertex lies beyond triangle {}; decompose() makes hulls", what, t));
+  }
+}
+
+}  // namespace
+
 ImportedMesh load_mesh(const std::filesystem::path& file, const ImportOptions& options,
                        const Context& context) {
   return working_for(context, [&] {
@@ -119,7 +144,10 @@ Cage build_cage(const Mesh& mesh, const std::vector<Mesh>& hulls, const CageOpti
     detail::require_in_range(settings);
     require_mesh(mesh, "mesh");
     const std::vector<ConvexShell> shells = detail::shells_of(hulls);
-    for (std::size_t h = 0; h < shells.size(); ++h) validate(shells[h], fmt::format("hull {}", h));
+    for (std::size_t h = 0; h < shells.size(); ++h) {
+      validate(shells[h], fmt::format("hull {}", h));
+      require_convex(shells[h], fmt::format("hull {}", h));
+    }
     const meshing::Cage made = detail::make_cage(surface_of(mesh), shells, settings, std::nullopt);
     Cage cage = cage_of(made.mesh, made.shell_from_tet);
     cage.volume_ratio = made.volume_ratio;
@@ -144,6 +172,7 @@ Binding bind(const Mesh& mesh, const Cage& cage, const Context& context) {
 }
 
 Vertices deform(const Binding& binding, const Tetrahedra& tets, const Vertices& nodes) {
+  require_finite(nodes);
   if (binding.weights.size() != binding.tet_from_vertex.size())
     throw InputError(fmt::format("binding: {} rows of weights and {} tets; there must be as many",
                                  binding.weights.size(), binding.tet_from_vertex.size()));
@@ -176,6 +205,7 @@ Vertices Body::deform(const Vertices& nodes) const {
   if (nodes.size() != impl_->cage.nodes.size())
     throw InputError(
         fmt::format("{} nodes are given, and the cage has {}", nodes.size(), impl_->cage.nodes.size()));
+  require_finite(nodes);
   Points moved;
   if (impl_->phong)
     ffd::deform_phong(impl_->bound, impl_->rest, impl_->gradients, detail::points_of(nodes), moved);

@@ -29,6 +29,13 @@ Scene::Scene(std::shared_ptr<const Impl> impl) : impl_(std::move(impl)) {}
 const std::string& Scene::name() const { return impl_->scene.name; }
 const std::string& Scene::text() const { return impl_->scene.text; }
 const std::string& Scene::robot() const { return impl_->scene.bodies[std::size_t(impl_->scene.robot)].name; }
+std::optional<Scene::Goal> Scene::goal() const {
+  if (!impl_->scene.lacks.empty()) return std::nullopt;
+  const scenes::Goal& goal = impl_->scene.goal;
+  const Vec3& at = goal.center_of_mass_m;
+  return Goal{{at.x(), at.y(), at.z()}, goal.radius_m};
+}
+double Scene::max_force_n() const { return impl_->scene.planner.max_force_n; }
 std::vector<std::string> Scene::bodies() const {
   std::vector<std::string> names;
   for (const scenes::BodySpec& body : impl_->scene.bodies) names.push_back(body.name);
@@ -85,6 +92,9 @@ void require_states(const States& states, int nodes) {
         "{} nodes, one step, and three positions and velocities a node",
         states.count, states.nodes, states.steps.size(), states.positions.size(), states.velocities.size(),
         nodes));
+  if (!states.sound.empty() && states.sound.size() != count)
+    throw InputError(fmt::format("states: {} of {} are said to be sound or not; give one each, or none",
+                                 states.sound.size(), count));
   for (std::size_t i = 0; i < count; ++i)
     if (states.steps[i] < 0 || states.steps[i] > largest_exact)
       throw InputError(

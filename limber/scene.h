@@ -26,6 +26,14 @@ class LIMBER_API Scene {
   const std::string& text() const;  // TOML, as it was read
   std::vector<std::string> bodies() const;
   const std::string& robot() const;
+  // Where the robot's centre of mass is to get, metres; nothing where the scene can only be simulated. The
+  // goal may ask more, and may move (docs/scene.md).
+  struct Goal {
+    std::array<double, 3> center_of_mass_m{};
+    double radius_m = 0;
+  };
+  std::optional<Goal> goal() const;
+  double max_force_n() const;  // that the planner may push the robot with
 
   struct Impl;
   explicit Scene(std::shared_ptr<const Impl>);
@@ -47,16 +55,20 @@ struct SceneSource {
   std::filesystem::path store = {};  // prepared bodies that models, scenes and machines share; empty: none
 };
 
-// Several states of a world. Node n of state s is at positions[3 (s · nodes + n)] and the two after it.
+// Several states of a world. Node n of state s is at positions[3 (s · nodes + n)] and the two after it. They
+// say nothing of which world they are: another with as many nodes takes them.
 struct States {
   int count = 0, nodes = 0;
   std::vector<std::int64_t> steps;           // (count) time = step × World's dt_s
   std::vector<float> positions, velocities;  // (count × nodes × 3), metres, metres a second
-  // (count) 0: the dynamics diverged, in this rollout or one before, and the state means nothing; else 1.
+  // (count) 0: the dynamics diverged, in this rollout or one before, and the state means nothing; else 1. Who
+  // makes states may leave all of it out.
   std::vector<std::uint8_t> sound;
 };
 
-// One push of the robot, held for `steps`. docs/planning.md.
+// One push of the robot, held for `steps`: no force; force_n on all of it; force_n on what is within radius_m
+// of `node`; towards target_m, each node to its place in the goal's shape or all alike, with at most
+// max_force_n. docs/planning.md.
 struct Push {
   enum class Kind : std::int32_t { none, body, control_point, interpolation, hold };
   Kind kind = Kind::none;
@@ -99,7 +111,7 @@ class LIMBER_API Problem {
   Range nodes_of(int body) const;
   States start(int copies = 1) const;
   // Each state pushed by the push of its number, on all threads. A result depends on its state and push
-  // alone. Throws InputError where numbers do not fit.
+  // alone. Throws InputError where numbers do not fit. A push may be stronger than the planner's max_force_n.
   States rollout(const States&, const std::vector<Push>&, const Context& = {}) const;
   std::vector<std::array<double, 3>> robot_centers(const States&) const;  // of mass, metres
 

@@ -13,7 +13,8 @@ namespace limber {
 class LIMBER_API Watcher {
  public:
   virtual ~Watcher();
-  // So much of a stage is done; `total` 0: nobody knows of how much. At most ten times a second.
+  // So much of a stage is done; `total` 0: nobody knows of how much. At most ten times a second. A stage may
+  // end before all is done: a search that has found its goal.
   virtual void progress(const std::string& stage, std::int64_t done, std::int64_t total,
                         const std::string& note);
   // Something that the user should know, and that ends nothing.
@@ -25,7 +26,7 @@ class LIMBER_API Watcher {
 // On whose behalf a call works. Results depend on none of it.
 struct Context {
   Watcher* watcher = nullptr;  // it outlives the call
-  int threads = 0;             // at most so many; 0: as many as the machine has
+  int threads = 0;             // at most so many, up to 256; 0: as many as the machine has
 };
 
 }  // namespace limber

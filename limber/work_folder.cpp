@@ -5,6 +5,7 @@
 #include "core/error.h"
 #include "core/json_text.h"
 #include "limber/detail/exports/export_motion.h"
+#include "limber/detail/interface/problem.h"
 #include "limber/detail/interface/ranges.h"
 #include "limber/detail/interface/working_for.h"
 #include "limber/detail/report/report.h"
@@ -20,6 +21,15 @@ std::vector<Promise> verify(const std::filesystem::path& folder, const std::stri
     VerifyOptions options;
     options.folder = folder, options.scene.scene = scene;
     return detail::verify(options).promises.rows();
+  });
+}
+
+std::vector<Promise> verify(const std::filesystem::path& folder, const Scene& scene, const Context& context) {
+  return working_for(context, [&] {
+    VerifyOptions options;
+    options.folder = folder;
+    const Scene::Impl& of = scene.impl();
+    return detail::verify(options, detail::TrustedScene{of.scene.name, of.scene, of.data}).promises.rows();
   });
 }
 

@@ -18,9 +18,14 @@ struct Promise {
   bool kept = false;
 };
 // Every promise that limber makes of a work folder or a body's folder, checked anew from its files: replayed,
-// searched again, measured. `scene`: a file or name of the one that the plan must be of; empty: its own word
-// is taken. Throws InputError where it is no such folder.
+// searched again (which takes as long as the search did), measured. `scene`: a file or name of the one that
+// the plan must be of, as it is without edits; empty: its own word is taken. Throws InputError where it is no
+// such folder.
 LIMBER_API std::vector<Promise> verify(const std::filesystem::path& folder, const std::string& scene = {},
+                                       const Context& = {});
+// The same with the scene that the plan must be of: edits, preset and folders of models as it was read with.
+// All keys must have the same values.
+LIMBER_API std::vector<Promise> verify(const std::filesystem::path& folder, const Scene&,
                                        const Context& = {});
 
 // What no promise is made of.
@@ -113,8 +118,8 @@ struct WrittenReport {
   FilmInPage film = FilmInPage::none;
   bool all_kept = false;  // promises, checked anew
 };
-// One page in HTML that needs nothing else; nothing: report.html in the folder. Throws as verify() does, or
-// DiskError.
+// One page in HTML that needs nothing else; nothing: report.html in the folder. Verifies, and takes as long.
+// Throws as verify() does, or DiskError.
 LIMBER_API WrittenReport write_report(const std::filesystem::path& folder,
                                       const std::optional<std::filesystem::path>& file = {},
                                       const Context& = {});

@@ -47,8 +47,16 @@ class PythonWatcher final : public limber::Watcher {
   }
   // Needs the GIL, when the call has ended.
   void tell_warnings() const {
+    if (warnings_.empty()) return;
+    int level = 1;  // of the first frame that is not limber's own
+    py::object frame = py::module_::import("sys").attr("_getframe")(0);
+    const auto is_ours = [](const py::object& of) {
+      const py::object name = of.attr("f_globals").attr("get")("__name__", "");
+      return py::isinstance<py::str>(name) && name.cast<std::string>() == "limber";
+    };
+    for (; !frame.is_none() && is_ours(frame); frame = frame.attr("f_back")) ++level;
     for (const std::string& text : warnings_)
-      if (PyErr_WarnEx(PyExc_UserWarning, text.c_str(), 2) != 0) throw py::error_already_set();
+      if (PyErr_WarnEx(PyExc_UserWarning, text.c_str(), level) != 0) throw py::error_already_set();
   }
   bool has_raised() const { return raised_.has_value(); }
   void raise_what_was_raised() {

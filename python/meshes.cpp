@@ -32,6 +32,16 @@ void add_mesh_functions(py::module_& m) {
       },
       "file"_a, py::kw_only(), "scale"_a, "y_up"_a, "progress"_a);
   m.def(
+      "clean",
+      [](const py::object& vertices, const py::object& faces, const py::object& progress) {
+        const limber::Mesh mesh = mesh_of(vertices, faces);
+        limber::ImportedMesh cleaned =
+            call(progress, 0, [&](const limber::Context& context) { return limber::clean(mesh, context); });
+        return py::make_tuple(owned(std::move(cleaned.mesh.vertices)), owned(std::move(cleaned.mesh.faces)),
+                              cleaned.mended, cleaned.warnings);
+      },
+      "vertices"_a, "faces"_a, py::kw_only(), "progress"_a);
+  m.def(
       "decompose",
       [](const py::object& vertices, const py::object& faces, int max_convex_hull, double threshold,
          double concavity, int max_hull_vertices, double inflate, bool exact, const py::object& progress,
@@ -99,6 +109,8 @@ void add_cage_functions(py::module_& m) {
         std::vector<limber::Mesh> shells;
         for (const py::handle& hull : hulls) {
           const auto pair = py::reinterpret_borrow<py::sequence>(hull);
+          if (!py::isinstance<py::sequence>(hull) || pair.size() != 2)
+            throw limber::InputError("hulls: each must be a pair, (vertices, faces)");
           shells.push_back(mesh_of(pair[0], pair[1]));
         }
         return call(progress, threads, [&](const limber::Context& context) {

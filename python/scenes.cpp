@@ -100,7 +100,14 @@ void add_scene(py::module_& m) {
       .def_property_readonly("name", &limber::Scene::name)
       .def_property_readonly("text", &limber::Scene::text)
       .def_property_readonly("bodies", &limber::Scene::bodies)
-      .def_property_readonly("robot", &limber::Scene::robot);
+      .def_property_readonly("robot", &limber::Scene::robot)
+      .def_property_readonly("goal",
+                             [](const limber::Scene& self) -> py::object {
+                               const std::optional<limber::Scene::Goal> goal = self.goal();
+                               if (!goal) return py::none();
+                               return py::make_tuple(goal->center_of_mass_m, goal->radius_m);
+                             })
+      .def_property_readonly("max_force_n", &limber::Scene::max_force_n);
 }
 
 void add_world(py::module_& m) {

@@ -17,17 +17,17 @@ namespace {
 void add_verify(py::module_& m) {
   m.def(
       "verify",
-      [](const std::filesystem::path& folder, const std::string& scene, const std::filesystem::path& model,
+      [](const std::filesystem::path& folder, const limber::Scene* scene, const std::filesystem::path& model,
          const py::object& progress, int threads) {
         py::list rows;
         for (const limber::Promise& p : call(progress, threads, [&](const limber::Context& context) {
-               return model.empty() ? limber::verify(folder, scene, context)
-                                    : limber::verify_body(folder, model, context);
+               if (!model.empty()) return limber::verify_body(folder, model, context);
+               return scene ? limber::verify(folder, *scene, context) : limber::verify(folder, "", context);
              }))
           rows.append(py::make_tuple(p.name, p.kept, p.value));
         return rows;
       },
-      "folder"_a, py::kw_only(), "scene"_a, "model"_a, "progress"_a, "threads"_a);
+      "folder"_a, py::kw_only(), "scene"_a.none(true), "model"_a, "progress"_a, "threads"_a);
 }
 
 void add_render(py::module_& m) {

@@ -86,8 +86,11 @@ fs::path find_scene(const std::string& name_or_path) {
     names.push_back(scene.name);
   }
   const std::string meant = nearest(name_or_path, names);
-  throw InputError(fmt::format("{}: no such scene file, and no scene of that name; {}known scenes: {}",
-                               name_or_path, meant.empty() ? "" : fmt::format("did you mean \"{}\"? ", meant),
+  const std::string wrong = name_or_path.empty()
+                                ? "no scene is named"
+                                : name_or_path + ": no such scene file, and no scene of that name";
+  throw InputError(fmt::format("{}; {}known scenes: {}", wrong,
+                               meant.empty() ? "" : fmt::format("did you mean \"{}\"? ", meant),
                                names.empty() ? "none (set LIMBER_SCENES to their folder)"
                                              : fmt::format("{}", fmt::join(names, ", "))));
 }

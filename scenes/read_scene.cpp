@@ -7,6 +7,9 @@
 // Scene keeps text and edits: a work folder stores them, and reads the same Scene from them again.
 #include "scenes/scene.h"
 
+#include <algorithm>
+#include <optional>
+
 #include "scenes/detail/edit_scene.h"
 #include "scenes/detail/scene_parts.h"
 #include "scenes/detail/schema.h"
@@ -40,10 +43,9 @@ Vec3 axis_named(const std::string& name) { return (name[0] == '-' ? -1.0 : 1.0) 
 
 namespace {
 
-// Where bodies are complained of, what names bodies (forces, motions, goals, cameras) is not read: each would
-// complain that a body is not there.
-Scene read(const std::string& toml, const std::string& name_for_messages,
-           const std::vector<std::string>& sets, const ScriptText& script, const Complaints& complaints) {
+// The text as it is after all edits, checked, with all defaults.
+Node completed(const std::string& toml, const std::string& name_for_messages,
+               const std::vector<std::string>& sets, const ScriptText& script, const Complaints& complaints) {
   Node root = parse_document(toml, name_for_messages);
   if (root.table()->empty())
     throw InputError(
@@ -53,6 +55,35 @@ Scene read(const std::string& toml, const std::string& name_for_messages,
   complaints.during([&] { append(script, root); });
   for (const std::string& set : sets) complaints.during([&] { edit(root, set); });
   check_and_complete(root, complaints);
+  return root;
+}
+
+// Where values stand does not count, nor the order of a table's keys, nor how a number is written.
+bool same_values(const Node& a, const Node& b) {
+  const auto number = [](const Node& node) -> std::optional<double> {
+    if (const auto* whole = std::get_if<std::int64_t>(&node.value)) return double(*whole);
+    if (const auto* real = std::get_if<double>(&node.value)) return *real;
+    return std::nullopt;
+  };
+  if (number(a) || number(b)) return number(a) == number(b);
+  if (a.value.index() != b.value.index()) return false;
+  if (const Array* list = a.array())
+    return std::equal(list->begin(), list->end(), b.array()->begin(), b.array()->end(), same_values);
+  if (const Table* table = a.table())
+    return table->size() == b.table()->size() &&
+           std::all_of(table->begin(), table->end(), [&](const Entry& entry) {
+             const Node* const other = b.find(entry.key);
+             return other && same_values(entry.value, *other);
+           });
+  if (const auto* text = std::get_if<std::string>(&a.value)) return *text == std::get<std::string>(b.value);
+  return std::get<bool>(a.value) == std::get<bool>(b.value);
+}
+
+// Where bodies are complained of, what names bodies (forces, motions, goals, cameras) is not read: each would
+// complain that a body is not there.
+Scene read(const std::string& toml, const std::string& name_for_messages,
+           const std::vector<std::string>& sets, const ScriptText& script, const Complaints& complaints) {
+  const Node root = completed(toml, name_for_messages, sets, script, complaints);
   Scene scene;
   if (complaints.any()) return scene;
 
@@ -106,6 +137,13 @@ std::vector<std::string> problems_of(const std::string& toml, const std::string&
   const Complaints complaints(&problems);
   complaints.during([&] { read(toml, name_for_messages, sets, {}, complaints); });
   return problems;
+}
+
+bool say_the_same(const Scene& a, const Scene& b) {
+  const auto values = [&](const Scene& scene) {
+    return completed(scene.text, scene.name, scene.sets, a.script, Complaints());
+  };
+  return same_values(values(a), values(b));
 }
 
 void require_plannable(const Scene& scene) {

@@ -359,6 +359,10 @@ Scene read_scene(const std::string& text, const std::string& name_for_messages,
 Scene read_scene_file(const fs::path&, const std::vector<std::string>& sets = {},
                       const fs::path& script = {});
 
+// Whether all keys have the same values, defaults included, whoever wrote them, text or edits; both with the
+// script of the first.
+bool say_the_same(const Scene&, const Scene&);
+
 // Throws InputError where the scene can be simulated only: it has no goal.
 void require_plannable(const Scene&);
 

@@ -89,8 +89,10 @@ std::vector<Part> cut_up(Model& model, Part root, InsideTest& inside, const Surf
     }
     return farthest;
   };
+  Progress progress("decompose", std::int64_t(wanted));
   leaves.push_back(seen(std::move(root)));
   while (leaves.size() < wanted) {
+    progress.update(std::int64_t(leaves.size()), "parts");
     Leaf* best = nullptr;
     for (Leaf& leaf : leaves)
       if (leaf.cut.gain > (best ? best->cut.gain : min_gain) &&

@@ -14,11 +14,13 @@ total, note)` where one is given. What depends on a seed depends on nothing else
 from __future__ import annotations
 
 import base64
+import collections.abc
 import functools
 import inspect
 import json
 import operator
 import os
+import shutil
 import signal
 import subprocess
 import tempfile
@@ -35,8 +37,9 @@ from ._limber import (Binding, Body, Cage, Certificate, DiskError, InputError, I
                       push_dtype, scene_names)
 
 __all__ = [
-    "Binding", "Body", "Cage", "Certificate", "Decomposition", "DiskError", "Film", "InputError", "InternalError",
-    "Mesh", "Plan", "Prepared", "Promise", "Scene", "States", "World", "bind", "build_cage", "certify", "decompose",
+    "Binding", "Body", "Cage", "Certificate", "Decomposition", "DiskError", "Film", "Goal", "InputError",
+    "InternalError", "Mesh", "Plan", "Prepared", "Promise", "Scene", "States", "World", "bind", "build_cage",
+    "certify", "clean", "decompose",
     "export", "load_body", "load_mesh", "load_plan", "plan", "prepare", "prepare_many", "push_dtype", "pushes",
     "render", "report", "scene_names", "simulate", "verify", "__version__",
 ]
@@ -56,6 +59,9 @@ _kinds_of_options: Dict[str, Tuple[Any, str]] = {
     "bool": (_bool, "True or False"), "str": (str, "a str"), "Path": (_text, "a path"),
     "Optional[Path]": (_text, "a path or None"),
     "Optional[Dict[str, Any]]": (dict, "a dict by keys of the scene file, or None"),
+    "Optional[Progress]": (collections.abc.Callable, "a function of (stage, done, total, note), or None"),
+    "Optional[Callable[[Plan], Any]]": (collections.abc.Callable, "a function of a Plan, or None"),
+    "Sequence[Path]": ((*_text, list, tuple), "a path, or a list of them"),
 }
 
 
@@ -86,17 +92,34 @@ def _list_of(paths: Any) -> List[Any]:
     return [paths] if isinstance(paths, _text) else list(paths)
 
 
+def _arrays_of(mesh: Any, faces: Any) -> Tuple[Any, Any]:
+    """Vertices and faces: as they are, or of a Mesh, a Body, a trimesh.Trimesh, a pair."""
+    if faces is not None:
+        return mesh, faces
+    if hasattr(mesh, "vertices") and hasattr(mesh, "faces"):
+        return mesh.vertices, mesh.faces
+    if isinstance(mesh, (tuple, list)) and len(mesh) == 2:
+        return mesh[0], mesh[1]
+    raise InputError("give vertices and faces, or what has both")
+
+
 class Mesh(NamedTuple):
     vertices: Array  # (V, 3) float64, metres
     faces: Array     # (F, 3) int32, counter-clockwise seen from outside
-    mended: List[str]     # what was done, as sentences
-    warnings: List[str]   # what looks wrong
+    mended: List[str] = []    # what was done, as sentences
+    warnings: List[str] = []  # what looks wrong
 
 
 @_checked
 def load_mesh(file: Path, *, scale: float = 1, y_up: bool = False, progress: Optional[Progress] = None) -> Mesh:
     """A model's surface, welded and oriented; OBJ, PLY, STL, OFF and what assimp reads."""
     return Mesh(*_limber.load_mesh(file, scale=scale, y_up=y_up, progress=progress))
+
+
+@_checked
+def clean(vertices: Any, faces: Any = None, *, progress: Optional[Progress] = None) -> Mesh:
+    """A mesh in memory, welded and oriented as load_mesh() does it."""
+    return Mesh(*_limber.clean(*_arrays_of(vertices, faces), progress=progress))
 
 
 class Decomposition(Sequence[Hull]):
@@ -123,30 +146,43 @@ class Decomposition(Sequence[Hull]):
 
 
 @_checked
-def decompose(vertices: Any, faces: Any, *, max_convex_hull: int = 32, threshold: float = 0, concavity: float = 0,
+def decompose(vertices: Any, faces: Any = None, *, max_convex_hull: int = 32, threshold: float = 0, concavity: float = 0,
               max_hull_vertices: int = 64, inflate: float = 0, exact: bool = False,
               progress: Optional[Progress] = None, threads: int = 0) -> Decomposition:
-    """A model as a union of few convex hulls. `threshold` is CoACD's concavity; 0: only the count rules."""
+    """A model as a union of few convex hulls: decompose(vertices, faces), or of a mesh that has both.
+
+    `threshold` is CoACD's concavity; 0: only the count rules. max_convex_hull = -1: as many as the threshold takes.
+    """
+    if max_convex_hull == -1:
+        if not (threshold > 0 or concavity > 0):
+            raise InputError("max_convex_hull is -1, no limit: threshold or concavity must be above 0")
+        max_convex_hull = 1000
     return Decomposition(_limber.decompose(
-        vertices, faces, max_convex_hull=max_convex_hull, threshold=threshold, concavity=concavity,
+        *_arrays_of(vertices, faces), max_convex_hull=max_convex_hull, threshold=threshold, concavity=concavity,
         max_hull_vertices=max_hull_vertices, inflate=inflate, exact=exact, progress=progress, threads=threads))
 
 
 @_checked
-def build_cage(vertices: Any, faces: Any, hulls: Sequence[Hull] = (), *, tets: int = 1000, mode: str = "lattice",
+def build_cage(vertices: Any, faces: Any = None, hulls: Sequence[Hull] = (), *, tets: int = 1000, mode: str = "lattice",
                progress: Optional[Progress] = None, threads: int = 0) -> Cage:
     """A coarse tetrahedral mesh that encloses the surface. Modes: lattice, fast, paper (needs hulls), conform."""
-    return _limber.build_cage(vertices, faces, list(hulls), tets=tets, mode=mode, progress=progress, threads=threads)
+    return _limber.build_cage(*_arrays_of(vertices, faces), list(hulls), tets=tets, mode=mode, progress=progress, threads=threads)
 
 
-def certify(vertices: Any, faces: Any, cage: Cage) -> Certificate:
+def _require_cage(cage: Any, name: str) -> Cage:
+    if not isinstance(cage, Cage):
+        raise TypeError(f"{name}: cage is {cage!r:.60}; it must be a Cage")
+    return cage
+
+
+def certify(vertices: Any, faces: Any = None, cage: Optional[Cage] = None) -> Certificate:
     """Whether the cage encloses the surface: proved with exact arithmetic, from the two alone."""
-    return _limber.certify(vertices, faces, cage)
+    return _limber.certify(*_arrays_of(vertices, faces), _require_cage(cage, "certify"))
 
 
-def bind(vertices: Any, faces: Any, cage: Cage) -> Binding:
+def bind(vertices: Any, faces: Any = None, cage: Optional[Cage] = None) -> Binding:
     """Barycentric weights of the surface in the cage."""
-    return _limber.bind(vertices, faces, cage)
+    return _limber.bind(*_arrays_of(vertices, faces), _require_cage(cage, "bind"))
 
 
 @_checked
@@ -154,14 +190,16 @@ def prepare(model: Any, faces: Any = None, *, shells: int = 32, concavity: float
             inflate: float = 0, max_hull_vertices: int = 64, exact: bool = False, tets: int = 1000,
             mode: str = "lattice", scale: float = 1, y_up: bool = False, progress: Optional[Progress] = None,
             threads: int = 0) -> Body:
-    """Hulls, cage, certificate and binding of a model: prepare("bunny.obj") or prepare(vertices, faces).
+    """Hulls, cage, certificate and binding of a model: prepare("bunny.obj"), prepare(vertices, faces) or prepare(mesh).
 
     `scale`: metres a unit; `y_up`: +Y is up in what is given, as +Z is here; of files and arrays alike.
 
     The surface may get vertices: edges longer than the cage's tets are cut, so that it bends as the cage does.
     """
     if faces is None and not isinstance(model, _text):
-        raise InputError("prepare takes a file, or vertices and faces")
+        model, faces = _arrays_of(model, faces)
+    if isinstance(model, _text) and "\0" in str(model):
+        raise InputError(f"model is {model!r}; a path has no NUL")
     if faces is not None and (scale != 1 or y_up):
         if not 0 < scale < float("inf"):
             raise InputError(f"scale is {scale}; it must be above 0")
@@ -230,14 +268,15 @@ def prepare_many(models: Union[Path, Sequence[Path]], out: Path, *, jobs: int = 
                  memory_limit: Optional[float] = None, retry_failed: bool = False, store: Path = "",
                  shells: int = 32, concavity: float = 0, threshold: float = 0, inflate: float = 0,
                  max_hull_vertices: int = 64, exact: bool = False, tets: int = 1000, mode: str = "lattice",
-                 scale: float = 1, y_up: bool = False, program: Path = "limber",
+                 scale: float = 1, y_up: bool = False, program: Path = "",
                  progress: Optional[Progress] = None, threads: int = 0) -> List[Prepared]:
     """Bodies of many models, files and folders, in the folder `out`, where they are found again.
 
     As `limber prepare` does it, whose program this calls: each in a process of its own, with an end to its CPU
     time (seconds) and memory (MB); one that hangs, crashes or is no model is told of, and the others go on.
+    `program`: the one on the PATH, or else that which was installed or built with this module.
     """
-    words = [os.fspath(program), "prepare"]
+    words = [os.fspath(program) or _program(), "prepare"]
     with tempfile.TemporaryDirectory() as lists:
         # Files go in lists: there may be more of them than a command line holds.
         listed: List[bytes] = []
@@ -281,6 +320,14 @@ def prepare_many(models: Union[Path, Sequence[Path]], out: Path, *, jobs: int = 
                      row.get("reason", ""), row.get("message", ""), row) for row in rows]
 
 
+def _program() -> str:
+    """On the PATH, else <prefix>/bin of <prefix>/lib/python3/dist-packages/limber, else that of the build."""
+    here = os.path.dirname(os.path.abspath(__file__))
+    known = [os.path.join(here, *([".."] * 4), "bin", "limber"), os.path.join(here, "..", "..", "cli", "limber")]
+    return next((path for path in known if os.access(path, os.X_OK)),
+                "limber") if shutil.which("limber") is None else "limber"
+
+
 def _run(words: List[str], progress: Optional[Progress]) -> Dict[str, Any]:
     """What the command says with --json; its errors as ours."""
     try:
@@ -319,6 +366,12 @@ def _run(words: List[str], progress: Optional[Progress]) -> Dict[str, Any]:
 
 # ---- Scenes and motions
 
+class Goal(NamedTuple):
+    """Where the robot's centre of mass is to get."""
+    center_of_mass_m: Array  # (3,)
+    radius_m: float
+
+
 class Scene:
     """A scene file, or the name of a scene that comes with limber.
 
@@ -328,15 +381,41 @@ class Scene:
     @_checked
     def __init__(self, file_or_name: Path, *, preset: str = "", set: Optional[Dict[str, Any]] = None,
                  data: Sequence[Path] = ()):
-        sets = [f"{key}={_toml(value)}" for key, value in (set or {}).items()]
-        self._scene = _limber.Scene(os.fspath(file_or_name), preset=preset, sets=sets, data=_list_of(data))
+        self._keep(_limber.Scene(os.fspath(file_or_name), preset=preset, sets=_edits(set), data=_list_of(data)))
+
+    def _keep(self, scene: "_limber.Scene") -> None:
+        self._scene = scene
         self.name: str = self._scene.name
         self.text: str = self._scene.text
         self.bodies: List[str] = self._scene.bodies
         self.robot: str = self._scene.robot
 
+    @property
+    def goal(self) -> Optional[Goal]:
+        """None where the scene can only be simulated. A goal may ask more, and may move (docs/scene.md)."""
+        goal = self._scene.goal
+        return None if goal is None else Goal(np.array(goal[0]), goal[1])
+
+    @property
+    def max_force_n(self) -> float:
+        """That the planner may push the robot with."""
+        return self._scene.max_force_n
+
     def __repr__(self) -> str:
         return f"<limber.Scene {self.name}: {', '.join(self.bodies)}>"
+
+
+def _edits(given: Optional[Dict[str, Any]]) -> List[str]:
+    """{"planner.seed": 3} and {"planner": {"seed": 3}} alike."""
+    edits = []
+    for key, value in (given or {}).items():
+        if value is None:
+            raise InputError(f"set: {key} is None; leave it out")
+        if isinstance(value, dict):
+            edits += [f"{key}.{edit}" for edit in _edits(value)]
+        else:
+            edits.append(f"{key}={_toml(value)}")
+    return edits
 
 
 def _toml(value: Any) -> str:
@@ -356,6 +435,16 @@ class States(NamedTuple):
     steps: Array       # (B,) int64
     sound: Array       # (B,) bool; False: the dynamics diverged, now or before, and the state means nothing
 
+    def take(self, rows: Any) -> States:
+        """Some of them, by number, slice or mask: states.take([3] * 64), states.take(states.sound)."""
+        picked = [np.atleast_1d(rows)] if not isinstance(rows, slice) else [rows]
+        return States(*(column[picked[0]] for column in self))
+
+    @staticmethod
+    def join(several: Sequence[States]) -> States:
+        """One row after the other."""
+        return States(*(np.concatenate(columns) for columns in zip(*several)))
+
 
 _kinds = ("none", "body", "control_point", "interpolation", "hold")
 
@@ -368,6 +457,7 @@ def pushes(count: int, kind: str = "body", *, steps: Any, force_n: Any = 0, node
     "body": force_n on the whole robot. "control_point": the same near `node` alone, within radius_m,
     and, where second_node is none of -1, at the same time second_force_n near that.
     "interpolation", "hold": towards target_m with at most max_force_n. Held for `steps` time steps.
+    Forces and targets are (3,) or (count, 3).
     """
     if kind not in _kinds:
         raise InputError(f"kind is {kind!r}; it must be one of {', '.join(_kinds)}")
@@ -377,6 +467,8 @@ def pushes(count: int, kind: str = "body", *, steps: Any, force_n: Any = 0, node
         whole = np.asarray(value)
         if whole.dtype.kind not in "iu" or (whole.size and not -2**31 <= int(whole.min()) <= int(whole.max()) < 2**31):
             raise InputError(f"{name} must be whole numbers below 2**31, not {value!r:.60}")
+        if whole.shape not in ((), (1,), (count,)):
+            raise InputError(f"{name} has the shape {whole.shape}; it must be () or {(count,)}")
     if np.size(steps) and np.min(steps) < 1:
         raise InputError(f"steps is {np.min(steps)}; it must be above 0")
     for name, value in (("force_n", force_n), ("radius_m", radius_m), ("target_m", target_m),
@@ -387,6 +479,11 @@ def pushes(count: int, kind: str = "body", *, steps: Any, force_n: Any = 0, node
             finite = False
         if not finite:
             raise InputError(f"{name} must be numbers that are finite in float32, not {value!r:.60}")
+        shape, wanted = np.shape(value), [(), (1,), (count,)]
+        if name in ("force_n", "target_m", "second_force_n"):
+            wanted = [(3,), (1, 3), (count, 3)]
+        if shape not in wanted and not (shape == () and value == 0):
+            raise InputError(f"{name} has the shape {shape}; it must be {wanted[0]} or {wanted[-1]}")
     made = np.zeros(count, push_dtype)
     made["kind"] = _kinds.index(kind)
     made["steps"], made["force_n"], made["node"] = steps, force_n, node
@@ -399,17 +496,27 @@ class World:
     """A scene's bodies, ready to be stepped. Without a work folder bodies are prepared in a temporary one."""
 
     @_checked
-    def __init__(self, scene: Union[Scene, Path], work_folder: Path = "", *, progress: Optional[Progress] = None,
-                 threads: int = 0):
-        self.scene = scene if isinstance(scene, Scene) else Scene(scene)
+    def __init__(self, scene: Union[Scene, Path], work_folder: Path = "", *, preset: str = "",
+                 set: Optional[Dict[str, Any]] = None, data: Sequence[Path] = (),
+                 progress: Optional[Progress] = None, threads: int = 0):
+        self.scene = _scene_of(scene, preset, set, data)
         self._world = _limber.World(self.scene._scene, work_folder, progress=progress, threads=threads)
+
+    @classmethod
+    def _of(cls, world: "_limber.World") -> World:
+        scene, made = Scene.__new__(Scene), cls.__new__(cls)
+        scene._keep(world.scene)
+        made.scene, made._world = scene, world
+        return made
 
     @property
     def bodies(self) -> Dict[str, Body]:
+        """By name."""
         return dict(zip(self.scene.bodies, self._world.bodies))
 
     @property
     def dt_s(self) -> float:
+        """Of a time step, seconds."""
         return self._world.dt_s
 
     def __repr__(self) -> str:
@@ -427,19 +534,24 @@ class World:
 
     @_checked
     def start(self, copies: int = 1) -> States:
+        """The scene's start, so many times."""
         return States(*self._world.start(copies))
 
     @_checked
     def rollout(self, states: States, pushes: Array, *, threads: int = 0) -> States:
-        """Where each state is led by the push of its row. A result depends on its state and push alone."""
-        if len(states) != 4:
-            raise TypeError("rollout: states must be States, as start() and rollout() give them")
-        states = States(*states)
+        """Where each state is led by the push of its row. A result depends on its state and push alone.
+
+        States say nothing of which world they are: another with as many nodes takes them.
+        """
+        states = _states_of(states)
+        if not isinstance(pushes, np.ndarray):
+            raise TypeError(f"rollout: pushes is {pushes!r:.60}; pushes() makes them")
         return States(*self._world.rollout(states.positions, states.velocities, states.steps, states.sound, pushes,
                                            threads=threads))
 
     def robot_centers(self, states: States) -> Array:
         """(B, 3) centres of mass of the robot, metres."""
+        states = _states_of(states)
         return self._world.robot_centers(states.positions, states.velocities, states.steps, states.sound)
 
     @_checked
@@ -470,6 +582,16 @@ class World:
         return Plan(self._world.simulate(duration, progress=progress, threads=threads), self)
 
 
+def _states_of(given: Any) -> States:
+    if not isinstance(given, tuple) or len(given) != 4:
+        raise TypeError("states must be States, as start() and rollout() give them")
+    for name, array, kinds in (("steps", given[2], "iu"), ("sound", given[3], "b")):
+        if np.asarray(array).dtype.kind not in kinds:
+            raise InputError(f"states: {name} must be {'whole numbers' if name == 'steps' else 'True or False'}, "
+                             f"not {array!r:.60}")
+    return States(*given)
+
+
 def _index(name: str, names: Sequence[str]) -> int:
     if name not in names:
         raise InputError(f"there is no body {name!r}; there are {', '.join(names)}")
@@ -481,6 +603,7 @@ class Plan:
 
     def __init__(self, plan: "_limber.Plan", world: Optional[World] = None):
         self._plan = plan
+        self._world = world
         self._bodies: List[str] = plan.world.scene.bodies
         self.solved: bool = plan.solved
         self.why: str = plan.explanation
@@ -490,6 +613,13 @@ class Plan:
         self.tree_hash: str = plan.tree_hash
         self.trajectory_hash: str = plan.trajectory_hash
         self._states: Optional[States] = None
+
+    @property
+    def world(self) -> World:
+        """The one that it was planned in."""
+        if self._world is None:
+            self._world = World._of(self._plan.world)
+        return self._world
 
     @property
     def states(self) -> States:
@@ -512,6 +642,8 @@ class Plan:
     def surface(self, body: str, frame: int) -> Array:
         """(V, 3) of the fine surface; a negative frame counts from the last."""
         count = self._plan.frame_count
+        if not -count <= frame < count:
+            raise InputError(f"there is no frame {frame}; they are 0 … {count - 1}, or from -{count} on from the last")
         return self._plan.surface(_index(body, self._bodies), frame + count if frame < 0 else frame)
 
     def faces(self, body: str) -> Array:
@@ -564,10 +696,13 @@ def plan(scene: Union[Scene, Path], out: Optional[Path] = None, *, preset: str =
          progress: Optional[Progress] = None, threads: int = 0) -> Plan:
     """Plans a scene; with `out` in a work folder, where its bodies are kept and the plan is saved.
 
-    A search that Ctrl-C ends is saved there, too, and `resume` goes on from it.
+    A search that Ctrl-C ends is saved there, too, and `resume` goes on from it; of one that has not begun (bodies
+    are prepared first) there is nothing to resume.
     """
     if resume and out is None:
         raise InputError("resume goes on from the plan in the folder `out`, and none is named")
+    if resume and out is not None and not os.path.exists(os.path.join(out, "plan.npz")):
+        raise InputError(f"{os.fspath(out)}: has no plan to go on from; leave resume out")
     scene = _scene_of(scene, preset, set, data)
     world = World(scene, "" if out is None else out, progress=progress, threads=threads)
     found = world.plan(seed=seed, iterations=iterations, time_limit=time_limit, shortcut=shortcut, cost=cost,
@@ -607,14 +742,21 @@ class Promise(NamedTuple):
 
 
 @_checked
-def verify(folder: Path, *, scene: str = "", model: Path = "", progress: Optional[Progress] = None,
+def verify(folder: Path, *, scene: Union[Scene, Path] = "", preset: str = "", set: Optional[Dict[str, Any]] = None,
+           data: Sequence[Path] = (), model: Path = "", progress: Optional[Progress] = None,
            threads: int = 0) -> List[Promise]:
-    """Every promise that limber makes of a work folder, or of a body's, checked anew from its files. `scene`: the one
-    that the plan must be of; `model`: the file that the body must be of."""
+    """Every promise that limber makes of a work folder, or of a body's, checked anew from its files.
+
+    Of a plan all is replayed and searched again, which takes as long as the search did. `scene`, with preset, set and
+    data as of plan(): the one that the plan must be of; `model`: the file that the body must be of.
+    """
     if scene and model:
         raise InputError("verify: scene is of a plan's folder, model of a body's: give one of them")
+    if not scene and (preset or set or data):
+        raise InputError("verify: preset, set and data are of a scene, and none is named")
+    named = _scene_of(scene, preset, set, data)._scene if scene else None
     return [Promise(*row) for row in
-            _limber.verify(folder, scene=scene, model=model, progress=progress, threads=threads)]
+            _limber.verify(folder, scene=named, model=model, progress=progress, threads=threads)]
 
 
 class Film(NamedTuple):
@@ -628,7 +770,7 @@ class Film(NamedTuple):
 def render(folder: Path, *, size: Optional[Tuple[int, int]] = None, frames: str = "", camera: str = "main",
            name: str = "", set: Optional[Dict[str, Any]] = None, video: Path = "", resume: bool = False,
            progress: Optional[Progress] = None, threads: int = 0) -> Film:
-    """Frames, and the film of them, without a display."""
+    """Frames, and the film of them, without a display. `frames`, "0-9,20-40:5", count the film's."""
     try:
         width, height = (0, 0) if size is None else (operator.index(size[0]), operator.index(size[1]))
         if size is not None and (len(size) != 2 or not 0 < min(width, height) <= max(width, height) < 2**31):
@@ -637,7 +779,7 @@ def render(folder: Path, *, size: Optional[Tuple[int, int]] = None, frames: str 
         raise TypeError(f"render: size is {size!r:.60}; it must be (width, height) in pixels") from None
     film, painted, failed = _limber.render(
         folder, width=width, height=height, frames=frames, camera=camera, name=name,
-        sets=[f"{key}={_toml(value)}" for key, value in (set or {}).items()], video=video, resume=resume,
+        sets=_edits(set), video=video, resume=resume,
         progress=progress, threads=threads)
     return Film(str(film) if str(film) not in ("", ".") else None, painted, failed)
 
@@ -652,5 +794,8 @@ def export(folder: Path, formats: Sequence[str] = ("gltf",), *, out: Path = "",
 
 @_checked
 def report(folder: Path, file: Path = "", *, progress: Optional[Progress] = None, threads: int = 0) -> str:
-    """One HTML page about a work folder."""
+    """One HTML page about a work folder; verifies it, and takes as long."""
+    parent = os.path.dirname(os.fspath(file)) or "."
+    if os.fspath(file) and not (os.path.isdir(parent) and os.access(parent, os.W_OK)):
+        raise InputError(f"{os.fspath(file)}: {parent} is no folder that can be written to")
     return str(_limber.report(folder, file=file, progress=progress, threads=threads))

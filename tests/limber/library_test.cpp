@@ -96,6 +96,14 @@ TEST_F(Library, WhatIsWrongIsNamed) {
   EXPECT_THAT(complaint([&] { build_cage(cube(), {}, {.tets = 3}); }), HasSubstr("24"));
   EXPECT_THAT(complaint([&] { prepare(cube(), {.tets = 0}); }), HasSubstr("24"));
   EXPECT_THAT(complaint([&] { decompose(cube(), {}, {.threads = -1}); }), HasSubstr("threads is -1"));
+  EXPECT_THAT(complaint([&] { decompose(cube(), {}, {.threads = 257}); }), HasSubstr("[0, 256]"));
+  Mesh dented = cube();
+  dented.vertices[6] = {0.4, 0.4, 0.4};
+  EXPECT_THAT(complaint([&] { build_cage(cube(), {cube(), dented}); }), HasSubstr("hull 1: is not convex"));
+  EXPECT_THAT(complaint([&] {
+                deform({{0}, {{1, 0, 0, 0}}}, {{0, 1, 2, 3}}, {{0, 0, 0}, {0, NAN, 0}, {0, 0, 1}, {1, 0, 0}});
+              }),
+              HasSubstr("node 1 has a coordinate"));
   EXPECT_THAT(complaint([&] { read_scene("barrier1"); }), HasSubstr("barriers1"));
   EXPECT_THAT(complaint([&] {
                 deform({{0}, {{1, 0, 0, 0}}}, {{0, 1, 2, 9}}, cube().vertices);
@@ -105,6 +113,8 @@ TEST_F(Library, WhatIsWrongIsNamed) {
 
 TEST_F(Library, OptionsOfWorkFoldersOutOfRangeAreRefused) {
   const std::vector<std::pair<const char*, std::function<void()>>> calls{
+      {"out is empty", [&] { plan_scene({.scene = {"barriers1"}}); }},
+      {"stage's number", [&] { name_of(Stage(77)); }},
       {"portfolio", [&] { plan_scene({.scene = {"barriers1"}, .out = path("out"), .portfolio = 0}); }},
       {"tets_factor", [&] { refine_plan({.folder = path("a"), .out = path("b"), .tets_factor = 0}); }},
       {"bits", [&] { render_film(path("a"), {.bits = 7}); }},
@@ -261,6 +271,13 @@ TEST_F(Library_slow, RolloutsDependOnTheirOwnStateAndPushAlone) {
   EXPECT_GT(centers[9][0], problem.robot_centers(problem.start())[0][0]);
 }
 
+TEST_F(Library, AGoalIsThatOfTheScene) {
+  const Scene scene = read_scene("barriers1");
+  ASSERT_TRUE(scene.goal());
+  EXPECT_EQ(scene.goal()->center_of_mass_m, (std::array<double, 3>{9.2, 1.5, 1.5}));
+  EXPECT_EQ(read_scene("barriers1", {.sets = {"planner.max_force_n=7"}}).max_force_n(), 7);
+}
+
 TEST_F(Library_slow, RolloutsOfWhatDoesNotFitAreRefused) {
   const Problem problem = small_problem();
   const States start = problem.start(2);
@@ -281,6 +298,11 @@ TEST_F(Library_slow, RolloutsOfWhatDoesNotFitAreRefused) {
   States odd = start;
   odd.positions.pop_back();
   EXPECT_THAT(complaint([&] { problem.rollout(odd, {{.steps = 1}, {.steps = 1}}); }), HasSubstr("states"));
+  odd = start;
+  odd.sound.pop_back();
+  EXPECT_THAT(complaint([&] { problem.rollout(odd, {{.steps = 1}, {.steps = 1}}); }), HasSubstr("1 of 2"));
+  odd.sound.clear();
+  EXPECT_TRUE(problem.rollout(odd, {{.steps = 1}, {.steps = 1}}).sound[0]);
   odd = start;
   odd.velocities[4] = INFINITY;
   EXPECT_THAT(complaint([&] {

@@ -48,6 +48,19 @@ class Meshes(unittest.TestCase):
             np.testing.assert_allclose(np.abs(vertices - 0.5).max(axis=1), 0.5, atol=1e-5)  # covers it, and hardly more
         self.assertEqual(hulls.triangles_uncovered, 0)
 
+    def test_what_has_vertices_and_faces_is_a_mesh(self):
+        whole = limber.decompose(CUBE, FACES)
+        for mesh in ((CUBE, FACES), limber.Mesh(CUBE, FACES), limber.clean(CUBE, FACES)):
+            np.testing.assert_array_equal(limber.decompose(mesh)[0][0], whole[0][0])
+        self.assertEqual(len(limber.decompose(CUBE, FACES, max_convex_hull=-1, threshold=0.05)), 1)
+        cage = limber.build_cage(limber.Mesh(CUBE, FACES), hulls=whole, tets=100)
+        self.assertTrue(limber.certify((CUBE, FACES), cage=cage).holds)
+        self.assertEqual(limber.bind((CUBE, FACES), cage=cage).outside, 0)
+        with self.assertRaisesRegex(limber.InputError, "what has both"):
+            limber.decompose(CUBE)
+        with self.assertRaisesRegex(limber.InputError, "no limit"):
+            limber.decompose(CUBE, FACES, max_convex_hull=-1)
+
     def test_a_body_moves_with_its_cage(self):
         body = limber.prepare(CUBE, FACES, tets=100)
         self.assertTrue(body.certificate.holds)
@@ -120,6 +133,10 @@ class Meshes(unittest.TestCase):
     def test_warnings_are_pythons(self):
         with self.assertWarnsRegex(UserWarning, "boundary edges"):
             limber.prepare(CUBE, FACES[:-1], tets=100)
+        with warnings.catch_warnings(record=True) as heard:
+            warnings.simplefilter("always")
+            limber.prepare(CUBE, FACES[:-1], tets=100)
+        self.assertEqual(heard[0].filename, __file__)  # where limber was called
 
     def test_what_is_wrong_is_named(self):
         wrong = FACES.copy()
@@ -131,6 +148,17 @@ class Meshes(unittest.TestCase):
                 limber.decompose(*given)
         with self.assertRaisesRegex(ValueError, "lattice"):  # InputError is one
             limber.build_cage(CUBE, FACES, mode="lettuce")
+        dented = CUBE.copy()
+        dented[6] = 0.4
+        with self.assertRaisesRegex(limber.InputError, "hull 0: is not convex"):
+            limber.build_cage(CUBE, FACES, [(dented, FACES)], mode="paper", tets=100)
+        with self.assertRaisesRegex(limber.InputError, "a pair"):
+            limber.build_cage(CUBE, FACES, [(CUBE, FACES, 3)], tets=100)
+        cage = limber.build_cage(CUBE, FACES, tets=100)
+        with self.assertRaisesRegex(limber.InputError, "node 0 has a coordinate that is not finite"):
+            limber.bind(CUBE, FACES, cage).deform(cage.tets, cage.vertices * np.nan)
+        with self.assertRaisesRegex(limber.InputError, "threads is 1000000"):
+            limber.decompose(CUBE, FACES, threads=1000000)
         with self.assertRaisesRegex(limber.InputError, "nothing.obj: cannot be read"):
             limber.prepare("nothing.obj")
         with self.assertRaises(limber.InputError):
@@ -208,6 +236,13 @@ class Scenes(unittest.TestCase):
         self.assertEqual(again.trajectory_hash, told["trajectory_hash"])
         np.testing.assert_array_equal(again.surface("robot", -1), plan.surface("robot", len(plan) - 1))
         self.assertIn(told["trajectory_hash"], again._repr_html_())
+        world = again.world
+        self.assertEqual((world.scene.robot, sorted(world.bodies)), ("robot", ["lower_plate", "robot", "upper_plate"]))
+        last = world.robot_centers(again.states.take([-1]))[0]
+        self.assertLess(np.linalg.norm(last - world.scene.goal.center_of_mass_m), world.scene.goal.radius_m)
+        for frame in (len(again), -len(again) - 1):
+            with self.assertRaisesRegex(limber.InputError, f"there is no frame {frame}; "):
+                again.surface("robot", frame)
         film = limber.render(self.path("2"), size=(64, 36), frames="0-1")
         self.assertEqual((film.frames_painted, film.frames_failed), (2, 0))
         self.assertTrue(limber.export(self.path("2"), "gltf")[0].endswith(".glb"))
@@ -219,6 +254,17 @@ class Scenes(unittest.TestCase):
         with self.assertRaisesRegex(limber.InputError, "mp4"):
             limber.render(self.path("2"), size=(64, 36), frames="0", video=self.path("film.doc"),
                           progress=lambda *event: self.fail(event))
+
+    def test_a_motion_is_verified_as_of_a_scene(self):
+        limber.simulate("barriers1", self.path("simulated"), preset="fast", duration=0.05)
+        for named in ({"scene": "barriers1"}, {"scene": limber.Scene("barriers1", preset="fast")}):  # fast is its own
+            self.assertTrue(all(promise.kept for promise in limber.verify(self.path("simulated"), **named)))
+        rows = limber.verify(self.path("simulated"), scene="barriers1", set={"planner": {"max_force_n": 9}})
+        broken = [row.value for row in rows if not row.kept]
+        self.assertEqual(len(broken), 1)
+        self.assertIn("planner.preset=fast; asked for were planner.max_force_n=9", broken[0])
+        with self.assertRaisesRegex(limber.InputError, "none is named"):
+            limber.verify(self.path("simulated"), preset="fast")
 
     def test_the_path_is_what_its_pushes_do(self):
         world = world_of("barriers1", preset="fast")
@@ -246,6 +292,12 @@ class Scenes(unittest.TestCase):
         shoved = world.rollout(world.start(2), limber.pushes(2, force_n=[[1e30, 0, 0], [0, 0, 0]], steps=5))
         np.testing.assert_array_equal(shoved.sound, [False, True])
         np.testing.assert_array_equal(world.rollout(shoved, limber.pushes(2, steps=2)).sound, [False, True])
+        for wrong, words in (({"steps": [0.5, 5]}, "steps must be whole"), ({"sound": [0.2, 1]}, "sound must be True")):
+            with self.assertRaisesRegex(limber.InputError, words):
+                world.rollout(shoved._replace(**wrong), limber.pushes(2, steps=2))
+        joined = limber.States.join([shoved.take(0), shoved.take(slice(1, 2)), shoved.take([True, False])])
+        np.testing.assert_array_equal(joined.sound, [False, True, False])
+        np.testing.assert_array_equal(joined.positions[1], shoved.positions[1])
         with self.assertRaisesRegex(limber.InputError, "state 0: its step is -1"):
             world.rollout(shoved._replace(steps=[-1, 5]), limber.pushes(2, steps=2))
         with self.assertRaisesRegex(limber.InputError, "sound must have the shape"):
@@ -259,6 +311,9 @@ class Scenes(unittest.TestCase):
         for options, words in (({"steps": 1.7}, "steps must be whole"), ({"steps": 2**31}, "steps must be whole"),
                                ({"steps": 0}, "steps is 0"), ({"steps": 1, "node": 0.5}, "node must be whole"),
                                ({"steps": 1, "force_n": np.inf}, "force_n must be numbers"),
+                               ({"steps": 1, "force_n": 100}, r"force_n has the shape \(\)"),
+                               ({"steps": 1, "target_m": (1, 2)}, r"target_m has the shape \(2,\)"),
+                               ({"steps": (1, 2, 3)}, r"steps has the shape \(3,\)"),
                                ({"steps": 1, "radius_m": "wide"}, "radius_m must be numbers")):
             with self.subTest(words), self.assertRaisesRegex(limber.InputError, words):
                 limber.pushes(2, **options)
@@ -338,6 +393,8 @@ class Scenes(unittest.TestCase):
             world.plan(seed=2, resume=some)
         with self.assertRaisesRegex(limber.InputError, "none is named"):
             limber.plan("squeeze", resume=True)
+        with self.assertRaisesRegex(limber.InputError, "no plan to go on from"):
+            limber.plan("squeeze", self.path("empty"), resume=True)
 
     def test_other_threads_run_meanwhile(self):
         world = world_of("barriers1")
@@ -367,6 +424,11 @@ class Scenes(unittest.TestCase):
         self.assertIn("barriers1", limber.scene_names())
         scene = limber.Scene("barriers1", set={"planner.seed": 9, "planner.preset": "fast"})
         self.assertEqual(scene.robot, "robot")
+        self.assertEqual(limber.Scene("barriers1", set={"planner": {"max_force_n": 9}}).max_force_n, 9)
+        with self.assertRaisesRegex(limber.InputError, "planner.seed is None"):
+            limber.Scene("barriers1", set={"planner.seed": None})
+        with self.assertRaisesRegex(limber.InputError, "no scene is named"):
+            limber.Scene("")
         for words in ({"file_or_name": "barriers9"}, {"file_or_name": "barriers1", "set": {"planner.speed": 1}},
                       {"file_or_name": "barriers1", "preset": "slow"}):
             with self.assertRaises(limber.InputError):

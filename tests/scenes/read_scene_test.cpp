@@ -95,6 +95,21 @@ TEST(ReadScene, ReadsWhatIsWritten) {
   EXPECT_EQ(s.text, good);
 }
 
+// Edits may say what the text says, or what is so anyway; what they change counts, wherever it stands.
+TEST(ReadScene, ScenesSayTheSameByTheirValues) {
+  const Scene scene = read_scene(good, "s.toml");
+  const auto edited = [](const char* set) { return read_scene(good, "t.toml", {set}); };
+  EXPECT_TRUE(say_the_same(scene, edited("planner.max_force_n=500")));
+  EXPECT_TRUE(say_the_same(scene, edited("planner.max_force_n=500.0")));
+  EXPECT_TRUE(say_the_same(edited("planner.seed=1"), scene));  // a default
+  EXPECT_TRUE(say_the_same(scene, read_scene("# more words\n" + std::string(good), "s.toml")));
+  EXPECT_FALSE(say_the_same(scene, edited("planner.max_force_n=501")));
+  EXPECT_FALSE(say_the_same(scene, edited("goal.radius_m=0.1")));
+  EXPECT_FALSE(say_the_same(scene, edited("world.walls=false")));
+  EXPECT_FALSE(say_the_same(scene, edited("bodies.robot.friction=0.25")));
+  EXPECT_FALSE(say_the_same(scene, edited("film.caption=another")));
+}
+
 TEST(ReadScene, ReadsPartsAndRigidRobots) {
   const Scene s = read_scene(replaced(good, "role = \"obstacle\"\n",
                                       "role = \"obstacle\"\nparts = [{ shell = 3, youngs_modulus_pa = 9e3 }, "

@@ -135,6 +135,7 @@ WholeBody make_body(const BodySource& source, const PrepareSettings& settings,
     made.contact = meshing::make_contact_shape(surface, made.cage.mesh, {}, &made.contact_report);
     end_stage("contact");
   }
+  progress.update(7, "done");
   return body;
 }
 

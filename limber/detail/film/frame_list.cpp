@@ -81,8 +81,7 @@ std::vector<int> parse_frames(const std::string& text, int count, std::int64_t* 
       frames.insert(int(f));
     }
   if (frames.empty())
-    throw InputError(
-        fmt::format("frames {}: names no frame of this motion, which has 0 … {}", text, count - 1));
+    throw InputError(fmt::format("frames {}: there is none of these; there are 0 … {}", text, count - 1));
   if (left_out) *left_out = beyond;
   return {frames.begin(), frames.end()};
 }

@@ -432,6 +432,9 @@ void end(const Findings& f, Page& page) {
 }  // namespace
 
 WrittenReport report(const fs::path& folder, const std::optional<fs::path>& file) {
+  if (file && !file->parent_path().empty() && !fs::is_directory(file->parent_path()))
+    throw InputError(fmt::format("{}: there is no folder {}; make it first", file->string(),
+                                 file->parent_path().string()));
   const PlanFolder planned = read_plan_folder(folder);
   const std::vector<PreparedBody> bodies = read_bodies_of(planned, folder);
   const fem::World world = build_world(planned.scene, bodies);

@@ -1,5 +1,7 @@
 #include "limber/detail/verify/verify.h"
 
+#include <fmt/ranges.h>
+
 #include "core/error.h"
 #include "core/hash.h"
 #include "core/json_text.h"
@@ -52,9 +54,14 @@ Verified verify_plan(const fs::path& folder, const PlanFolder& planned,
   Promises table;
   scenes::Scene scene = planned.scene;
   if (trusted) {
-    const std::string wrong = scene.text != trusted->scene.text   ? "its text is another"
-                              : scene.sets != trusted->scene.sets ? "its edits by --set are others"
-                                                                  : "";
+    const auto edits = [](const scenes::Scene& of) {
+      return of.sets.empty() ? "none" : fmt::format("{}", fmt::join(of.sets, ", "));
+    };
+    const std::string wrong = scene.text != trusted->scene.text ? "its text is another"
+                              : !scenes::say_the_same(scene, trusted->scene)
+                                  ? fmt::format("its edits by --set are others: {}; asked for were {}",
+                                                edits(scene), edits(trusted->scene))
+                                  : "";
     table.row("the plan is of the scene " + trusted->name, wrong.empty(), wrong);
     scene.folder = trusted->scene.folder;
   }
@@ -69,11 +76,11 @@ Verified verify_plan(const fs::path& folder, const PlanFolder& planned,
           Verdict::Scene{scene.name, hex(hash_of(std::string_view(scene.text))), scene.sets}};
 }
 
-Verified verify(const VerifyOptions& options) {
+Verified verify(const VerifyOptions& options, std::optional<TrustedScene> trusted) {
   const fs::path& folder = options.folder;
   if (!fs::is_directory(folder))
     throw InputError(fmt::format("{}: is not a folder; name a work folder of limber", folder.string()));
-  const bool scene_is_named = !options.scene.scene.empty();
+  const bool scene_is_named = trusted || !options.scene.scene.empty();
   if (!scene_is_named && !(options.scene.sets.empty() && options.scene.data.empty()))
     throw InputError("--set and --data are of the scene that --scene names, and none is named");
   if (const auto& csv = options.observables;
@@ -85,8 +92,7 @@ Verified verify(const VerifyOptions& options) {
       throw InputError(
           "--model is of a body's folder; the models of a plan's bodies are its scene's: name that "
           "with --scene");
-    std::optional<TrustedScene> trusted;
-    if (scene_is_named)
+    if (scene_is_named && !trusted)
       trusted = {options.scene.scene,
                  scenes::read_scene_file(scenes::find_scene(options.scene.scene), options.scene.sets),
                  options.scene.data};

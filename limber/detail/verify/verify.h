@@ -34,7 +34,8 @@ struct Verified {
 Verified verify_plan(const fs::path& folder, const PlanFolder&, const std::vector<PreparedBody>&,
                      const fem::World&, MotionFigures& figures, const VerifyDepth& = {});
 
-// Of a work folder, or of one that prepare has written. Throws InputError where it is neither.
-Verified verify(const VerifyOptions&);
+// Of a work folder, or of one that prepare has written. Throws InputError where it is neither. `trusted`,
+// where it is there, in place of the scene that the options name.
+Verified verify(const VerifyOptions&, std::optional<TrustedScene> trusted = {});
 
 }  // namespace limber::detail
