@@ -183,7 +183,10 @@ TEST_F(Report, WrongInputIsTold) {
   EXPECT_EQ(unplanned.code, exit_bad_input);
   EXPECT_NE(unplanned.err.find("limber plan"), std::string::npos) << unplanned.err;
   plan();
-  EXPECT_EQ(limber_program({"report", out(), "-o", out("none/page.html")}).code, exit_disk);
+  const Result nowhere =
+      limber_program({"report", out(), "-o", out("none/page.html")});  // told before the work
+  EXPECT_EQ(nowhere.code, exit_bad_input);
+  EXPECT_NE(nowhere.err.find("there is no folder"), std::string::npos) << nowhere.err;
 }
 
 TEST_F(Report, ABrowserPlaysIt) {
