@@ -120,8 +120,9 @@ void write_ply(const fs::path& path, const SurfaceMesh& mesh) {
   write_file(path, text);
 }
 
-SurfaceMesh read_ply(const fs::path& path) {
-  const std::string text = read_file(path);
+SurfaceMesh read_ply(const fs::path& path) { return ply_from(read_file(path), path); }
+
+SurfaceMesh ply_from(const std::string& text, const fs::path& path) {
   Words words(text, path.string());
   const auto header = [&](std::string_view wanted) {
     if (const auto got = words.line(); got != wanted)
@@ -279,7 +280,10 @@ void write_msh(const fs::path& path, const TetMesh& mesh, const std::vector<int>
 }
 
 TetMesh read_msh(const fs::path& path, std::vector<int>* label) {
-  const std::string text = read_file(path);
+  return msh_from(read_file(path), path, label);
+}
+
+TetMesh msh_from(const std::string& text, const fs::path& path, std::vector<int>* label) {
   Words words(text, path.string());
   words.expect_start("$MeshFormat", "a Gmsh 2.2 mesh");
   words.expect("$MeshFormat"), words.expect("2.2"), words.expect("0"), words.expect("8"),

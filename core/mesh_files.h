@@ -14,6 +14,7 @@ namespace limber {
 // ASCII and float PLY of the same elements.
 void write_ply(const fs::path&, const SurfaceMesh&);
 SurfaceMesh read_ply(const fs::path&);
+SurfaceMesh ply_from(const std::string& bytes, const fs::path& named);  // of a file that was read
 
 // OBJ with 17 digits; one group "shell_i" a shell; how many shells, vertices and triangles there are stands
 // in its first line, and "# end" in its last.
@@ -25,5 +26,6 @@ void write_obj(const fs::path&, const SurfaceMesh&);
 // elementary tags, plus 1.
 void write_msh(const fs::path&, const TetMesh&, const std::vector<int>& label = {});
 TetMesh read_msh(const fs::path&, std::vector<int>* label = nullptr);
+TetMesh msh_from(const std::string& text, const fs::path& named, std::vector<int>* label = nullptr);
 
 }  // namespace limber

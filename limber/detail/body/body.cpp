@@ -165,20 +165,23 @@ PreparedBody read_body(const fs::path& folder) {
     body.report = read_body_report(folder);
     if (const std::string& only = body.report.input.settings.only; !only.empty())
       throw InputError(fmt::format("{}: is a part of a body, made with --only {}", folder.string(), only));
-    const auto require_hash = [&](const std::string& name) {
-      if (!body.report.has_file(name, hash_of_file(folder / name)))
+    const auto known = [&](const std::string& name) {  // bytes of the file that was reported
+      std::string bytes = read_file(folder / name);
+      if (!body.report.has_file(name, hex(hash_of(std::string_view(bytes)))))
         throw InputError(
             fmt::format("{}: is not the file that report.json was written for", (folder / name).string()));
+      return bytes;
     };
-    for (const char* name : body_files) require_hash(name);
-    body.surface = read_ply(folder / "surface.ply");
-    body.cage = read_msh(folder / "cage.msh", &body.shell_from_tet);
+    body.surface = ply_from(known("surface.ply"), folder / "surface.ply");
+    body.cage = msh_from(known("cage.msh"), folder / "cage.msh", &body.shell_from_tet);
+    for (const char* name : {"shells.obj", "binding.npz", "contact.npz"}) known(name);
     body.binding = ffd::read_binding(folder / "binding.npz", body.surface, body.cage);
     body.contact = read_contact_shape(folder / "contact.npz", body.surface, body.cage);
     if (body.report.files.contains(appearance_file)) {
-      require_hash(appearance_file);
+      known(appearance_file);
       body.appearance = read_appearance(folder, body.surface);
-      for (const std::string& name : files_of_body(body.appearance)) require_hash(name);
+      for (std::size_t i = 0; i < body.appearance.images.size(); ++i)
+        known(name_of_image_file(body.appearance, i));
     }
     body.gradients = node_gradients(body.cage);
   } catch (const InputError& error) {
