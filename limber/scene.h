@@ -108,7 +108,7 @@ class LIMBER_API Problem {
   struct Range {
     int first = 0, count = 0;  // nodes; count 0: does not move
   };
-  Range nodes_of(int body) const;
+  Range nodes_of(int body) const;  // throws InputError where there is no such body
   States start(int copies = 1) const;
   // Each state pushed by the push of its number, on all threads. A result depends on its state and push
   // alone. Throws InputError where numbers do not fit. A push may be stronger than the planner's max_force_n.
@@ -148,7 +148,8 @@ class LIMBER_API Plan {
   std::string tree_hash() const, trajectory_hash() const;
   States frames() const;             // all of them
   std::vector<Push> pushes() const;  // from the start
-  // The fine surface of a body, in the order of Scene::bodies(), at a frame.
+  // The fine surface of a body, in the order of Scene::bodies(), at a frame from 0 on. Throws InputError where there is
+  // no such body or frame.
   Vertices surface(int body, int frame) const;
   // What the command tells, as the text of a JSON object: docs/files.md.
   std::string summary_json(const Context& = {}) const;

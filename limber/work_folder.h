@@ -19,7 +19,7 @@ struct Promise {
 };
 // Every promise that limber makes of a work folder or a body's folder, checked anew from its files: replayed,
 // searched again (which takes as long as the search did), measured. `scene`: a file or name of the one that
-// the plan must be of, as it is without edits; empty: its own word is taken. Throws InputError where it is no
+// the plan must be of, without edits but those that change nothing; empty: its own word is taken. Throws InputError where it is no
 // such folder.
 LIMBER_API std::vector<Promise> verify(const std::filesystem::path& folder, const std::string& scene = {},
                                        const Context& = {});

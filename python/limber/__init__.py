@@ -333,7 +333,8 @@ def _run(words: List[str], progress: Optional[Progress]) -> Dict[str, Any]:
     try:
         version = subprocess.run([words[0], "--version"], capture_output=True, text=True, check=True).stdout.split()
     except (OSError, subprocess.CalledProcessError) as error:
-        raise InputError(f"{words[0]}: cannot be run ({error}); install the program limber, or name it by program=")
+        why = getattr(error, "strerror", None) or str(error)
+        raise InputError(f"{words[0]}: cannot be run ({why}); install the program limber, or name it by program=")
     if version != ["limber", __version__]:
         raise InputError(f"{words[0]}: is {' '.join(version)}, and this is limber {__version__}; "
                          "name another by program=")
@@ -347,7 +348,7 @@ def _run(words: List[str], progress: Optional[Progress]) -> Dict[str, Any]:
         for line in process.stderr:
             event = json.loads(line) if line.startswith("{") else {}
             if event.get("event") == "warning":
-                _warnings.warn(event["text"], UserWarning, stacklevel=3)
+                _warnings.warn(event["text"], UserWarning, stacklevel=4)
             elif event.get("event") == "model" and progress is not None:
                 progress("prepare", event["done"], event["total"], event["name"])
     except BaseException:
