@@ -148,8 +148,8 @@ class LIMBER_API Plan {
   std::string tree_hash() const, trajectory_hash() const;
   States frames() const;             // all of them
   std::vector<Push> pushes() const;  // from the start
-  // The fine surface of a body, in the order of Scene::bodies(), at a frame from 0 on. Throws InputError where there is
-  // no such body or frame.
+  // The fine surface of a body, in the order of Scene::bodies(), at a frame from 0 on. Throws InputError
+  // where there is no such body or frame.
   Vertices surface(int body, int frame) const;
   // What the command tells, as the text of a JSON object: docs/files.md.
   std::string summary_json(const Context& = {}) const;

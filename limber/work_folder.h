@@ -19,8 +19,8 @@ struct Promise {
 };
 // Every promise that limber makes of a work folder or a body's folder, checked anew from its files: replayed,
 // searched again (which takes as long as the search did), measured. `scene`: a file or name of the one that
-// the plan must be of, without edits but those that change nothing; empty: its own word is taken. Throws InputError where it is no
-// such folder.
+// the plan must be of, without edits but those that change nothing; empty: its own word is taken. Throws
+// InputError where it is no such folder.
 LIMBER_API std::vector<Promise> verify(const std::filesystem::path& folder, const std::string& scene = {},
                                        const Context& = {});
 // The same with the scene that the plan must be of: edits, preset and folders of models as it was read with.
