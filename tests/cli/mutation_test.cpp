@@ -1203,7 +1203,8 @@ TEST_F(Mutations_slow, OfAnotherScene) {
                  }},
                 {"an edit by --set", named,
                  [](Mutant& m) {
-                   m.planned.scene.sets.push_back("goal.radius_m=0.3");
+                   m.planned.scene.sets.push_back(
+                       "film.caption=another");  // one that says what the scene says is none
                    m.write_plan();
                  }}},
                trusted);
