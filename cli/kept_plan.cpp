@@ -108,8 +108,9 @@ std::string text_of_motion(const Json& s) {
   std::string volumes;
   for (const auto& [name, percent] : s.at("largest_volume_change_percent").items())
     volumes += fmt::format("{}{} {:.2f} %", volumes.empty() ? "" : ", ", name, percent.get<double>());
+  const int substeps = s.value("substeps", 1);  // plans of before had one
   return fmt::format(
-      "  motion       {:.2f} s in {} frames, time step {:.3g} ms\n"
+      "  motion       {:.2f} s in {} frames, time step {:.3g} ms{}\n"
       "  volume       changes at most: {}\n"
       "  penetration  at most {:.4f} m, {:.2f} % of the robot's size ({})\n"
       "  surfaces     overlap at most {:.2f} % ({}), in themselves {:.2f} % ({}), gap where they press "
@@ -117,7 +118,8 @@ std::string text_of_motion(const Json& s) {
       "in the median\n"
       "  strain       at most {:.3f} ({})\n"
       "  contact      at most {:.1f} N ({})\n",
-      s.at("motion_s").get<double>(), s.at("frames").get<int>(), 1e3 * s.at("dt_s").get<double>(), volumes,
+      s.at("motion_s").get<double>(), s.at("frames").get<int>(), 1e3 * s.at("dt_s").get<double>(),
+      substeps > 1 ? fmt::format(" in {} substeps", substeps) : "", volumes,
       s.at("deepest_penetration_m").get<double>(),
       100 * s.at("deepest_penetration_of_robot_size").get<double>(),
       s.at("penetration_between").get<std::string>(),

@@ -21,6 +21,7 @@
 
 #include "core/error.h"
 #include "fem/detail/check_world.h"
+#include "fem/detail/even_masses.h"
 #include "fem/detail/ligaments.h"
 #include "fem/detail/make_body.h"
 #include "fem/detail/make_elements.h"
@@ -39,6 +40,8 @@ constexpr double step_safety = 1.0 / 3, neo_hookean_step_safety = 0.25, fascia_s
                  ligament_step_safety = 0.25;
 // Of a world in which only rigid bodies move, and so no elastic step exists.
 constexpr double rigid_step_s = 1e-3;
+// Forces of contact are held for so many steps of the elastic forces at most.
+constexpr int max_substeps = 8;
 
 // The shape to which interpolation draws the robot, seen from its centre of mass; its rest shape if none is
 // given.
@@ -54,9 +57,25 @@ Points goal_shape(const Body& robot, const Points& given) {
   return shape;
 }
 
-// Sets contact_dt_s, the automatic step, and dt_s, the step that is taken. Both are float32 numbers
-// exactly, so that float and double steppers step alike. A sliver among the tets sets the step of the whole
-// world; the message names the body that has it.
+// The longest step of contact on fine surfaces. Of all bodies that are pushed the smallest counts, by the
+// geometric mean of its size and of its thickness 6 V/A: thin bodies are passed soonest, long ones go
+// fastest. Overlap grows with the square of the step (docs/contact-measured.md, "Substeps").
+double longest_contact_step_s(const World& world) {
+  constexpr double of_one_meter_s = 1.8e-3;
+  double smallest_m = std::numeric_limits<double>::infinity();
+  for (const Body& body : world.bodies) {
+    if (!body.pushed()) continue;
+    const double size_m = bounding_box(body.cage.positions).size().maxCoeff();
+    const double thickness_m = 6 * body.rest_volume_m3 / area({body.cage.positions, body.surface});
+    smallest_m = std::min(smallest_m, std::sqrt(size_m * std::min(size_m, thickness_m)));
+  }
+  return of_one_meter_s * std::sqrt(smallest_m);
+}
+
+// Sets the steps: of elastic forces as long as is stable; of contact on fine surfaces, which costs ten times
+// as much, as many of those as are accurate, and of contact between cages one. Steps of elastic forces and
+// contact_dt_s are float32 numbers exactly, so that float and double steppers step alike. A sliver among the
+// tets sets the step of the whole world; the message names the body that has it.
 void choose_step(double max_dt_s, World& world) {
   const auto step_of = [](const Body& body) {
     const bool springs = body.material.model == MaterialModel::springs;
@@ -71,14 +90,18 @@ void choose_step(double max_dt_s, World& world) {
     if (const double ratio = body.material.fascia_damping_ratio; body.material.fascia_hz > 0)
       step_s = std::min(step_s, fascia_step_safety * 2 * (std::hypot(1, ratio) - ratio) /
                                     (2 * std::numbers::pi * body.material.fascia_hz));
-  step_s = std::min(step_s, ligament_step_safety * detail::largest_stable_step(world.ligaments));
-  world.contact_dt_s = float(step_s);
-  world.dt_s = max_dt_s > 0 ? std::min(world.contact_dt_s, double(float(max_dt_s))) : world.contact_dt_s;
-  if (!(world.dt_s >= 1e-7))
+  step_s = float(std::min(step_s, ligament_step_safety * detail::largest_stable_step(world.ligaments)));
+  const double allowed_s = max_dt_s > 0 ? double(float(max_dt_s)) : std::numeric_limits<double>::infinity();
+  const double contact_s = world.bodies[0].shape ? std::min(longest_contact_step_s(world), allowed_s) : 0;
+  const double substep_s = std::min(step_s, allowed_s);
+  world.substeps = std::clamp(int(contact_s / substep_s), 1, max_substeps);
+  world.dt_s = world.substeps * substep_s;
+  world.contact_dt_s = float(world.substeps * step_s);
+  if (!(substep_s >= 1e-7))
     throw InputError(fmt::format(
         "body {}: its stable time step is {:.2g} s, too short to be of use; soften it, or mesh it "
         "without slivers, and see that no ligament is too stiff for what hangs on it",
-        stiffest->name, world.dt_s));
+        stiffest->name, substep_s));
 }
 
 // A force in steps of the world and on the nodes that may move. Its mass is that of all nodes it is meant
@@ -138,6 +161,9 @@ World build_world(const WorldSpec& spec) {
         fmt::format("body {}: the robot has no node that can move", world.bodies[spec.robot].name));
 
   detail::find_stiffness_shares(world.bodies);
+  // Between cages a longer step would make contact softer, and nothing stands against that.
+  for (Body& body : world.bodies)
+    if (body.shape) detail::even_masses(body);
   auto& tables = world.tables64;
   detail::for_each_table([&](auto& table) { table.ranges.resize(world.bodies.size()); }, tables.elements);
   world.topology.bodies.resize(world.bodies.size());

@@ -150,9 +150,10 @@ struct World {
   Box bounds_m;
   bool walls;
   double rest_speed_m_s;
-  double dt_s;  // time step, exactly a float32
-  double
-      contact_dt_s;  // step from which contact stiffness follows: the automatic one, also when dt_s is lower
+  double dt_s;   // time step: of controls, contact and frames; substeps × a float32
+  int substeps;  // of elastic forces, friction and integration in a step
+  // Step from which contact stiffness follows: the automatic one, also when dt_s is lower. A float32, too.
+  double contact_dt_s;
   Points goal_shape_m;              // (N × 3) from its centre of mass: to what interpolation draws the robot
   int moving_nodes;                 // nodes of State
   int nodes;                        // with those of static bodies
@@ -161,6 +162,7 @@ struct World {
   detail::Topology topology;
   detail::SurfaceTables<float> surfaces;  // without bodies where contact is between the cages
   detail::SurfaceTables<double> surfaces64;
+  double substep_s() const { return dt_s / substeps; }  // a float32 exactly
   bool touches_on_surfaces() const { return !surfaces.bodies.empty(); }
   std::vector<float> start_positions;  // (3 × moving_nodes) rest shapes and places, unless they were parted
   Parting parting;

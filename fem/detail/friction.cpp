@@ -8,8 +8,8 @@
 //
 // twelve times, or until no impulse changes by more than a thousandth of its limit.
 //
-// What always holds: impulses begin from zero in each step and are found in the fixed order of contacts, so
-// State is all there is, and the bits are the same for any lanes and threads. Both sides get an impulse by
+// What always holds: impulses begin from zero in each substep and are found in the fixed order of contacts,
+// so State is all there is, and the bits are the same for any lanes and threads. Both sides get an impulse by
 // the same shares, so momentum is kept; it never makes the kinetic energy larger. Below its limit nothing
 // creeps, above it slides as Coulomb says. Impulses are N s; as forces they are p/h.
 //
@@ -47,7 +47,7 @@ template <class Real>
 Friction<Real>::Friction(const World& world)
     : world_(world),
       tables_(tables_of<Real>(world)),
-      dt_(Real(world.dt_s)),
+      dt_(Real(world.substep_s())),
       slot_of_node_(std::size_t(world.nodes), -1),
       wall_loads_(6 * world.bodies.size()) {
   for (const Body& body : world.bodies)
@@ -64,7 +64,7 @@ template <class Real>
 void Friction<Real>::begin() {
   for (const Slot& slot : slots_) slot_of_node_[std::size_t(slot.node)] = -1;
   for (Spin& spin : spins_) spin.met = false;
-  slots_.clear(), shares_.clear(), slips_.clear();
+  slots_.clear(), shares_.clear(), slips_.clear(), limited_ = false;
   wall_nodes_of_slot_.clear(), wall_nodes_.clear(), wall_tellings_.clear(), wall_shares_.clear();
 }
 
@@ -315,7 +315,10 @@ template <class Real>
 void Friction<Real>::add_forces(const LaneView<Real>& view, const std::vector<const Real*>& pushes,
                                 std::vector<ContactRecord<Real>>* records) {
   if (slips_.empty() && wall_nodes_.empty()) return;
-  predict(view, pushes), limit_wall_nodes();
+  predict(view, pushes);
+  if (!limited_) limit_wall_nodes(), limited_ = true;  // once for all substeps
+  for (Slip& slip : slips_) std::fill_n(slip.impulse, 3, Real(0));
+  for (WallNode& node : wall_nodes_) std::fill_n(node.impulse, 3, Real(0));
   for (WallNode& node : wall_nodes_)
     if (!node.meets_others) step_of(node);
   for (int sweep = 0; sweep < max_sweeps; ++sweep) {

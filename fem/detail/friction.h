@@ -32,8 +32,8 @@ class Friction {
   void add(int body, int against, const Real place[3], const Real normal[3], Real most,
            const Share<Real>* first, const Share<Real>* second, const Share<Real>* last, int records = -1,
            Real told_share = 1);
-  // When view.f holds all other forces: adds those of friction, and to what was told. `pushes` [body] as of
-  // Motion, at the lane, or null.
+  // When view.f holds all other forces: adds those of friction, and to what was told; in each substep again,
+  // of the same touches. `pushes` [body] as of Motion, at the lane, or null.
   void add_forces(const LaneView<Real>& view, const std::vector<const Real*>& pushes,
                   std::vector<ContactRecord<Real>>* records);
 
@@ -112,6 +112,7 @@ class Friction {
   std::vector<Slip> slips_;
   std::vector<std::array<int, 6>> wall_nodes_of_slot_;  // by side; −1: none
   std::vector<WallNode> wall_nodes_;
+  bool limited_ = false;              // `most` of wall nodes is known
   std::vector<WallLoad> wall_loads_;  // [6 body + side]; empty between steps
   std::vector<WallTelling> wall_tellings_;
   std::vector<WallShare> wall_shares_;

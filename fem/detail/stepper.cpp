@@ -83,7 +83,7 @@ Stepper<Real>::Stepper(const World& world, int lanes, Isa isa)
       speed2_before_(std::size_t(lanes), 0),
       inner_speed2_(std::size_t(lanes), 0) {
   const Real speed2 = Real(world.rest_speed_m_s * world.rest_speed_m_s),
-             gain2 = speed2 * Real(world.dt_s * world.dt_s);  // gained within a second
+             gain2 = speed2 * Real(world.substep_s() * world.substep_s());  // gained within a second
   rest_.max_speed2 = speed2, rest_.max_gain2 = gain2;
   rest_.max_gain2_of_still = 100 * gain2;  // within a tenth of it
   rest_.max_shake2 = speed2 / 16, rest_.max_mean_gain2 = 16 * gain2,
@@ -239,24 +239,28 @@ LaneView<Real> Stepper<Real>::view(int lane) {
           &asleep_[lane]};
 }
 
-// Every Cost::sampled-th step is timed, and counts for all of them. The pieces are the same in both
-// branches.
+// Every Cost::sampled-th step is timed, and counts for all of them. Forces of contact are found once and held
+// over the substeps (docs/dynamics.md, "Step").
 template <class Real>
 void Stepper<Real>::step() {
   for (int lane = 0; lane < lanes_; ++lane)
     if (contact_[lane] && step_[lane] >= next_change_[lane]) follow_forces(lane);
-  if (cost_.steps++ % Cost::sampled != Cost::sampled / 2) {
-    find_sleepers(), add_contact_forces(), find_pushes(), add_stretch_limits(), add_fascia(), add_ligaments(),
-        add_elastic_forces(), add_friction(), integrate();
-    return;
+  const bool timed = cost_.steps++ % Cost::sampled == Cost::sampled / 2;
+  std::optional<Stopwatch> watch;
+  if (timed) watch.emplace();
+  const auto spent_on = [&](double& seconds) {
+    if (timed) seconds += Cost::sampled * watch->lap_s();
+  };
+  find_sleepers(), add_contact_forces(), spent_on(cost_.contact_s);
+  if (world_.substeps > 1) contact_forces_ = f_;
+  for (int substep = 0; substep < world_.substeps; ++substep) {
+    if (substep > 0) f_ = contact_forces_;
+    find_pushes(), spent_on(cost_.controls_s);
+    add_stretch_limits(), add_fascia(), add_ligaments(), add_elastic_forces(), spent_on(cost_.elastic_s);
+    add_friction(), spent_on(cost_.contact_s);
+    integrate(substep), spent_on(cost_.integration_s);
   }
-  Stopwatch watch;
-  const auto spent = [&] { return Cost::sampled * watch.lap_s(); };
-  find_sleepers(), add_contact_forces(), cost_.contact_s += spent();
-  find_pushes(), cost_.controls_s += spent();
-  add_stretch_limits(), add_fascia(), add_ligaments(), add_elastic_forces(), cost_.elastic_s += spent();
-  add_friction(), cost_.contact_s += spent();
-  integrate(), cost_.integration_s += spent();
+  for (std::int64_t& step : step_) ++step;
 }
 
 // Whether a kinematic body is elsewhere at the end of the step that begins.
@@ -309,13 +313,13 @@ void Stepper<Real>::move_by_keyframes(std::size_t b) {
 // are passed over; in some lanes they are held by the kernel. A soft body that may come to rest takes
 // the kernel that knows of rest, which gives the same bits where nothing rests.
 template <class Real>
-void Stepper<Real>::integrate() {
+void Stepper<Real>::integrate(int substep) {
   for (std::size_t b = 0; b < world_.bodies.size(); ++b) {
     const Topology::Body& body = world_.topology.bodies[b];
     if (!body.moving) continue;
     const std::size_t first = b * std::size_t(lanes_);
     if (world_.bodies[b].kind == BodyKind::kinematic) {
-      move_by_keyframes(b);
+      if (substep + 1 == world_.substeps) move_by_keyframes(b);
       continue;
     }
     if (all_asleep_[b]) {
@@ -324,11 +328,18 @@ void Stepper<Real>::integrate() {
                   &f_[force_layout_.at(body.last_node - 1, 0)] + force_layout_.node, Real(0));
       continue;
     }
-    Motion<Real> motion{
-        body.first_node, body.last_node, tables_.inverse_mass.data(), Real(world_.dt_s),  {},
-        Real(1),         pushes_on(b),   &lower_[3 * first],          &upper_[3 * first], &speed2_[first]};
+    Motion<Real> motion{body.first_node,
+                        body.last_node,
+                        tables_.inverse_mass.data(),
+                        Real(world_.substep_s()),
+                        {},
+                        Real(1),
+                        pushes_on(b),
+                        &lower_[3 * first],
+                        &upper_[3 * first],
+                        &speed2_[first]};
     for (int c = 0; c < 3; ++c) motion.gravity[c] = Real(world_.bodies[b].gravity_m_s2[c]);
-    motion.kept = Real(std::exp(-world_.bodies[b].material.mass_damping_per_s * world_.dt_s));
+    motion.kept = Real(std::exp(-world_.bodies[b].material.mass_damping_per_s * world_.substep_s()));
     Real *const x = state_.data(), *const v = &state_[first_velocity_];
     std::fill_n(&at_rest_[first], lanes_, Real(0));
     std::copy_n(&speed2_[first], lanes_, speed2_before_.data());
@@ -342,7 +353,8 @@ void Stepper<Real>::integrate() {
     } else
       kernels_.integrate(motion, x, v, f_.data());
     for (int lane = 0; lane < lanes_; ++lane)
-      unchanged_[first + lane] = at_rest_[first + lane] > 0 && speed2_before_[lane] == 0;
+      unchanged_[first + lane] = at_rest_[first + lane] > 0 && speed2_before_[lane] == 0 &&
+                                 (substep == 0 || unchanged_[first + lane] > 0);
     for (int lane = 0; lane < lanes_; ++lane)
       travel_[first + lane] += motion.dt * std::sqrt(speed2_[first + lane]);
     if (!wears_inside_[b]) continue;
@@ -350,7 +362,6 @@ void Stepper<Real>::integrate() {
     for (int lane = 0; lane < lanes_; ++lane)
       inner_travel_[first + lane] += motion.dt * std::sqrt(inner_speed2_[lane]);
   }
-  for (std::int64_t& step : step_) ++step;
 }
 
 template class Stepper<float>;

@@ -67,7 +67,7 @@ class Stepper {
   void add_ligaments();
   void add_elastic_forces();
   void add_friction(std::vector<ContactRecord<Real>>* records = nullptr);
-  void integrate();
+  void integrate(int substep);
   bool goes_on(int lane, int body) const;
   void move_by_keyframes(std::size_t body);
   const Real* pushes_on(std::size_t body);
@@ -85,8 +85,8 @@ class Stepper {
   Layout state_layout_, force_layout_;
   int first_velocity_;
   using Numbers = std::vector<Real, LineAllocator<Real>>;
-  Numbers state_, f_;
-  Numbers push_;  // [robot node][xyz][lane] accelerations, by the controls
+  Numbers state_, f_, contact_forces_;  // the last: of the step, as far as it has substeps
+  Numbers push_;                        // [robot node][xyz][lane] accelerations, by the controls
   // [body][its node][xyz][lane] The same by the world's forces, nothing for bodies without; and of the
   // robot's both together.
   std::vector<Numbers> forced_;

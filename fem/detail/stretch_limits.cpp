@@ -43,7 +43,7 @@ void diagonalise(double m[3][3], double vectors[3][3]) {
 
 template <class Real>
 StretchLimits<Real>::StretchLimits(const World& world, const Kernels<Real>& kernels)
-    : tables_(tables_of<Real>(world)), kernels_(kernels), step_(Real(world.contact_dt_s)) {
+    : tables_(tables_of<Real>(world)), kernels_(kernels), step_(Real(world.contact_dt_s / world.substeps)) {
   std::vector<std::size_t> first;
   for (std::size_t b = 0; b < world.bodies.size(); ++b) {
     const fem::Body& body = world.bodies[b];

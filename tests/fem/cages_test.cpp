@@ -1,12 +1,16 @@
 // What takes longer: the laws over cages of real models, and sag under refinement (docs/dynamics.md).
+#include <fmt/core.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
 
+#include "fem/detail/even_masses.h"
+#include "fem/detail/make_body.h"
 #include "meshing/cage.h"
 #include "meshing/import.h"
 #include "scenes/shapes.h"
 #include "tests/fem/laws.h"
+#include "tests/fem/modes.h"
 #include "tests/places.h"
 
 namespace limber::fem {
@@ -37,6 +41,42 @@ TEST(Cages, OfOrgansObeyTheLaws) {
     testing::prove_laws_of_any_mesh(std::string("cage of a ") + name,
                                     cage_of(meshing::import_model(file, {.scale = 0.001}).surface, 600),
                                     0.05);
+  }
+}
+
+// What is moved to light nodes of organs' cages makes the fastest mode slower and leaves the slow ones.
+TEST(EvenMasses_slow, OfOrgansSlowModesStay) {
+  const fs::path folder = fs::path(limber_shared_data) / "organs";
+  if (!fs::exists(folder)) GTEST_SKIP() << folder << " is not here: nothing proved of organs";
+  std::vector<fs::path> files;
+  for (const auto& entry : fs::directory_iterator(folder))
+    if (entry.path().extension() == ".obj") files.push_back(entry.path());
+  std::sort(files.begin(), files.end());
+  for (const fs::path& file : files) {
+    const TetMesh cage = cage_of(meshing::import_model(file, {.scale = 0.001}).surface, 160);
+    for (const auto& [model, name, allowed] :
+         {std::tuple(MaterialModel::springs, "springs", 0.035),
+          std::tuple(MaterialModel::neo_hookean, "Neo-Hookean", 0.015)}) {
+      BodySpec spec{"organ", cage, {}, {}};
+      spec.material.poisson_ratio = 0.45, spec.material.model = model;
+      Body body = detail::make_body(spec);
+      body.stiffness_share = 1;
+      const Eigen::VectorXd before = testing::frequencies2(body);
+      detail::even_masses(body);
+      const Eigen::VectorXd after = testing::frequencies2(body);
+      const Eigen::Index fastest = before.size() - 1;
+      Eigen::Index first = 0;  // a cage of p pieces has 6 p modes that move them as wholes
+      while (before[first] < 1e-7 * before[fastest]) ++first;
+      double largest = 0;
+      for (Eigen::Index mode = first; mode < first + 10; ++mode)
+        largest = std::max(largest, std::abs(std::sqrt(after[mode] / before[mode]) - 1));
+      const double longer = std::sqrt(before[fastest] / after[fastest]);
+      fmt::print(
+          "{} of {} tets, {}: undamped step x {:.2f}, ten slowest frequencies off by at most {:.2f} %\n",
+          file.stem().string(), cage.tets.rows(), name, longer, 100 * largest);
+      EXPECT_LT(largest, allowed) << file << ' ' << name;
+      EXPECT_GE(longer, 1 - 1e-9) << file << ' ' << name;
+    }
   }
 }
 

@@ -95,6 +95,7 @@ Json facts_of_motion(const plan::Plan& plan, const fem::World& world, const Moti
   const plan::Trajectory& path = plan.trajectory;
   Json json{{"explanation", plan::explain(plan)},
             {"dt_s", world.dt_s},
+            {"substeps", world.substeps},
             {"motion_s", double(path.end.step - plan.tree.states.steps()[0]) * world.dt_s},
             {"frames", path.frames.size()},
             {"tree_hash", hex(plan::hash_of(plan.tree))},

@@ -59,6 +59,7 @@ std::uint64_t hash_of_world(const fem::World& world) {
   hasher.matrix(world.goal_shape_m);
   const Vec3 gravity_m_s2 = world.bodies[std::size_t(world.robot)].gravity_m_s2;
   hasher.matrix(gravity_m_s2).value(world.dt_s).value(world.contact_dt_s).value(world.rest_speed_m_s);
+  if (world.substeps > 1) hasher.text("substeps").value(world.substeps);
   for (const double offset : world.surfaces64.offset) hasher.value(offset);
   if (!world.part_overlaps) hasher.text("overlaps are refused");
   if (std::isfinite(world.max_overlap_m)) hasher.value(world.max_overlap_m);
