@@ -61,7 +61,7 @@ Points goal_shape(const Body& robot, const Points& given) {
 // geometric mean of its size and of its thickness 6 V/A: thin bodies are passed soonest, long ones go
 // fastest. Overlap grows with the square of the step (docs/contact-measured.md, "Substeps").
 double longest_contact_step_s(const World& world) {
-  constexpr double of_one_meter_s = 1.8e-3;
+  constexpr double of_one_meter_s = 1.5e-3;
   double smallest_m = std::numeric_limits<double>::infinity();
   for (const Body& body : world.bodies) {
     if (!body.pushed()) continue;
