@@ -105,7 +105,7 @@ class Finder {
 
   // Corners of triangles at a vertex belong to one fan when an edge at that vertex joins their triangles.
   void find_fans() {
-    detail::UnionFind fans(int(mesh_.triangles.size()));
+    UnionFind fans(int(mesh_.triangles.size()));
     const auto corner_at = [&](const EdgeUse& use, int vertex) {
       return 3 * use.triangle +
              (mesh_.triangles(use.triangle, use.side) == vertex ? use.side : (use.side + 1) % 3);

@@ -100,7 +100,7 @@ void add_entries(const Vec3& p, int row, double tolerance_m, std::vector<CellEnt
 // that of vertices counts.
 std::vector<int> weld(const Points& positions, double tolerance_m) {
   const int n = int(positions.rows());
-  detail::UnionFind welded(n);
+  UnionFind welded(n);
   const auto coordinates = [&](int v) {
     return std::tuple(positions(v, 0), positions(v, 1), positions(v, 2));
   };

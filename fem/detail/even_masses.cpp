@@ -17,11 +17,10 @@
 #include <Eigen/QR>
 #include <algorithm>
 #include <array>
-#include <cmath>
-#include <limits>
 #include <numeric>
 #include <vector>
 
+#include "core/union_find.h"
 #include "fem/detail/make_elements.h"
 #include "fem/detail/tet_edges.h"
 
@@ -83,18 +82,12 @@ NodeStiffness stiffness_of_nodes(const Body& body, const ElementTables<double>& 
 
 // The nodes of each part of the cage that hangs together.
 std::vector<std::vector<int>> pieces_of(const Body& body) {
-  std::vector<int> leader(std::size_t(body.node_count()));
-  std::iota(leader.begin(), leader.end(), 0);
-  const auto find = [&](int n) {
-    while (leader[std::size_t(n)] != n)
-      n = leader[std::size_t(n)] = leader[std::size_t(leader[std::size_t(n)])];
-    return n;
-  };
+  UnionFind parts(body.node_count());
   for (int t = 0; t < body.cage.tets.rows(); ++t)
-    for (int i = 1; i < 4; ++i) leader[std::size_t(find(body.cage.tets(t, i)))] = find(body.cage.tets(t, 0));
-  std::vector<std::vector<int>> of_leader(leader.size()), pieces;
-  for (int n = 0; n < body.node_count(); ++n) of_leader[std::size_t(find(n))].push_back(n);
-  std::copy_if(of_leader.begin(), of_leader.end(), std::back_inserter(pieces),
+    for (int i = 1; i < 4; ++i) parts.join(body.cage.tets(t, 0), body.cage.tets(t, i));
+  std::vector<std::vector<int>> of_root(std::size_t(body.node_count())), pieces;
+  for (int n = 0; n < body.node_count(); ++n) of_root[std::size_t(parts.root(n))].push_back(n);
+  std::copy_if(of_root.begin(), of_root.end(), std::back_inserter(pieces),
                [](const std::vector<int>& nodes) { return !nodes.empty(); });
   return pieces;
 }

@@ -2,11 +2,11 @@
 // over it.
 #pragma once
 
-#include <numeric>
 #include <span>
 #include <vector>
 
 #include "core/types.h"
+#include "core/union_find.h"
 
 namespace limber::meshing::detail {
 
@@ -30,23 +30,6 @@ void for_each_edge(const std::vector<EdgeUse>& uses, Visit visit) {
     visit(std::span<const EdgeUse>(uses.data() + begin, end - begin));
   }
 }
-
-// Groups that grow together; the root of a group is its lowest member.
-class UnionFind {
- public:
-  explicit UnionFind(int n) : parent_(std::size_t(n)) { std::iota(parent_.begin(), parent_.end(), 0); }
-  int root(int i) {
-    while (parent_[i] != i) i = parent_[i] = parent_[parent_[i]];
-    return i;
-  }
-  void join(int i, int j) {
-    i = root(i), j = root(j);
-    if (i != j) parent_[std::max(i, j)] = std::min(i, j);
-  }
-
- private:
-  std::vector<int> parent_;
-};
 
 // For each triangle, the lowest triangle that it is joined to over shared edges.
 std::vector<int> components(const Triangles&, const std::vector<EdgeUse>&);

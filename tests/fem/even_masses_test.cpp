@@ -83,7 +83,9 @@ TEST(EvenMasses, EachPieceKeepsItsOwn) {
     return sum;
   };
   const double first = mass(0), second = mass(nodes);
+  const std::vector<double> masses = body.node_mass_kg;
   detail::even_masses(body);
+  EXPECT_NE(body.node_mass_kg, masses);
   EXPECT_NEAR(mass(0), first, 1e-9 * first);
   EXPECT_NEAR(mass(nodes), second, 1e-9 * second);
 }
