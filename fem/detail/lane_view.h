@@ -1,6 +1,8 @@
 // One lane's arrays, as contact reads and writes them.
 #pragma once
 
+#include <cstdint>
+
 #include "fem/detail/kernels.h"
 
 namespace limber::fem::detail {
@@ -16,6 +18,9 @@ struct LaneView {
   const Real *lower, *upper, *travel, *inner_travel;
   // Bodies that take no part in this step, [body stride], or null: nothing is looked for between two of them.
   const Real* asleep = nullptr;
+  // How often each body has changed its place since load, [body stride], or null: while two bodies' counts
+  // stay, so do their contacts.
+  const std::uint32_t* changes = nullptr;
   bool sleeps(int body) const { return asleep && asleep[body * stride] > 0; }
 };
 

@@ -106,7 +106,7 @@ Stepper<Real>::Stepper(const World& world, int lanes, Isa isa)
                             (std::isfinite(body.max_stretch) || body.self_contact || body.phong));
   speed2_.assign(bodies, 0), travel_.assign(bodies, 0), inner_travel_.assign(bodies, 0);
   unchanged_.assign(bodies, 0), asleep_.assign(bodies, 0), at_rest_.assign(bodies, 0);
-  touches_.assign(bodies, 0);
+  touches_.assign(bodies, 0), changes_.assign(bodies, 0);
   met_.assign(world.bodies.size() * bodies, false);
   tied_.assign(world.bodies.size() * world.bodies.size(), false);
   for (const Ligament& ligament : world.ligaments)
@@ -236,7 +236,7 @@ LaneView<Real> Stepper<Real>::view(int lane) {
           force_layout_,  lanes_,
           &lower_[lane],  &upper_[lane],
           &travel_[lane], &inner_travel_[lane],
-          &asleep_[lane]};
+          &asleep_[lane], &changes_[lane]};
 }
 
 // Every Cost::sampled-th step is timed, and counts for all of them. Forces of contact are found once and held
@@ -260,6 +260,7 @@ void Stepper<Real>::step() {
     add_friction(), spent_on(cost_.contact_s);
     integrate(substep), spent_on(cost_.integration_s);
   }
+  for (std::size_t k = 0; k < changes_.size(); ++k) changes_[k] += unchanged_[k] == 0;
   for (std::int64_t& step : step_) ++step;
 }
 

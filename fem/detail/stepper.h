@@ -101,6 +101,7 @@ class Stepper {
   // Sleep (docs/dynamics.md), all [body][lane], 0 or 1: is as it was a step ago; takes no part in this step;
   // was at rest in this step. And [pair of bodies][lane]: their boxes met a step ago.
   Numbers unchanged_, asleep_, at_rest_;
+  std::vector<std::uint32_t> changes_;            // [body][lane] steps in which it changed, since load
   Numbers touches_;                               // its box meets another's or a wall
   std::vector<bool> met_;                         // or a ligament ties them, always
   std::vector<bool> tied_;                        // [pair of bodies]

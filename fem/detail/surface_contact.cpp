@@ -81,7 +81,8 @@ SurfaceContacts<Real>::SurfaceContacts(const World& world, const Kernels<Real>& 
 // node that walls can meet is awake.
 template <class Real>
 void SurfaceContacts<Real>::forget(int lane) {
-  for (std::size_t p = 0; p < pairs_.size(); ++p) lists_[lane * pairs_.size() + p].built = false;
+  for (std::size_t p = 0; p < pairs_.size(); ++p)
+    lists_[lane * pairs_.size() + p].built = lists_[lane * pairs_.size() + p].kept = false;
   for (int body = 0; body < bodies_; ++body) {
     auto& walls = walls_asleep_until_[lane * bodies_ + body];
     std::fill(walls.begin(), walls.end(), std::numeric_limits<Real>::lowest());

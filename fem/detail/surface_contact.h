@@ -62,6 +62,12 @@ class SurfaceContacts {
     bool built = false;
     Real travel_at_build = 0, reach = 0;
     Near near[2];  // samples of a in b, of b in a
+    // What find_pair found last where neither body has moved since the call before; indices of shares count
+    // from the first of these.
+    bool kept = false;
+    std::uint32_t changes[2] = {0, 0};  // of a and b in the last call
+    std::vector<SurfaceContact<Real>> contacts;
+    std::vector<Share> shares;
   };
   // x y z and nothing: added and scaled at once.
   typedef Real Row __attribute__((vector_size(4 * sizeof(Real)), may_alias));
@@ -90,14 +96,12 @@ class SurfaceContacts {
   // How far a surface is, negative below it, along its unit normal.
   struct Surface {
     Real distance, normal[3];
-    // By the field's value and gradient at rest, and what that becomes as the body is deformed. A distance
-    // has slope 1; where the field has hardly any, in a slit that is finer than its cells, the point is about
-    // as far off as it says, and not many times so far.
+    // By the field's value and gradient at rest, and what the gradient becomes as the body is deformed. The
+    // value is the distance at rest, and the ratio of the two slopes says how the body's deformation scales
+    // it. It does not jump where the gradient does, at borders of the grid's cells.
     bool set(Real at_rest, const Real rest_gradient[3], const Real gradient[3]) {
-      constexpr Real min_slope = Real(0.5);
-      const Real steepness = std::sqrt(dot(gradient, gradient)), slope2 = dot(rest_gradient, rest_gradient);
-      distance = at_rest / steepness;
-      if (slope2 < min_slope * min_slope) distance *= std::sqrt(slope2) / min_slope;
+      const Real steepness = std::sqrt(dot(gradient, gradient));
+      distance = at_rest * (std::sqrt(dot(rest_gradient, rest_gradient)) / steepness);
       for (int c = 0; c < 3; ++c) normal[c] = gradient[c] / steepness;
       return steepness > Real(1e-3);
     }
@@ -119,6 +123,7 @@ class SurfaceContacts {
   // surface_candidates.cpp
   Real travel_of(const LaneView<Real>&, int a, int b);
   void find_pair(int lane, const LaneView<Real>&, std::size_t pair);
+  void find_moved_pair(const LaneView<Real>&, int a, int b, List&);
   void build(const LaneView<Real>&, int from, int into, Real reach, Near&);
   void collect_groups(const LaneView<Real>&, int from, const Real lower[3], const Real upper[3], Real reach);
   void sort_groups(const Real lower[3], const Real upper[3]);

@@ -3,12 +3,14 @@
 // A sample p in a tet with barycentric weights λ is at rest at X = Σ λᵢ Xᵢ. There φ(X) is the distance to
 // the surface, and through the deformation gradient F of the tet its gradient becomes g:
 //
-//     g = F⁻ᵀ ∇φ = Σᵢ (∇φ·(Xᵢ − X₀)) ∇λᵢ,    distance = φ/|g| along n = g/|g|,    depth = offset − distance.
+//     g = F⁻ᵀ ∇φ = Σᵢ (∇φ·(Xᵢ − X₀)) ∇λᵢ,   distance = φ|∇φ|/|g| along n = g/|g|,   depth = offset −
+//     distance.
 //
-// g is exact within a tet, the distance to first order: the nearer the surface, the better. Where |∇φ| < ½
-// the distance is that of |∇φ| = ½: in slits of an aorta along a spine, finer than the spine's cells, φ/|g|
-// made 3 mm of a tenth. Depths are metres along the unit normal n, which points out of the body whose surface
-// it is.
+// g is exact within a tet, the distance to first order: the nearer the surface, the better. Depths are metres
+// along the unit normal n, which points out of the body whose surface it is. φ/|g| would divide by |∇φ| what
+// is a distance already: that is less exact (docs/contact-measured.md), in slits finer than the field's
+// cells 3 mm for a tenth, and jumps where |∇φ| does, at borders of cells: a node that a sample hangs on got
+// more speed there than it came with, and trembled for ever.
 //
 // Where Phong Deformation bends the surface, X is found by Newton's method and F is the mean F̄ = Σ λᵢ Fᵢ
 // of the nodes', so g does not jump at borders of tets. What a bend moves farther than a body's `bulge` may
@@ -222,9 +224,9 @@ bool SurfaceContacts<Real>::is_beside(int tet, const Real weight[4], Real slack)
 }
 
 // Measures a sample of `from` in a tet of `into`, and appends a touch where it is nearer to the surface
-// than the offset, or below it. Where something bends, the sample is first measured as if nothing did, with
-// the two bends added to first order: most candidates end there. Only then come the exact place and
-// Newton's method.
+// than the offset, or below it. Where something bends, the sample is first measured as if nothing did: most
+// candidates are too far off then, whichever way the bends go, and end there. Only then come the exact place
+// and Newton's method.
 template <class Real>
 bool SurfaceContacts<Real>::measure(const LaneView<Real>& view, int from, int into, int sample, int tet,
                                     const Real weight[4]) {
@@ -243,16 +245,14 @@ bool SurfaceContacts<Real>::measure(const LaneView<Real>& view, int from, int in
   Real against[4];
   std::copy_n(weight, 4, against);
   if (from_bends || into_bends) {
-    // To first order the bends shift the distance by their parts along the normal; a third more for the rest.
+    // No bend can bring it nearer than by its own length: a field's slope is 1, or little more.
     Place bent, against_bent;
     bent.row = against_bent.row = Row{};
     if (from_bends) bent = bend(bends_of(view, own.tet), own.weight);
     if (into_bends) against_bent = bend(bends_of(view, tet), weight);
-    const Real slack =
-        (std::sqrt(dot(bent.at, bent.at)) + std::sqrt(dot(against_bent.at, against_bent.at))) / 3;
-    if (surface.distance + dot(surface.normal, bent.at) - dot(surface.normal, against_bent.at) >
-        apart + slack)
-      return false;
+    constexpr Real steepest = Real(1.2);
+    const Real nearer = std::sqrt(dot(bent.at, bent.at)) + std::sqrt(dot(against_bent.at, against_bent.at));
+    if (surface.distance > apart + steepest * nearer) return false;
     if (from_bends) {
       place.row += bent.row;
       if (!barycentric(view, tet, place.at, against)) return false;

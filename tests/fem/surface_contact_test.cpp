@@ -136,6 +136,53 @@ TEST_P(SurfaceContact, InSlitsThatTheFieldDoesNotSeeNothingIsDeep) {
   EXPECT_GT(flat, 100);
 }
 
+// A bent ball slides over a slit and the edges of a block at rest whose field has cells of 120 mm, so that
+// its slope is far from 1 and changes from cell to cell. The depth of a sample changes by no more than the
+// ball goes: what jumps gives a light node more speed than it came with, again and again.
+TEST_P(SurfaceContact, DepthsDoNotJump) {
+  WorldSpec spec;
+  const Vec3 start(0.2, 0.25, 1.2);
+  spec.bodies = {{"ball", cube(start, 1, 2), {}, {}, BodyKind::deformable},
+                 {"block", cube(Vec3::Zero(), 2, 4), {}, {}, BodyKind::immovable}};
+  spec.bodies[0].shape = shape_of(spec.bodies[0].cage, ball_surface(start, 0.4), 0.02, 0.05);
+  const auto block = [](const Vec3& p) {
+    const auto part = [&](double from, double to) {
+      return rounded_box_surface({Vec3(from, -0.6, -0.6), Vec3(to, 0.6, 0.7)}, 0.02)(p);
+    };
+    return std::min(part(-0.6, 0.38), part(0.43, 0.6));
+  };
+  spec.bodies[1].shape = shape_of(spec.bodies[1].cage, block, 0.12, 0.05);
+  spec.bodies[0].phong = GetParam();
+  spec.bounds_m = {Vec3::Constant(-20), Vec3::Constant(20)};
+  spec.walls = false, spec.contact_offset_m = 0.04;
+  const World world = build_world(spec);
+  Lane lane(world);
+  lane.move(0, [&](const Vec3f& p) {
+    const Vec3f q = p - start.cast<float>();
+    return Vec3f(p + Vec3f(0.9f * q.z() * q.z(), 0.7f * q.z() * q.z(), -0.15f + 0.5f * q.x() * q.x()));
+  });
+  std::map<int, float> before;
+  constexpr float step = 0.5e-3f;
+  float largest = 0;
+  int followed = 0;
+  for (int k = 0; k < 1200; ++k) {
+    std::map<int, float> now;
+    for (const auto& contact : touches_of(lane))
+      if (contact.body == 0) now[contact.sample] = contact.depth;
+    for (const auto& [sample, depth] : now) {
+      const auto old = before.find(sample);
+      if (k > 0) largest = std::max(largest, std::abs(depth - (old == before.end() ? 0 : old->second)));
+      ++followed;
+    }
+    for (const auto& [sample, depth] : before)
+      if (!now.contains(sample)) largest = std::max(largest, depth);
+    before = std::move(now);
+    lane.move(0, [&](const Vec3f& p) { return Vec3f(p + Vec3f(step, 0.7f * step, -0.1f * step)); });
+  }
+  EXPECT_GT(followed, 10000);
+  EXPECT_LT(largest, 1.5f * step);
+}
+
 // A small ball is pressed into an ellipsoid, a ball that is drawn out and sheared, from twelve sides. Depths
 // of its samples are those below the tangent plane at the nearest of many places of the ellipsoid.
 TEST_P(SurfaceContact, DepthsInAnEllipsoidAreThoseOfBruteForce) {
@@ -541,6 +588,50 @@ TEST(SurfaceContacts, StepsOneByOneAreAllAtOnce) {
     EXPECT_EQ(stepped, whole);
     for (const float v : whole.velocities) ASSERT_EQ(v, 0);  // all sleep
   }
+}
+
+// A ball rests on a block while another goes about within its box, so that neither sleeps; then it is struck,
+// and comes to rest again. Contacts that were kept are those that are found anew at each step.
+TEST_P(SurfaceContact, WhatStaysTouchesAsItDid) {
+  WorldSpec spec = two_balls(0.04, 0.5, GetParam());
+  for (BodySpec& body : spec.bodies) body.material.damping_ratio = 1;
+  spec.bodies.push_back({"block", cube({0, 0, -1.4}, 2, 2), {}, {}, BodyKind::immovable});
+  spec.bodies[2].shape = shape_of(
+      spec.bodies[2].cage, rounded_box_surface({Vec3(-1, -1, -2.3), Vec3(1, 1, -0.41)}, 0.02), 0.1, 0.08);
+  spec.gravity_m_s2 = {0, 0, -2}, spec.rest_speed_m_s = 0.05;
+  spec.robot = 1;
+  spec.bodies[1].gravity_m_s2 = Vec3::Zero();
+  const World world = build_world(spec);
+  Batch batch(world, 1);
+  const State start = rest_state(world);
+  const auto run = [&](State state, Control control, bool anew) {
+    for (int left = control.steps; left > 0; left -= control.steps) {
+      if (anew) control.steps = 1, batch.load(0, start, control);  // forgets all lists
+      batch.load(0, state, control);
+      batch.advance();
+      batch.store(0, state);
+    }
+    return state;
+  };
+  State state = start;
+  int rested = 0, moved = 0;
+  const std::pair<double, Vec3f> legs[] = {{2, {0, 0, 0}},    {0.3, {0, 0, 1}}, {0.3, {0, 0, -1}},
+                                           {0.3, {-2, 0, 0}}, {0.3, {2, 0, 0}}, {1, {0, 0, 0}},
+                                           {0.3, {0, 0, -1}}};
+  for (const auto& [duration_s, push_m_s2] : legs) {
+    Control control;
+    control.manipulation = Manipulation::body, control.force_n = float(world.bodies[1].mass_kg) * push_m_s2;
+    control.steps = int(duration_s / world.dt_s);
+    const State whole = run(state, control, false);
+    ASSERT_EQ(run(state, control, true), whole) << push_m_s2.transpose();
+    state = whole;
+    const bool rests =
+        std::all_of(state.velocities.begin(), state.velocities.begin() + 3 * world.bodies[0].node_count(),
+                    [](float v) { return v == 0; });
+    (rests ? rested : moved)++;
+  }
+  EXPECT_GE(rested, 3);
+  EXPECT_GE(moved, 1);
 }
 
 TEST_P(SurfaceContact, TheAgeOfListsChangesNothing) {

@@ -23,6 +23,8 @@ constexpr int preferred_lanes = 16;
 // Goes up where the laws of motion or of what a search refuses change: plans made before are of another
 // world.
 constexpr int edition = 3;
+// The same of contact on fine surfaces alone.
+constexpr int surface_edition = 2;
 constexpr int widths[] = {1, 4, 8, 16};
 
 // Nothing where nothing happens by itself.
@@ -60,6 +62,7 @@ std::uint64_t hash_of_world(const fem::World& world) {
   const Vec3 gravity_m_s2 = world.bodies[std::size_t(world.robot)].gravity_m_s2;
   hasher.matrix(gravity_m_s2).value(world.dt_s).value(world.contact_dt_s).value(world.rest_speed_m_s);
   if (world.substeps > 1) hasher.text("substeps").value(world.substeps);
+  if (world.touches_on_surfaces()) hasher.text("surfaces").value(surface_edition);
   for (const double offset : world.surfaces64.offset) hasher.value(offset);
   if (!world.part_overlaps) hasher.text("overlaps are refused");
   if (std::isfinite(world.max_overlap_m)) hasher.value(world.max_overlap_m);
