@@ -4,7 +4,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <optional>
+#include <utility>
+#include <vector>
 
 #include "core/mass_properties.h"
 #include "core/random.h"
@@ -163,13 +166,20 @@ class Checker {
       if (least > -0.999) c_.misplaced_m = std::max(c_.misplaced_m, (there - p).norm());
     }
     c_.area_share = samples.area_m2.sum() / seen_.area_m2;
+    // The nearest may be one of a crease, where they are close, beside a face, where they are not: one of a few
+    // near ones stands for the place.
     const detail::SurfaceSpots sequence(seen_);
+    std::vector<std::pair<double, Eigen::Index>> near(std::size_t(samples.area_m2.size()));
+    const std::size_t few = std::min<std::size_t>(near.size(), 6);
     for (int i = 0; i < spots; ++i) {
       const Vec3 p = sequence.at(std::uint32_t(i)).position;
-      Eigen::Index nearest = 0;
-      const double squared =
-          (samples.positions_m.rowwise() - p.transpose()).rowwise().squaredNorm().minCoeff(&nearest);
-      c_.widest_gap = std::max(c_.widest_gap, std::sqrt(squared / samples.area_m2[nearest]));
+      for (std::size_t s = 0; s < near.size(); ++s)
+        near[s] = {(samples.positions_m.row(Eigen::Index(s)).transpose() - p).squaredNorm(), Eigen::Index(s)};
+      std::partial_sort(near.begin(), near.begin() + std::ptrdiff_t(few), near.end());
+      double gap2 = std::numeric_limits<double>::infinity();
+      for (std::size_t k = 0; k < few; ++k)
+        gap2 = std::min(gap2, near[k].first / samples.area_m2[near[k].second]);
+      c_.widest_gap = std::max(c_.widest_gap, std::sqrt(gap2));
     }
   }
 

@@ -18,8 +18,8 @@ struct ContactCheck {
   double off_surface_m = 0, misplaced_m = 0;  // the farthest of a sample from the surface, and from where its
                                               // weights put it
   double area_share = 0;                      // that the samples stand for, of the surface that is seen
-  double widest_gap =
-      0;  // of points of the surface to the nearest sample, over the side of a square of its area
+  // Of points of the surface to one of the nearest samples, over the side of a square of that sample's area.
+  double widest_gap = 0;
   int wrong_least_weights = 0;  // tets whose min_weight does not follow from the field
 
   std::string field_fault, sample_fault;  // "" where all of that is as it must be

@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include "meshing/contact_check.h"
 #include "tests/meshing/contact_shapes.h"
 
 namespace limber::meshing {
@@ -36,6 +37,41 @@ TEST(ContactShape, OutsideTheCageWeightsAreClamped) {
     }
     nearest = (cage.positions.rowwise() - s.positions_m.row(i)).rowwise().norm().minCoeff();
     EXPECT_LT(own, nearest + 0.1);
+  }
+}
+
+// A ball without samples on a cap of it is told, whoever stands for the cap's area: all others, one beside it,
+// or one far off.
+TEST(ContactCheck, APlaceWithoutSamplesIsTold) {
+  const Made made(made_sphere(30));
+  EXPECT_EQ(check_contact_shape(made.shape, made.surface, made.cage).sample_fault, "");
+  for (const int heir : {-1, 0, 1}) {
+    ContactShape shape = made.shape;
+    SurfaceSamples &all = shape.samples, kept = all;
+    Eigen::Index count = 0, beside = 0, opposite = 0;
+    double lost_m2 = 0;
+    for (Eigen::Index s = 0; s < all.area_m2.size(); ++s) {
+      const double z = all.positions_m(s, 2);
+      if (z > 0.8) {
+        lost_m2 += all.area_m2[s];
+        continue;
+      }
+      kept.positions_m.row(count) = all.positions_m.row(s), kept.weights.row(count) = all.weights.row(s);
+      kept.area_m2[count] = all.area_m2[s], kept.tet_from_sample[count] = all.tet_from_sample[s];
+      if (z > kept.positions_m(beside, 2)) beside = count;
+      if (z < kept.positions_m(opposite, 2)) opposite = count;
+      ++count;
+    }
+    kept.positions_m.conservativeResize(count, 3), kept.weights.conservativeResize(count, 4);
+    kept.area_m2.conservativeResize(count), kept.tet_from_sample.conservativeResize(count);
+    if (heir < 0)
+      kept.area_m2 *= (kept.area_m2.sum() + lost_m2) / kept.area_m2.sum();
+    else
+      kept.area_m2[heir == 0 ? beside : opposite] += lost_m2;
+    all = kept;
+    EXPECT_NE(check_contact_shape(shape, made.surface, made.cage).sample_fault.find("spacings away"),
+              std::string::npos)
+        << heir;
   }
 }
 
