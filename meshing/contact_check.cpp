@@ -166,8 +166,8 @@ class Checker {
       if (least > -0.999) c_.misplaced_m = std::max(c_.misplaced_m, (there - p).norm());
     }
     c_.area_share = samples.area_m2.sum() / seen_.area_m2;
-    // The nearest may be one of a crease, where they are close, beside a face, where they are not: one of a few
-    // near ones stands for the place.
+    // The nearest may be one of a crease, where they are close, beside a face, where they are not: one of a
+    // few near ones stands for the place.
     const detail::SurfaceSpots sequence(seen_);
     std::vector<std::pair<double, Eigen::Index>> near(std::size_t(samples.area_m2.size()));
     const std::size_t few = std::min<std::size_t>(near.size(), 6);

@@ -198,6 +198,7 @@ SurfaceTables<float> single_precision(const Tables64& t) {
     copy.tets_of_wall_nodes = b.tets_of_wall_nodes;
   }
   out.offset.assign(t.offset.begin(), t.offset.end());
+  out.first_own_offset = t.first_own_offset, out.own_offset.assign(t.own_offset.begin(), t.own_offset.end());
   for (const auto& s : t.slopes)
     out.slopes.push_back({s.node, {float(s.gradient[0]), float(s.gradient[1]), float(s.gradient[2])}});
   out.first_slope = t.first_slope, out.first_share = t.first_share;

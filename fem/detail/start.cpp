@@ -1,8 +1,10 @@
 #include "fem/detail/start.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <optional>
 #include <utility>
 
@@ -23,7 +25,12 @@ struct Gap {
   std::optional<SurfaceContact<double>> nearest;        // nothing: no nearer than that offset
   std::vector<SurfaceTables<double>::Share> shares[2];  // of it: of the sample's side, of the other
 };
-using Gaps = std::vector<Gap>;  // [body a × bodies + body b], on the diagonal of a body and itself
+struct Gaps {
+  std::vector<Gap> of_pair;  // [body a × bodies + body b], on the diagonal of a body and itself
+  // The gaps of single samples below that offset, by body, against, sample.
+  std::map<std::array<int, 3>, double> of_sample;
+  const Gap& operator[](std::size_t pair) const { return of_pair[pair]; }
+};
 
 std::vector<double> places_of(const World& world, const Positions& positions) {
   std::vector<double> x = world.tables64.rest_positions;
@@ -34,7 +41,7 @@ std::vector<double> places_of(const World& world, const Positions& positions) {
 // Of a world whose surfaces64 have that offset everywhere.
 Gaps gaps(const World& world, double offset_m, const Positions& positions) {
   const std::size_t bodies = world.bodies.size();
-  Gaps gaps(bodies * bodies, {offset_m, {}, {}});
+  Gaps gaps{std::vector<Gap>(bodies * bodies, {offset_m, {}, {}}), {}};
   const std::vector<double> x = places_of(world, positions), still(x.size(), 0.0), travel(bodies, 0.0);
   std::vector<double> forces(x.size(), 0.0), lower, upper;
   for (const Body& body : world.bodies) {
@@ -49,21 +56,40 @@ Gaps gaps(const World& world, double offset_m, const Positions& positions) {
                                                lower.data(), upper.data(), travel.data(), travel.data()})) {
     if (contact.against < 0) continue;
     const std::size_t one = std::size_t(contact.body), other = std::size_t(contact.against);
-    if (const double gap = offset_m - contact.depth; gap < gaps[one * bodies + other].gap_m)
-      gaps[one * bodies + other] =
-          gaps[other * bodies + one] = {gap,
-                                        contact,
-                                        {{contacts.shares().begin() + contact.first_share,
-                                          contacts.shares().begin() + contact.first_against},
-                                         {contacts.shares().begin() + contact.first_against,
-                                          contacts.shares().begin() + contact.last_share}}};
+    const double gap = offset_m - contact.depth;
+    gaps.of_sample[{contact.body, contact.against, contact.sample}] = gap;
+    if (gap < gaps[one * bodies + other].gap_m)
+      gaps.of_pair[one * bodies + other] =
+          gaps.of_pair[other * bodies + one] = {gap,
+                                                contact,
+                                                {{contacts.shares().begin() + contact.first_share,
+                                                  contacts.shares().begin() + contact.first_against},
+                                                 {contacts.shares().begin() + contact.first_against,
+                                                  contacts.shares().begin() + contact.last_share}}};
   }
   return gaps;
 }
 
-void set_offsets(const std::vector<double>& offsets, World& world) {
-  world.surfaces64.offset = offsets;
-  world.surfaces.offset.assign(offsets.begin(), offsets.end());
+// From here on a sample that begins nearer than the offset is in contact when it is nearer than that, less
+// what rounding does: so nothing pushes at the start.
+void set_own_offsets(const std::map<std::array<int, 3>, double>& gaps, double offset_m, World& world) {
+  constexpr double rounding = 1e-3;  // of the offset
+  auto& tables = world.surfaces64;
+  const std::size_t bodies = world.bodies.size();
+  if (!gaps.empty()) tables.first_own_offset.assign(bodies * bodies, -1);
+  for (const auto& [key, gap] : gaps) {
+    const auto [body, against, sample] = key;
+    int& first = tables.first_own_offset[std::size_t(body) * bodies + std::size_t(against)];
+    if (first < 0) {
+      first = int(tables.own_offset.size());
+      const auto& tets = tables.bodies[std::size_t(body)].sampled_tets;
+      const int samples = tables.first_sample[std::size_t(tets.back()) + 1] - tables.first_sample_of(body);
+      tables.own_offset.insert(tables.own_offset.end(), std::size_t(samples), offset_m);
+    }
+    tables.own_offset[std::size_t(first + sample - tables.first_sample_of(body))] = gap - rounding * offset_m;
+  }
+  world.surfaces.first_own_offset = tables.first_own_offset;
+  world.surfaces.own_offset.assign(tables.own_offset.begin(), tables.own_offset.end());
 }
 
 // Of the offset: how deep surfaces are pressed that are to part, at first and where that does not part them;
@@ -296,11 +322,7 @@ void set_start(const WorldSpec& spec, World& world) {
   if (!world.touches_on_surfaces()) return;
   const double offset_m = spec.contact_offset_m;
   const Gaps before = gaps(world, offset_m, world.start_positions);
-  std::vector<double> offsets;
-  if (!must_part(before, offset_m, spec)) {
-    for (const Gap& gap : before) offsets.push_back(gap.gap_m);
-    return set_offsets(offsets, world);
-  }
+  if (!must_part(before, offset_m, spec)) return set_own_offsets(before.of_sample, offset_m, world);
   if (spec.start_positions.empty()) {
     Parter(world, offset_m, before).run(world);
   } else if (spec.start_positions.size() == world.start_positions.size()) {
@@ -313,13 +335,17 @@ void set_start(const WorldSpec& spec, World& world) {
   record_to(before, now, world);
   // Bodies that are still pressed lie as they were left: the push that holds them there stays.
   const std::size_t bodies = world.bodies.size();
-  for (std::size_t k = 0; k < before.size(); ++k) {
-    const bool itself = k / bodies == k % bodies;
-    offsets.push_back(itself                ? before[k].gap_m
-                      : before[k].gap_m < 0 ? offset_m
-                                            : std::max(before[k].gap_m, now[k].gap_m));
+  std::map<std::array<int, 3>, double> own;
+  for (const auto& [key, gap] : before.of_sample) {
+    const bool itself = key[0] == key[1];
+    if (!itself && before[std::size_t(key[0]) * bodies + std::size_t(key[1])].gap_m < 0) continue;
+    const auto after = now.of_sample.find(key);
+    if (itself)
+      own[key] = gap;
+    else if (after != now.of_sample.end())
+      own[key] = std::max(gap, after->second);
   }
-  set_offsets(offsets, world);
+  set_own_offsets(own, offset_m, world);
 }
 
 }  // namespace limber::fem::detail

@@ -90,16 +90,15 @@ void SurfaceContacts<Real>::forget(int lane) {
 }
 
 // How deep a sample is below the surface of another body at most, in metres: depth counts from the offset,
-// which is taken off. Of two bodies that overlap where they start the offset is negative, and only what is
-// deeper than that counts.
+// which is taken off. Of what begins below it the offset is negative, and only what is deeper counts.
 template <class Real>
 Real SurfaceContacts<Real>::deepest_overlap(int lane, const LaneView<Real>& view) {
   Real deepest = 0;
   for (const SurfaceContact<Real>& contact : find(lane, view))
     if (contact.against >= 0 && contact.against != contact.body)
-      deepest =
-          std::max(deepest, contact.depth -
-                                std::max(surface_.offset[contact.body * bodies_ + contact.against], Real(0)));
+      deepest = std::max(
+          deepest, contact.depth -
+                       std::max(surface_.offset_of(contact.body, contact.against, contact.sample), Real(0)));
   return deepest;
 }
 

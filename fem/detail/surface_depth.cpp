@@ -230,7 +230,7 @@ bool SurfaceContacts<Real>::is_beside(int tet, const Real weight[4], Real slack)
 template <class Real>
 bool SurfaceContacts<Real>::measure(const LaneView<Real>& view, int from, int into, int sample, int tet,
                                     const Real weight[4]) {
-  const Real near = offset(from, into), apart = surface_.offset[from * bodies_ + into];
+  const Real near = offset(from, into), apart = surface_.offset_of(from, into, sample);
   for (int c = 0; c < 3; ++c) {  // what is farther off is not in every list
     const int k = (3 * into + c) * view.stride;
     const Real at = places_[row_of_sample(sample)].at[c];

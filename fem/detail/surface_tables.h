@@ -71,6 +71,20 @@ struct SurfaceTables {
   // [body a × bodies + body b] metres: surfaces that near are in contact. On the diagonal: a body with
   // itself.
   std::vector<Real> offset;
+  // Samples that begin nearer to the other's surface than that, or in it, are in contact when they are nearer
+  // than they began. [body × bodies + against] −1, or where own_offset has those of the body's samples,
+  // metres, counted from its first.
+  std::vector<int> first_own_offset;
+  std::vector<Real> own_offset;
+  int first_sample_of(int body) const {
+    const std::vector<int>& tets = bodies[std::size_t(body)].sampled_tets;
+    return tets.empty() ? 0 : first_sample[std::size_t(tets.front())];
+  }
+  Real offset_of(int body, int against, int sample) const {
+    const std::size_t pair = std::size_t(body) * bodies.size() + std::size_t(against);
+    const int first = first_own_offset.empty() ? -1 : first_own_offset[pair];
+    return first < 0 ? offset[pair] : own_offset[std::size_t(first + sample - first_sample_of(body))];
+  }
   std::vector<std::vector<int>> tets_round_node;  // of bodies that touch themselves, else empty; ascending
 };
 

@@ -163,9 +163,24 @@ TEST(Start, BodiesThatDoNotOverlapStayWhereTheyAre) {
     const World world = build_world(spec);
     EXPECT_EQ(start_state(world), rest_state(world));
     EXPECT_TRUE(world.parting.pairs.empty());
-    EXPECT_NEAR(world.surfaces64.offset[1], std::min(gap_m, offset_m), 1e-3);
+    // Each sample's offset is how far it is from the other ball, or the offset of all.
+    const auto& tables = world.surfaces64;
+    const Vec3 other(2 * radius_m + gap_m, 0, 0);
+    double nearest = offset_m;
+    for (int s = tables.first_sample_of(0); s < tables.first_sample_of(1); ++s) {
+      const auto& sample = tables.samples[std::size_t(s)];
+      Vec3 place = Vec3::Zero();
+      for (int i = 0; i < 4; ++i)
+        place +=
+            sample.weight[i] * Eigen::Map<const Vec3>(&world.tables64.rest_positions[3 * sample.node[i]]);
+      const double off = (place - other).norm() - radius_m;
+      EXPECT_NEAR(tables.offset_of(0, 1, s), std::min(off, offset_m), 5e-4) << place.transpose();
+      nearest = std::min(nearest, tables.offset_of(0, 1, s));
+    }
+    EXPECT_NEAR(nearest, std::min(gap_m, offset_m), 1e-3);
+    EXPECT_TRUE(contact_forces(world, start_state(world)).empty());
     spec.part_overlaps = false;
-    EXPECT_EQ(build_world(spec).surfaces64.offset, world.surfaces64.offset);
+    EXPECT_EQ(build_world(spec).surfaces64.own_offset, tables.own_offset);
   }
 }
 

@@ -40,8 +40,8 @@ TEST(ContactShape, OutsideTheCageWeightsAreClamped) {
   }
 }
 
-// A ball without samples on a cap of it is told, whoever stands for the cap's area: all others, one beside it,
-// or one far off.
+// A ball without samples on a cap of it is told, whoever stands for the cap's area: all others, one beside
+// it, or one far off.
 TEST(ContactCheck, APlaceWithoutSamplesIsTold) {
   const Made made(made_sphere(30));
   EXPECT_EQ(check_contact_shape(made.shape, made.surface, made.cage).sample_fault, "");

@@ -64,6 +64,7 @@ std::uint64_t hash_of_world(const fem::World& world) {
   if (world.substeps > 1) hasher.text("substeps").value(world.substeps);
   if (world.touches_on_surfaces()) hasher.text("surfaces").value(surface_edition);
   for (const double offset : world.surfaces64.offset) hasher.value(offset);
+  for (const double offset : world.surfaces64.own_offset) hasher.value(offset);
   if (!world.part_overlaps) hasher.text("overlaps are refused");
   if (std::isfinite(world.max_overlap_m)) hasher.value(world.max_overlap_m);
   if (!world.parting.pairs.empty())
