@@ -220,8 +220,10 @@ struct Shot::Labeling {
                         [&](const auto& box) { return render::runs_through(place, end, box); });
   }
 
-  // What is seen longest and deepest, and of that what is nearest to the side where most of the body is.
-  int best_end(std::size_t label, const Act& act) const {
+  // What is seen longest and deepest, and of that what is nearest to where the words begin on the side where
+  // most of the body is. `words` is the share of the picture's width that they take: a line to what is behind
+  // them would run through them, and so from the other side.
+  int best_end(std::size_t label, const Act& act, double words) const {
     double x = 0, worth = 0;
     for (int s = act.first; s <= act.last; ++s)
       for (const Look& look : sights[std::size_t(s)].at[label])
@@ -233,8 +235,8 @@ struct Shot::Labeling {
       double sum = 0;
       for (int s = act.first; s <= act.last; ++s) {
         const Look& look = sights[std::size_t(s)].at[label][e];
-        const double aside = std::clamp(look.pixel.x() / shot.look_.width, 0.0, 1.0);
-        if (look.worth > 0) sum += look.worth * (1 - aside_price * (right ? 1 - aside : aside));
+        const double off = std::abs(look.pixel.x() / shot.look_.width - (right ? 1 - words : words));
+        if (look.worth > 0) sum += look.worth * (1 - aside_price * std::min(off, 1.0));
       }
       if (sum > most) most = sum, best = int(e);
     }
@@ -243,7 +245,11 @@ struct Shot::Labeling {
 
   Act act_of(int first, int last) const {
     Act act{first, last, {}, {}};
-    for (std::size_t l = 0; l < labels.size(); ++l) act.end.push_back(best_end(l, act));
+    double widest = 0;
+    for (std::size_t l = 0; l < labels.size(); ++l)
+      widest = std::max(widest, render::width_of_words(shot.scene_.film.labels[l].text, shot.letter_px_));
+    const double words = std::min(0.5, 1.0 / 40 + (widest + 2 * shot.letter_px_) / shot.look_.width);
+    for (std::size_t l = 0; l < labels.size(); ++l) act.end.push_back(best_end(l, act, words));
     render::LabelRoom room{
         shot.look_.width, shot.look_.height, shot.letter_px_, {double(shot.look_.width), 0, 0, 0}, taken};
     std::vector<render::WantedLabel> wanted;
