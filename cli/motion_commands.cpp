@@ -68,7 +68,7 @@ void add_simulate(CLI::App& command, SimulateOptions& options) {
       ->type_name("DIR");
   command
       .add_option("--control", options.script,
-                  "a TOML file with more [[forces]] and [[motions]], as the scene has them")
+                  "a TOML file with more [[forces]], [[pressures]] and [[motions]], as the scene has them")
       ->type_name("FILE");
   add_from(command, options.from, options.frame);
   command.add_flag("--resume", options.resume,

@@ -3,11 +3,21 @@
 // bodies of one scene; scene check says what can be said before a search.
 #include <CLI/CLI.hpp>
 
+#include <map>
+#include <string>
 #include <tuple>
 
 #include "cli/described_commands.h"
 
 namespace limber::cli {
+
+namespace {
+
+const std::map<std::string, Story> stories{
+    {"away", Story::away},           {"aside", Story::aside},     {"instrument", Story::instrument},
+    {"endoscope", Story::endoscope}, {"balloon", Story::balloon}, {"tour", Story::tour}};
+
+}  // namespace
 
 void DescribedCommands::add_scene_commands() {
   CLI::App& scene_command = *program.add_subcommand("scene", "makes scene files, and checks them");
@@ -33,17 +43,12 @@ void DescribedCommands::add_scene_commands() {
       ->type_name("NAME");
   new_command
       .add_option_function<std::string>(
-          "--story",
-          [&](const std::string& word) {
-            new_options.story = word == "instrument" ? Story::instrument
-                                : word == "aside"    ? Story::aside
-                                : word == "tour"     ? Story::tour
-                                                     : Story::away;
-          },
-          "away: it moves away, past all that lies that way; aside: it is moved aside; instrument: one comes "
-          "to "
-          "it; tour: nothing moves but the cameras; default: away")
-      ->check(CLI::IsMember({"away", "instrument", "aside", "tour"}))
+          "--story", [&](const std::string& word) { new_options.story = stories.at(word); },
+          "away: it moves away, past all that lies that way; aside: it is moved aside; instrument, "
+          "endoscope, "
+          "balloon: one comes to it, a rigid rod, a soft one, or a balloon that is blown up there; tour: "
+          "nothing moves but the cameras; default: away")
+      ->check(CLI::IsMember(stories))
       ->type_name("STORY");
   const auto names = [&](const char* flag, std::vector<std::string>& list, const char* meaning) {
     new_command.add_option(flag, list, meaning)

@@ -19,7 +19,8 @@ bool same_bits(const Control& a, const Control& b) {
   return a.manipulation == b.manipulation && a.node == b.node && a.steps == b.steps &&
          a.second_node == b.second_node && same_bits(a.second_force_n, b.second_force_n) &&
          same_bits(a.force_n, b.force_n) && same_bits(a.target_m, b.target_m) &&
-         same(a.radius_m, b.radius_m) && same(a.max_force_n, b.max_force_n);
+         same(a.radius_m, b.radius_m) && same(a.max_force_n, b.max_force_n) &&
+         same(a.pressure_pa, b.pressure_pa);
 }
 
 }  // namespace limber

@@ -43,6 +43,8 @@ struct Control {
   // none.
   std::int32_t second_node = -1;
   Vec3f second_force_n = Vec3f::Zero();
+  // ≥ 0, whatever the manipulation: blows the robot up (fem/script.h, PressureSpec).
+  float pressure_pa = 0;
 
   bool operator==(const Control&) const = default;
 };

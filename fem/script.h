@@ -24,6 +24,20 @@ struct Force {
   double mass_kg;          // of what the force is shared by; what held nodes get moves nothing
 };
 
+// Blows a soft body up: on each face of its cage's surface, as that is now, pressure × area outward, a third
+// of it on each corner; where the cage has hollows, on their walls alone, out of the hollow. Over a closed
+// surface that is no force and no torque.
+struct PressureSpec {
+  int body = 0;
+  double from_s = 0, to_s = 0;
+  double pressure_pa = 0;  // < 0 draws it together
+};
+struct Pressure {
+  int body;
+  std::int64_t first_step, end_step;  // as of Force
+  double pressure_pa;
+};
+
 struct Keyframe {
   double at_s = 0;  // > 0, ascending
   Vec3 position_m = Vec3::Zero();

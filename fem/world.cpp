@@ -138,6 +138,22 @@ Force make_force(const ForceSpec& spec, const World& world) {
   return force;
 }
 
+Pressure make_pressure(const PressureSpec& spec, const World& world) {
+  const auto refuse = [](const std::string& why) { throw InputError(why); };
+  if (spec.body < 0 || spec.body >= int(world.bodies.size()))
+    refuse(fmt::format("a pressure is in body {}, and there are {}", spec.body, world.bodies.size()));
+  const Body& body = world.bodies[std::size_t(spec.body)];
+  if (!body.pushed() || body.kind != BodyKind::deformable)
+    refuse(fmt::format("body {}: a pressure is in it, and it is not soft", body.name));
+  if (!(spec.from_s >= 0 && spec.to_s > spec.from_s && spec.to_s / world.dt_s < 1e15))
+    refuse(fmt::format("body {}: a pressure is in it from {} to {} s, which is no time", body.name,
+                       spec.from_s, spec.to_s));
+  if (!std::isfinite(spec.pressure_pa))
+    refuse(fmt::format("body {}: a pressure in it is not finite", body.name));
+  return {spec.body, std::llround(spec.from_s / world.dt_s), std::llround(spec.to_s / world.dt_s),
+          spec.pressure_pa};
+}
+
 }  // namespace
 
 // Moving bodies get the first nodes and tets, in the order given, then the others. Pairs of bodies rub with
@@ -202,6 +218,8 @@ World build_world(const WorldSpec& spec) {
     world.ligaments.push_back(detail::make_ligament(ligament, world));
   choose_step(spec.max_dt_s, world);
   for (const ForceSpec& force : spec.forces) world.forces.push_back(make_force(force, world));
+  for (const PressureSpec& pressure : spec.pressures)
+    world.pressures.push_back(make_pressure(pressure, world));
   detail::make_surface_tables(spec.contact_offset_m, world);
   detail::check_places(world);
   detail::set_start(spec, world);

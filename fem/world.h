@@ -93,6 +93,7 @@ struct WorldSpec {
   // start.
   double max_overlap_m = std::numeric_limits<double>::infinity();
   std::vector<ForceSpec> forces = {};
+  std::vector<PressureSpec> pressures = {};
   std::vector<LigamentSpec> ligaments = {};
   // World::start_positions of a world of this spec, which spares it the parting; empty: not known.
   std::vector<float> start_positions = {};
@@ -110,6 +111,7 @@ struct Body {
   int first_node;     // the body's row 0 among the world's nodes; for moving bodies also among those of State
   int first_tet;      // its tet 0 among the world's
   Triangles surface;  // boundary faces, rows of cage.positions
+  Triangles blown;    // faces along whose normal a pressure acts: the surface's, or of hollows, turned inward
   std::vector<int> surface_nodes;    // rows of cage.positions, ascending
   std::vector<bool> fixed;           // (N)
   std::vector<double> node_mass_kg;  // (N) a quarter of each adjacent tet's
@@ -169,13 +171,15 @@ struct World {
   bool part_overlaps;                            // as asked for
   double max_overlap_m;                          // as asked for
   std::vector<Force> forces;                     // in the order of WorldSpec
+  std::vector<Pressure> pressures;               // likewise
   std::vector<Ligament> ligaments;               // likewise
   std::vector<detail::RigidTable> rigid_tables;  // a body; empty unless it is rigid
 };
 
 // Throws InputError naming body and element: a cage that is not valid, a node in no tet, a fixed node that
 // does not exist or belongs to a rigid body, a material out of range, a robot that is missing or cannot move,
-// a body outside the bounds, a force between no times or on a body or nodes that nothing can push, keyframes
+// a body outside the bounds, a force between no times or on a body or nodes that nothing can push, a pressure
+// likewise or in what is not soft, keyframes
 // that do not ascend from above 0, a ligament that hangs on nothing that moves or away from its bodies, two
 // bodies that overlap at the start (and how deep) and are not parted, coordinates too large for float32, a
 // step too small to be of use, start_positions of another number. Throws Interrupted after a stop signal.

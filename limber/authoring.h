@@ -14,8 +14,9 @@
 namespace limber {
 
 // What a new scene tells of the model that it is about: it goes away, past all that lies in its way; an
-// instrument comes to it; it is moved aside; or nothing moves but the cameras.
-enum class Story { away, instrument, aside, tour };
+// instrument comes to it, or a soft endoscope, or a balloon that is blown up there; it is moved aside; or
+// nothing moves but the cameras.
+enum class Story { away, instrument, endoscope, balloon, aside, tour };
 
 struct NewSceneOptions {
   std::filesystem::path from = {};    // models in one frame: a folder, a label map, an atlas

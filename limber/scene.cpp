@@ -113,9 +113,10 @@ Control control_of(const Push& push, int row, int robot_nodes) {
   require(push.steps > 0, fmt::format("steps is {}; it must be above 0", push.steps));
   for (const float x : {push.force_n[0], push.force_n[1], push.force_n[2], push.target_m[0], push.target_m[1],
                         push.target_m[2], push.radius_m, push.max_force_n, push.second_force_n[0],
-                        push.second_force_n[1], push.second_force_n[2]})
+                        push.second_force_n[1], push.second_force_n[2], push.pressure_pa})
     require(std::isfinite(x), "a number of it is not finite");
   require(push.max_force_n >= 0 && push.radius_m >= 0, "max_force_n and radius_m must not be negative");
+  require(push.pressure_pa >= 0, "pressure_pa must not be negative");
   if (push.kind == Push::Kind::control_point)
     require(push.node >= 0 && push.node < robot_nodes,
             fmt::format("node is {}; the robot has the nodes 0 … {}", push.node, robot_nodes - 1));
@@ -131,7 +132,8 @@ Control control_of(const Push& push, int row, int robot_nodes) {
           .max_force_n = push.max_force_n,
           .steps = push.steps,
           .second_node = push.second_node,
-          .second_force_n = {push.second_force_n[0], push.second_force_n[1], push.second_force_n[2]}};
+          .second_force_n = {push.second_force_n[0], push.second_force_n[1], push.second_force_n[2]},
+          .pressure_pa = push.pressure_pa};
 }
 
 Push push_of(const Control& c) {
@@ -143,7 +145,8 @@ Push push_of(const Control& c) {
           .max_force_n = c.max_force_n,
           .steps = c.steps,
           .second_node = c.second_node,
-          .second_force_n = {c.second_force_n.x(), c.second_force_n.y(), c.second_force_n.z()}};
+          .second_force_n = {c.second_force_n.x(), c.second_force_n.y(), c.second_force_n.z()},
+          .pressure_pa = c.pressure_pa};
 }
 
 std::vector<detail::PreparedBody> prepare_bodies(const Scene::Impl& scene,

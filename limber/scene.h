@@ -81,6 +81,7 @@ struct Push {
   // control_point: another, pushed at the same time, as by a second carrier; −1: none
   std::int32_t second_node = -1;
   std::array<float, 3> second_force_n{};
+  float pressure_pa = 0;  // of any kind, ≥ 0: blows a soft robot up meanwhile
 };
 
 struct SolveOptions {

@@ -40,6 +40,9 @@ Sample draw_sample(const Settings& s, const System& system, std::int64_t iterati
   d.rank = rng.uniform(), d.ahead = rng.uniform(), d.stretch = rng.uniform();
   d.aside = rng.direction();
   d.lift = rng.uniform();
+  // Half of the time slack, as it gets farthest.
+  const double blown = 2 * rng.uniform() - 1;
+  if (!d.towards_goal && blown > 0) d.pressure_pa = blown * s.max_pressure_pa;
   return d;
 }
 
@@ -53,7 +56,7 @@ Control steered_control(const Sample& d, const Settings& s, const System& system
     control.node = d.robot_node;
     control.radius_m = float(s.control_point_radius_m);
   }
-  control.steps = d.steps;
+  control.steps = d.steps, control.pressure_pa = float(d.pressure_pa);
   const Vec3 way = target - from.center, velocity = from.velocity - target_velocity;
   if (drive.acceleration <= 0 || way.squaredNorm() == 0) return control;
   control.force_n = (force * best_direction(way, velocity, drive)).cast<float>();
@@ -74,7 +77,7 @@ Control carriers_control(const Sample& d, const Settings& s, const System& syste
   control.manipulation = Manipulation::control_point;
   control.node = system.carriers()->nodes[0], control.second_node = system.carriers()->nodes[1];
   control.radius_m = float(s.control_point_radius_m);
-  control.steps = d.steps;
+  control.steps = d.steps, control.pressure_pa = float(d.pressure_pa);
   double lasts = 0;
   for (std::size_t i = 0; i < 2; ++i) {
     const Vec3 way = targets[i] - from.carried[i].place,
@@ -95,7 +98,7 @@ Control carriers_control(const Sample& d, const Settings& s, const System& syste
 Control control_of(const Sample& d, const Settings& s, const Vec3& center, const Vec3& goal_shift) {
   Control control;
   control.manipulation = d.manipulation;
-  control.steps = d.steps;
+  control.steps = d.steps, control.pressure_pa = float(d.pressure_pa);
   if (d.manipulation == Manipulation::interpolation) {
     if (s.search_options.hold) control.manipulation = Manipulation::hold;
     control.target_m = (s.goal.center_of_mass_m + goal_shift).cast<float>();
@@ -125,6 +128,7 @@ Control goal_control(const Settings& s, int steps) {
 Control settle_control(const Settings& s, int steps) {
   Control control = goal_control(s, steps);
   control.manipulation = s.settle.hold ? Manipulation::hold : Manipulation::interpolation;
+  control.pressure_pa = float(s.settle.pressure_pa);
   return control;
 }
 

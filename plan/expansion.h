@@ -22,6 +22,7 @@ struct Sample {
   double ahead = 0;           // how far ahead it aims
   double stretch = 0;         // how much longer than it should take it pushes
   Vec3 aside = Vec3::Zero();  // unit; where it aims besides
+  double pressure_pa = 0;     // in a balloon
   double lift = 0;            // share of the robot's weight that carriers bear
 };
 Sample draw_sample(const Settings&, const System&, std::int64_t iteration);

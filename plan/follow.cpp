@@ -106,7 +106,8 @@ Control Follower::correct(const State& state, std::size_t piece) const {
       if (behind.norm() < 0.1 * settings_.goal.radius_m) return control;
       const double lasts = guide_.pieces[piece].steps * system_.dt_s();
       force += mass * (guide_.velocities[piece + 1] - guide_.velocities[piece]) / lasts;
-      control = {.manipulation = Manipulation::body, .steps = control.steps};
+      control = {
+          .manipulation = Manipulation::body, .steps = control.steps, .pressure_pa = control.pressure_pa};
     }
   }
   control.force_n = limited(force);

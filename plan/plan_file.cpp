@@ -49,7 +49,7 @@ void put_shared_states(Npz& file, const States& states) {
 
 void put_controls(Npz& file, const std::string& name, const std::vector<Control>& controls) {
   std::vector<std::int32_t> manipulation, node, steps, second_node;
-  std::vector<float> force, radius, target, max_force, second_force;
+  std::vector<float> force, radius, target, max_force, second_force, pressure;
   for (const Control& c : controls) {
     manipulation.push_back(std::int32_t(c.manipulation));
     node.push_back(c.node);
@@ -59,6 +59,7 @@ void put_controls(Npz& file, const std::string& name, const std::vector<Control>
     target.insert(target.end(), c.target_m.begin(), c.target_m.end());
     max_force.push_back(c.max_force_n);
     second_node.push_back(c.second_node);
+    pressure.push_back(c.pressure_pa);
     second_force.insert(second_force.end(), c.second_force_n.begin(), c.second_force_n.end());
   }
   const std::int64_t n = std::int64_t(controls.size());
@@ -69,6 +70,8 @@ void put_controls(Npz& file, const std::string& name, const std::vector<Control>
   file.arrays[name + "_target_m"] = NpyArray::of<float>(target, {n, 3});
   file.arrays[name + "_max_force_n"] = NpyArray::of<float>(max_force, {n});
   file.arrays[name + "_steps"] = NpyArray::of<std::int32_t>(steps, {n});
+  if (std::any_of(pressure.begin(), pressure.end(), [](float p) { return p != 0; }))
+    file.arrays[name + "_pressure_pa"] = NpyArray::of<float>(pressure, {n});
   if (std::all_of(second_node.begin(), second_node.end(), [](int node) { return node < 0; })) return;
   file.arrays[name + "_second_node"] = NpyArray::of<std::int32_t>(second_node, {n});
   file.arrays[name + "_second_force_n"] = NpyArray::of<float>(second_force, {n, 3});
@@ -150,9 +153,11 @@ class Reader {
     const auto node = array<std::int32_t>(name + "_node", n, 1),
                steps = array<std::int32_t>(name + "_steps", n, 1);
     const auto radius = numbers(name + "_radius_m", n, 1), max_force = numbers(name + "_max_force_n", n, 1);
-    // Where nobody has a second carrier, nothing is told of it.
+    // Where nobody has a second carrier, or a pressure, nothing is told of it.
     std::span<const std::int32_t> second_node;
-    std::span<const float> second_force;
+    std::span<const float> second_force, pressure;
+    if (const std::string key = name + "_pressure_pa"; file_.arrays.contains(key))
+      pressure = numbers(key, n, 1);
     if (const std::string key = name + "_second_node"; file_.arrays.contains(key)) {
       second_node = array<std::int32_t>(key, n, 1);
       second_force = numbers(name + "_second_force_n", n, 3);
@@ -172,6 +177,10 @@ class Reader {
                      Vec3f(target.data() + 3 * i),
                      max_force[i],
                      steps[i]};
+      if (!pressure.empty()) {
+        require(pressure[i] >= 0, fmt::format("{}_pressure_pa[{}] is {}, below 0", name, i, pressure[i]));
+        controls[i].pressure_pa = pressure[i];
+      }
       if (second_node.empty()) continue;
       require(second_node[i] >= -1 && (at_a_node || second_node[i] == -1),
               fmt::format("{}_second_node[{}] is {}, which is none", name, i, second_node[i]));

@@ -67,6 +67,13 @@ void describe(AnySettings& s, const Visitor& visit) {
   visit("/in_flight", s.in_flight, Range{0, 65536});
 }
 
+// Those that files hold only where they are not 0: most have none, and older ones know none.
+template <class AnySettings, class Visitor>
+void describe_rare(AnySettings& s, const Visitor& visit) {
+  visit("/max_pressure_pa", s.max_pressure_pa, at_least_zero);
+  visit("/settle/pressure_pa", s.settle.pressure_pa, Range{0, s.max_pressure_pa});
+}
+
 // What a message calls it: /settle/hold is settle.hold.
 std::string name_of(const char* pointer) {
   std::string name = pointer + 1;
@@ -116,14 +123,16 @@ Settings settings_of_leg(const Settings& settings, int leg) {
   if (leg == int(s.via.size())) return s;
   const Via& via = settings.via.at(std::size_t(leg));
   s.goal = via.goal;
+  s.settle.pressure_pa = 0;
   if (!via.rest) s.settle.max_duration_s = 0;
   return s;
 }
 
 void validate(const Settings& s) {
-  describe(s, [](const char* name, const auto& value, const Range& range) {
+  const auto check = [](const char* name, const auto& value, const Range& range) {
     require_in(range, double(value), name_of(name));  // flags and choices have a range that holds them all
-  });
+  };
+  describe(s, check), describe_rare(s, check);
   if (s.time_limit_s != std::numeric_limits<double>::infinity())
     require_in(at_least_zero, s.time_limit_s, "time_limit_s");
   validate_goal(s.goal, "the goal");
@@ -161,6 +170,9 @@ Json json_of(const Settings& s) {
   }
   describe(
       s, [&](const char* name, const auto& value, const Range&) { json[Json::json_pointer(name)] = value; });
+  describe_rare(s, [&](const char* name, double value, const Range&) {
+    if (value != 0) json[Json::json_pointer(name)] = value;
+  });
   json["time_limit_s"] = std::isfinite(s.time_limit_s) ? Json(s.time_limit_s) : Json();
   return json;
 }
@@ -184,6 +196,9 @@ Settings settings_from_json(const Json& json, const std::string& what) try {
     const bool old =
         &value == static_cast<const void*>(&s.settle.hold) && !json.at("settle").contains("hold");
     json.at(Json::json_pointer(old ? "/laws/hold" : name)).get_to(value);
+  });
+  describe_rare(s, [&](const char* name, double& value, const Range&) {
+    if (const Json::json_pointer at(name); json.contains(at)) json.at(at).get_to(value);
   });
   if (const Json& limit = json.at("time_limit_s"); !limit.is_null()) limit.get_to(s.time_limit_s);
   return s;

@@ -40,6 +40,7 @@ struct Settle {
   double max_duration_s = 3;     // 0: none
   double mean_speed_m_s = 0.02;  // slower is at rest
   double max_force_share = 1;    // of max_force_n, in [0, 1]
+  double pressure_pa = 0;        // in the robot meanwhile, ≥ 0; not in goals on the way
   bool hold = false;             // as it is, in whatever turn and shape; else by interpolation
 };
 
@@ -72,6 +73,7 @@ struct Settings {
   double goal_bias = 0.1;  // share of expansions drawn towards the goal, in [0, 1]
   ManipulationWeights weights;
   double max_force_n = 0;      // on the whole robot, ≥ 0
+  double max_pressure_pa = 0;  // ≥ 0; > 0: the robot is a balloon
   double min_force_share = 0;  // the magnitude is drawn from [min, max] × max_force_n, 0 ≤ min ≤ max ≤ 1
   double max_force_share = 1;
   double min_duration_s = 0.2;  // of an expansion, rounded to whole steps and at least one

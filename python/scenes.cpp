@@ -69,7 +69,8 @@ py::dtype push_dtype() {
         field("max_force_n", "<f4", offsetof(limber::Push, max_force_n)),
         field("steps", "<i4", offsetof(limber::Push, steps)),
         field("second_node", "<i4", offsetof(limber::Push, second_node)),
-        field("second_force_n", "(3,)<f4", offsetof(limber::Push, second_force_n))}) {
+        field("second_force_n", "(3,)<f4", offsetof(limber::Push, second_force_n)),
+        field("pressure_pa", "<f4", offsetof(limber::Push, pressure_pa))}) {
     names.append(name), formats.append(format), offsets.append(offset);
   }
   return py::dtype::from_args(py::dict("names"_a = names, "formats"_a = formats, "offsets"_a = offsets,

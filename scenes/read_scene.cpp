@@ -101,6 +101,7 @@ Scene read(const std::string& toml, const std::string& name_for_messages,
   const bool all_bodies = !complaints.any();  // else others may name one that was left out
   if (all_bodies) {
     for (const Node& table : list(root, "forces")) complaints.during([&] { read_force(table, scene); });
+    for (const Node& table : list(root, "pressures")) complaints.during([&] { read_pressure(table, scene); });
     for (const Node& table : list(root, "motions")) complaints.during([&] { read_motion(table, scene); });
     for (const Node& table : list(root, "ligaments")) complaints.during([&] { read_ligament(table, scene); });
     read_goals(root, scene, complaints);

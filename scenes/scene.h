@@ -158,6 +158,14 @@ struct ForceSpec {
   std::string where;            // its place in the text, for complaints
 };
 
+// A pressure in a soft body between two times, which blows it up.
+struct PressureSpec {
+  int body = -1;
+  double from_s = 0, to_s = 0;  // from < to
+  double pressure_pa = 0;       // on the surface of its cage, or, where that is hollow, in the hollow
+  std::string where;            // its place in the text, for complaints
+};
+
 // A rigid obstacle goes from keyframe to keyframe; at 0 s it is where its pose has it.
 struct MotionSpec {
   struct Keyframe {
@@ -202,10 +210,11 @@ struct Goal {
   };
   std::optional<Shape> shape;
   int above = -1, below = -1, clear_of = -1;  // indices of bodies; −1: none
-  std::map<int, int> through;                 // so many pieces of the robot are in the hole of this body
+  double volume = 0;           // > 0: the robot's cage holds at least so many times what it does at rest
+  std::map<int, int> through;  // so many pieces of the robot are in the hole of this body
 };
 struct Via {
-  Goal goal;          // without lost_below_m and shape
+  Goal goal;          // without lost_below_m, shape and volume
   bool rest = false;  // the robot comes to rest in it before it goes on
 };
 
@@ -218,6 +227,7 @@ struct PlannerSpec {
   double weight_body = 0, weight_control_point = 0, weight_interpolation = 0;
   double max_force_n = 0;                           // on the whole robot
   double min_force_share = 0, max_force_share = 0;  // of max_force_n, drawn evenly between
+  double max_pressure_pa = 0;                       // > 0: the robot is a balloon, blown up by so much
   double min_duration_s = 0, max_duration_s = 0;    // one manipulation is held so long, drawn evenly between
   double control_point_radius_m = 0;
   // Where control points are, in world coordinates at the start; empty: at any node. With `lead` the first is
@@ -311,7 +321,7 @@ struct FilmSpec {
   int sheet_columns = 0, sheet_rows = 0;
 };
 
-// More [[forces]] and [[motions]], in a file of their own.
+// More [[forces]], [[pressures]] and [[motions]], in a file of their own.
 struct ScriptText {
   std::string text, name_for_messages;
   bool operator==(const ScriptText&) const = default;
@@ -328,6 +338,7 @@ struct Scene {
   std::optional<double> max_dt_s;          // only ever lowers the automatic time step
   std::vector<BodySpec> bodies;
   std::vector<ForceSpec> forces;
+  std::vector<PressureSpec> pressures;
   std::vector<MotionSpec> motions;  // of one body each
   std::vector<LigamentSpec> ligaments;
   // Index of the one body whose role is robot; of a scene without, the first that can be pushed: shares of

@@ -11,6 +11,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <numeric>
 
 #include <Eigen/LU>
 
@@ -19,6 +20,40 @@
 #include "fem/detail/tet_edges.h"
 
 namespace limber::fem::detail {
+
+namespace {
+
+// Pieces of the surface that hold less than nothing are the walls of hollows. Those are blown up, seen from
+// within; else the whole surface is.
+Triangles blown_faces(const Points& positions, const Triangles& surface) {
+  std::vector<int> leader(std::size_t(positions.rows()));
+  std::iota(leader.begin(), leader.end(), 0);
+  const auto leader_of = [&](int node) {
+    while (leader[std::size_t(node)] != node) node = leader[std::size_t(node)];
+    return node;
+  };
+  for (Eigen::Index t = 0; t < surface.rows(); ++t)
+    for (const int i : {1, 2}) {
+      const int a = leader_of(surface(t, 0)), b = leader_of(surface(t, i));
+      leader[std::size_t(std::max(a, b))] = std::min(a, b);
+    }
+  const Vec3 origin = positions.colwise().mean();
+  std::vector<double> held(std::size_t(positions.rows()), 0);
+  const auto corner = [&](Eigen::Index t, int i) -> Vec3 { return positions.row(surface(t, i)); };
+  for (Eigen::Index t = 0; t < surface.rows(); ++t)
+    held[std::size_t(leader_of(surface(t, 0)))] +=
+        signed_volume(origin, corner(t, 0), corner(t, 1), corner(t, 2));
+  std::vector<Eigen::Index> walls;
+  for (Eigen::Index t = 0; t < surface.rows(); ++t)
+    if (held[std::size_t(leader_of(surface(t, 0)))] < 0) walls.push_back(t);
+  if (walls.empty()) return surface;
+  Triangles blown(Eigen::Index(walls.size()), 3);
+  for (std::size_t w = 0; w < walls.size(); ++w)
+    blown.row(Eigen::Index(w)) << surface(walls[w], 0), surface(walls[w], 2), surface(walls[w], 1);
+  return blown;
+}
+
+}  // namespace
 
 // `moving` means that the body is part of State: some node of it is free, or keyframes move it. Phong
 // Deformation and self-contact are for deformable bodies alone. inverse_rest_edges has, for each tet, the
@@ -32,6 +67,7 @@ Body make_body(const BodySpec& spec) {
   body.cage.positions = spec.cage.positions.cast<float>().cast<double>();
   validate(body.cage, fmt::format("body {}: cage in float32", spec.name));
   body.surface = boundary_triangles(body.cage.tets);
+  body.blown = blown_faces(body.cage.positions, body.surface);
   body.surface_nodes = vertices_of(body.surface);
   const int nodes = body.node_count();
   body.kind = spec.kind;

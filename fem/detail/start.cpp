@@ -126,7 +126,7 @@ class Parter {
  public:
   Parter(const World& world, double offset_m, const Gaps& before)
       : world_(world), offset_m_(offset_m), bodies_(world.bodies.size()), before_(before), now_(before) {
-    world_.forces.clear(), world_.ligaments.clear();
+    world_.forces.clear(), world_.pressures.clear(), world_.ligaments.clear();
     for (Body& body : world_.bodies) {
       body.gravity_m_s2.setZero(), body.material.mass_damping_per_s = body.material.fascia_hz = 0;
       body.track = {};  // time stands still

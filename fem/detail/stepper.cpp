@@ -2,8 +2,8 @@
 // evaluation of forces. The velocity belongs to the middle of a step (docs/dynamics.md, "Integration"). In a
 // step come, in this order,
 //
-//     who sleeps, contact, controls, limits of stretch, fascia, ligaments, elastic forces, friction,
-//     integration.
+//     who sleeps, contact, controls, limits of stretch, fascia, ligaments, pressures, elastic forces,
+//     friction, integration.
 //
 // Friction is last, because it is chosen against the velocities with which the step would end. The order is
 // fixed, since the last bits of a sum of forces depend on it.
@@ -106,7 +106,7 @@ Stepper<Real>::Stepper(const World& world, int lanes, Isa isa)
                             (std::isfinite(body.max_stretch) || body.self_contact || body.phong));
   speed2_.assign(bodies, 0), travel_.assign(bodies, 0), inner_travel_.assign(bodies, 0);
   unchanged_.assign(bodies, 0), asleep_.assign(bodies, 0), at_rest_.assign(bodies, 0);
-  touches_.assign(bodies, 0), changes_.assign(bodies, 0);
+  touches_.assign(bodies, 0), pressure_.assign(bodies, 0), changes_.assign(bodies, 0);
   met_.assign(world.bodies.size() * bodies, false);
   tied_.assign(world.bodies.size() * world.bodies.size(), false);
   for (const Ligament& ligament : world.ligaments)
@@ -171,6 +171,7 @@ void Stepper<Real>::load(int lane, std::int64_t step, const Real* positions, con
   step_[lane] = next_change_[lane] = step;
   for (Numbers& forced : forced_)
     for (std::size_t k = 0; k < forced.size(); k += std::size_t(lanes_)) forced[k + lane] = 0;
+  for (std::size_t k = std::size_t(lane); k < pressure_.size(); k += std::size_t(lanes_)) pressure_[k] = 0;
 
   const Body& robot = world_.bodies[world_.robot];
   for (std::size_t k = lane; k < push_.size(); k += std::size_t(lanes_)) push_[k] = 0;
@@ -256,7 +257,8 @@ void Stepper<Real>::step() {
   for (int substep = 0; substep < world_.substeps; ++substep) {
     if (substep > 0) f_ = contact_forces_;
     find_pushes(), spent_on(cost_.controls_s);
-    add_stretch_limits(), add_fascia(), add_ligaments(), add_elastic_forces(), spent_on(cost_.elastic_s);
+    add_stretch_limits(), add_fascia(), add_ligaments(), add_pressures(), add_elastic_forces(),
+        spent_on(cost_.elastic_s);
     add_friction(), spent_on(cost_.contact_s);
     integrate(substep), spent_on(cost_.integration_s);
   }

@@ -65,6 +65,7 @@ class Stepper {
   void add_stretch_limits();
   void add_fascia();
   void add_ligaments();
+  void add_pressures();
   void add_elastic_forces();
   void add_friction(std::vector<ContactRecord<Real>>* records = nullptr);
   void integrate(int substep);
@@ -91,6 +92,7 @@ class Stepper {
   // robot's both together.
   std::vector<Numbers> forced_;
   Numbers all_pushes_;
+  Numbers pressure_;                       // [body][lane] of the world's and the control's that act
   std::vector<std::int64_t> step_;         // [lane] at which its state is
   std::vector<std::int64_t> next_change_;  // [lane] of the forces that act
   Numbers lower_, upper_;                  // [body][xyz][lane]

@@ -1,7 +1,7 @@
 // The forces of a step (stepper.cpp), each added to those there are: contact, pushes by controls and by the
-// world's forces, limits of stretch, fascia, ligaments, elastic forces and friction. Formulas and where they
-// come from are in docs/dynamics.md; the order is that of Stepper::step, and fixed, since the last bits of a
-// sum depend on it.
+// world's forces, limits of stretch, fascia, ligaments, pressures, elastic forces and friction. Formulas and
+// where they come from are in docs/dynamics.md; the order is that of Stepper::step, and fixed, since the last
+// bits of a sum depend on it.
 //
 // What always holds: a force on a lane is a function of that lane's state and step alone. Bodies that sleep
 // in all lanes are passed over only where their forces would be what they were.
@@ -66,9 +66,9 @@ void Stepper<Real>::pull_towards_goal(int lane) {
   }
 }
 
-// Finds the accelerations by the world's forces that act at the lane's step, and when the next of them
-// begins or ends. A change wakes the bodies that have forces: it is no part of State that they did not
-// change.
+// Finds the accelerations by the world's forces that act at the lane's step, and the pressures, and when the
+// next of them begins or ends. A change wakes the bodies that have forces or pressures: it is no part of
+// State that they did not change.
 template <class Real>
 void Stepper<Real>::follow_forces(int lane) {
   const std::int64_t step = step_[lane];
@@ -87,6 +87,16 @@ void Stepper<Real>::follow_forces(int lane) {
       for (const int n : force.nodes)
         forced_[std::size_t(force.body)][(3 * n + c) * lanes_ + lane] += acceleration;
     }
+  }
+  const auto at = [&](int body) { return std::size_t(body * lanes_ + lane); };
+  for (std::size_t k = std::size_t(lane); k < pressure_.size(); k += std::size_t(lanes_)) pressure_[k] = 0;
+  pressure_[at(world_.robot)] = Real(controls_[std::size_t(lane)].pressure_pa);
+  for (const Pressure& pressure : world_.pressures) {
+    for (const std::int64_t change : {pressure.first_step, pressure.end_step})
+      if (change > step) next = std::min(next, change);
+    unchanged_[at(pressure.body)] = 0;
+    if (step < pressure.first_step || step >= pressure.end_step) continue;
+    pressure_[at(pressure.body)] += Real(float(pressure.pressure_pa));
   }
 }
 
@@ -184,6 +194,34 @@ void Stepper<Real>::add_ligaments() {
     }
 }
 
+// On each face of the cage's surface p A n, a third on each of its corners: with the edges e and f from one
+// of them A n = e × f / 2.
+template <class Real>
+void Stepper<Real>::add_pressures() {
+  for (std::size_t b = 0; b < world_.bodies.size(); ++b) {
+    const Body& body = world_.bodies[b];
+    for (int lane = 0; lane < lanes_; ++lane) {
+      const std::size_t k = b * std::size_t(lanes_) + std::size_t(lane);
+      if (pressure_[k] == 0 || !contact_[lane] || asleep_[k] > 0) continue;
+      const LaneView<Real> all = view(lane);
+      const Real sixth = pressure_[k] / 6;
+      for (Eigen::Index t = 0; t < body.blown.rows(); ++t) {
+        int node[3];
+        Real e[2][3];
+        for (int i = 0; i < 3; ++i) node[i] = body.first_node + body.blown(t, i);
+        for (int i = 0; i < 2; ++i)
+          for (int c = 0; c < 3; ++c)
+            e[i][c] = all.x[all.state.at(node[i + 1], c)] - all.x[all.state.at(node[0], c)];
+        for (int c = 0; c < 3; ++c) {
+          const int y = (c + 1) % 3, z = (c + 2) % 3;
+          const Real force = sixth * (e[0][y] * e[1][z] - e[0][z] * e[1][y]);
+          for (const int n : node) all.f[all.force.at(n, c)] += force;
+        }
+      }
+    }
+  }
+}
+
 // Pushes that depend on the state; constant ones were set when the lane was loaded.
 template <class Real>
 void Stepper<Real>::find_pushes() {
@@ -237,7 +275,7 @@ std::vector<ContactRecord<Real>> Stepper<Real>::contact_records(int lane) {
   };
   follow_forces(lane), find_sleepers();
   record_to(&records), add_contact_forces(), record_to(nullptr);
-  find_pushes(), add_stretch_limits(), add_fascia(), add_ligaments(), add_elastic_forces(),
+  find_pushes(), add_stretch_limits(), add_fascia(), add_ligaments(), add_pressures(), add_elastic_forces(),
       add_friction(&records);
   std::fill(f_.begin(), f_.end(), Real(0));  // as integration leaves it
   return records;
@@ -261,6 +299,7 @@ template bool Stepper<float>::is_clear(int);
 template void Stepper<float>::add_stretch_limits();
 template void Stepper<float>::add_fascia();
 template void Stepper<float>::add_ligaments();
+template void Stepper<float>::add_pressures();
 template void Stepper<float>::find_pushes();
 template std::vector<Vec3> Stepper<float>::pushes_m_s2(int);
 template void Stepper<float>::add_elastic_forces();
@@ -274,6 +313,7 @@ template bool Stepper<double>::is_clear(int);
 template void Stepper<double>::add_stretch_limits();
 template void Stepper<double>::add_fascia();
 template void Stepper<double>::add_ligaments();
+template void Stepper<double>::add_pressures();
 template void Stepper<double>::find_pushes();
 template std::vector<Vec3> Stepper<double>::pushes_m_s2(int);
 template void Stepper<double>::add_elastic_forces();

@@ -21,9 +21,9 @@ namespace limber::fem::detail {
 // that meet and rub one another sleep and wake together; leader_ joins them (union by the lowest number).
 // Lanes without contact are idle, and sleep altogether.
 //
-// touches_ tells the kernels where a box meets another's or a wall: there rest is judged by the mean of
-// nodes, too. pushed_asleep_: bodies that sleep in all lanes, but touch one that does not; forces that fell
-// on them must be cleared.
+// touches_ tells the kernels where a box meets another's or a wall, or a pressure acts: there rest is judged
+// by the mean of nodes, too. pushed_asleep_: bodies that sleep in all lanes, but touch one that does not;
+// forces that fell on them must be cleared.
 template <class Real>
 void Stepper<Real>::find_sleepers() {
   const int bodies = int(world_.bodies.size());
@@ -33,7 +33,7 @@ void Stepper<Real>::find_sleepers() {
     const auto at = [&](int body) { return std::size_t(body * lanes_ + lane); };
     for (int b = 0; b < bodies; ++b) {
       asleep_[at(b)] = contact_[lane] ? unchanged_[at(b)] : 1;
-      touches_[at(b)] = 0;
+      touches_[at(b)] = pressure_[at(b)] != 0;
       for (int c = 0; c < 3 && world_.walls; ++c)
         if (lower_[at(3 * b + c)] < Real(world_.bounds_m.lower[c]) ||
             upper_[at(3 * b + c)] > Real(world_.bounds_m.upper[c]))

@@ -452,12 +452,14 @@ _kinds = ("none", "body", "control_point", "interpolation", "hold")
 
 @_checked
 def pushes(count: int, kind: str = "body", *, steps: Any, force_n: Any = 0, node: Any = -1, radius_m: Any = 0,
-           target_m: Any = 0, max_force_n: Any = 0, second_node: Any = -1, second_force_n: Any = 0) -> Array:
+           target_m: Any = 0, max_force_n: Any = 0, second_node: Any = -1, second_force_n: Any = 0,
+           pressure_pa: Any = 0) -> Array:
     """`count` pushes of the robot, as rows of push_dtype; each argument is one for all, or one a push.
 
     "body": force_n on the whole robot. "control_point": the same near `node` alone, within radius_m,
     and, where second_node is none of -1, at the same time second_force_n near that.
-    "interpolation", "hold": towards target_m with at most max_force_n. Held for `steps` time steps.
+    "interpolation", "hold": towards target_m with at most max_force_n. Of any kind: pressure_pa blows a
+    soft robot up meanwhile. Held for `steps` time steps.
     Forces and targets are (3,) or (count, 3).
     """
     if kind not in _kinds:
@@ -473,7 +475,7 @@ def pushes(count: int, kind: str = "body", *, steps: Any, force_n: Any = 0, node
     if np.size(steps) and np.min(steps) < 1:
         raise InputError(f"steps is {np.min(steps)}; it must be above 0")
     for name, value in (("force_n", force_n), ("radius_m", radius_m), ("target_m", target_m),
-                        ("max_force_n", max_force_n), ("second_force_n", second_force_n)):
+                        ("max_force_n", max_force_n), ("second_force_n", second_force_n), ("pressure_pa", pressure_pa)):
         try:
             finite = bool(np.isfinite(np.asarray(value, dtype=np.float32)).all())
         except (TypeError, ValueError):
@@ -490,6 +492,7 @@ def pushes(count: int, kind: str = "body", *, steps: Any, force_n: Any = 0, node
     made["steps"], made["force_n"], made["node"] = steps, force_n, node
     made["radius_m"], made["target_m"], made["max_force_n"] = radius_m, target_m, max_force_n
     made["second_node"], made["second_force_n"] = second_node, second_force_n
+    made["pressure_pa"] = pressure_pa
     return made
 
 

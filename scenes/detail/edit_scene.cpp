@@ -113,10 +113,10 @@ void append(const ScriptText& script, Node& root) {
   if (script.text.empty()) return;
   Node more = parse_document(script.text, script.name_for_messages);
   for (Entry& entry : std::get<Table>(more.value)) {
-    if (entry.key != "forces" && entry.key != "motions")
+    if (entry.key != "forces" && entry.key != "pressures" && entry.key != "motions")
       throw InputError(
-          fmt::format("{}: \"{}\" is not for this file; it holds [[forces]] and [[motions]], all "
-                      "else stands in the scene",
+          fmt::format("{}: \"{}\" is not for this file; it holds [[forces]], [[pressures]] and [[motions]], "
+                      "all else stands in the scene",
                       entry.where.text(), entry.key));
     Node* const own = root.find(entry.key);
     if (!own) {

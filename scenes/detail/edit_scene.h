@@ -11,7 +11,7 @@ namespace limber::scenes {
 // `set` is "a.b.c=value", as read_scene() has it. Throws InputError that begins with "--set a.b.c=value".
 void edit(Node& root, const std::string& set);
 
-// Puts the [[forces]] and [[motions]] of a script behind the scene's own.
+// Puts the [[forces]], [[pressures]] and [[motions]] of a script behind the scene's own.
 void append(const ScriptText&, Node& root);
 
 }  // namespace limber::scenes

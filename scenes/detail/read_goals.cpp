@@ -66,11 +66,27 @@ Goal read_any_goal(const Node& table, const Scene& scene, const std::string& nam
   return goal;
 }
 
+// It is blown up while it is held in the goal.
+void require_of_balloon(const Node& volume, const Node& planner, const Goal& goal) {
+  if (!(number(planner, "max_pressure_pa") > 0))
+    complain(volume, "nothing blows the robot up; write planner.max_pressure_pa, or leave goal.volume out");
+  if (!(number(planner, "settle_time_s") > 0))
+    complain(volume,
+             "planner.settle_time_s is 0, so there is no time to blow the robot up; raise it, or leave "
+             "goal.volume out");
+  if (goal.shape || !flag(planner, "settle_hold"))
+    complain(volume,
+             "the robot is drawn into its shape in the goal, which it cannot keep when it is blown up; write "
+             "planner.settle_hold = true and leave goal.shape out");
+}
+
 Goal read_goal(const Node& root, const Scene& scene) {
   const Node& table = child(root, "goal");
   Goal goal = read_any_goal(table, scene, "goal");
   if (const Node* shape = table.find("shape")) goal.shape = read_goal_shape(*shape);
   goal.lost_below_m = maybe_number(table, "lost_below_m");
+  goal.volume = maybe_number(table, "volume").value_or(0);
+  if (goal.volume > 0) require_of_balloon(child(table, "volume"), child(root, "planner"), goal);
   if (goal.lost_below_m && goal.moves_with < 0)
     complain(child(table, "lost_below_m"), "goal.lost_below_m goes with goal.moves_with only; remove it");
   if (goal.moves_with >= 0 && number(child(root, "planner"), "settle_time_s") > 0)
@@ -119,6 +135,12 @@ void read_goals(const Node& root, Scene& scene, const Complaints& complaints) {
   }
   complaints.during([&] { scene.via = read_via(root, scene); });
   complaints.during([&] { scene.goal = read_goal(root, scene); });
+  complaints.during([&] {
+    const Node& planner = child(root, "planner");
+    if (number(planner, "max_pressure_pa") > 0 && scene.bodies[std::size_t(scene.robot)].kind == Kind::rigid)
+      complain(child(planner, "max_pressure_pa"),
+               "the robot is rigid, which no pressure blows up; make it soft, or leave max_pressure_pa out");
+  });
 }
 
 // Keys that only have a meaning together are checked together: guidance needs a lag, and what ends a push on
@@ -174,6 +196,7 @@ PlannerSpec read_planner(const Node& table) {
         "planner.weights of body and control_point are both 0, so nothing could drive the robot anywhere but "
         "to the goal; make one of them > 0");
   planner.max_force_n = number(table, "max_force_n");
+  planner.max_pressure_pa = number(table, "max_pressure_pa");
   const Eigen::Vector2d share = vector2(table, "force_share"), duration = vector2(table, "duration_s");
   planner.min_force_share = share[0], planner.max_force_share = share[1];
   planner.min_duration_s = duration[0], planner.max_duration_s = duration[1];

@@ -1,10 +1,22 @@
-// What happens by itself, whatever the planner does: [[forces]] on bodies that can be pushed, [[motions]] of
-// rigid obstacles, [[ligaments]] between bodies. Bodies are called by their names and kept by their numbers.
-// Meaning: docs/simulation.md, "What happens by itself".
+// What happens by itself, whatever the planner does: [[forces]] on bodies that can be pushed, [[pressures]]
+// in soft ones, [[motions]] of rigid obstacles, [[ligaments]] between bodies. Bodies are called by their
+// names and kept by their numbers. Meaning: docs/simulation.md, "What happens by itself".
 #include "scenes/detail/scene_parts.h"
 #include "scenes/detail/typed_reads.h"
 
 namespace limber::scenes {
+
+namespace {
+
+void read_times(const Node& table, const std::string& what, double& from_s, double& to_s) {
+  from_s = number(table, "from_s"), to_s = number(table, "to_s");
+  if (!(to_s > from_s))
+    complain(
+        child(table, "to_s"),
+        fmt::format("{}.to_s is {}, not after from_s, {}; write the later one there", what, to_s, from_s));
+}
+
+}  // namespace
 
 void read_force(const Node& table, Scene& scene) {
   ForceSpec force;
@@ -16,14 +28,24 @@ void read_force(const Node& table, Scene& scene) {
              fmt::format("{}: {} is a rigid obstacle, which no force moves; choose another body, or make it "
                          "soft or free",
                          what, body.name));
-  force.from_s = number(table, "from_s"), force.to_s = number(table, "to_s");
-  if (!(force.to_s > force.from_s))
-    complain(child(table, "to_s"),
-             fmt::format("{}.to_s is {}, not after from_s, {}; write the later one there", what, force.to_s,
-                         force.from_s));
+  read_times(table, what, force.from_s, force.to_s);
   force.force_n = vector(table, "force_n");
   if (table.find("box_m")) force.box_m = box(table, "box_m");
   scene.forces.push_back(std::move(force));
+}
+
+void read_pressure(const Node& table, Scene& scene) {
+  PressureSpec pressure;
+  const std::string what = fmt::format("pressures[{}]", scene.pressures.size());
+  pressure.where = table.where.text();
+  pressure.body = body_called(child(table, "body"), scene, what + ".body");
+  if (const BodySpec& body = scene.bodies[std::size_t(pressure.body)]; body.kind == Kind::rigid)
+    complain(child(table, "body"),
+             fmt::format("{}: {} is rigid, which no pressure blows up; choose another body, or make it soft",
+                         what, body.name));
+  read_times(table, what, pressure.from_s, pressure.to_s);
+  pressure.pressure_pa = number(table, "pressure_pa");
+  scene.pressures.push_back(std::move(pressure));
 }
 
 // Of one body there is one motion, so that it is never asked to be in two places. A keyframe without

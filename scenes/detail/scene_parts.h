@@ -24,8 +24,10 @@ bool is_rigid_obstacle(const BodySpec&);
 int body_called(const Node&, const Scene&, const std::string& key);
 int other_body(const Node&, const Scene&, const std::string& key);  // other than the robot
 
-// What happens by itself: one of [[forces]], [[motions]], [[ligaments]]. scenes/detail/read_script.cpp
+// What happens by itself: one of [[forces]], [[pressures]], [[motions]], [[ligaments]].
+// scenes/detail/read_script.cpp
 void read_force(const Node& table, Scene&);
+void read_pressure(const Node& table, Scene&);
 void read_motion(const Node& table, Scene&);
 void read_ligament(const Node& table, Scene&);
 

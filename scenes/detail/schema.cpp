@@ -129,7 +129,7 @@ constexpr Key all_keys[] = {
      ""},
     {"bodies[].max_volume_change",
      Type::number,
-     {0, 1, true, false},
+     {0, 1000, true, false},
      0,
      "0.1",
      "\\|V − V₀\\|/V₀: no plan passes through a state in which a body that moves has changed more",
@@ -451,6 +451,25 @@ constexpr Key all_keys[] = {
     {"forces[].box_m", Type::region, any, 0, may_lack,
      "m; only the nodes of its cage that are in this box at the start, in world coordinates", "", ""},
 
+    {"pressures",
+     Type::tables,
+     {},
+     0,
+     "[]",
+     "one `[[pressures]]` for each pressure that blows a soft body up, whatever the planner does "
+     "([simulation](simulation.md))",
+     "",
+     ""},
+    {"pressures[].body", Type::text, {}, 0, required, "a soft body", "", ""},
+    {"pressures[].from_s", Type::number, from_to(0, 1e6), 0, "0.0", "s; when it begins, to the nearest step",
+     "", ""},
+    {"pressures[].to_s", Type::number, from_to(0, 1e6), 0, required, "s; when it ends", "", ""},
+    {"pressures[].pressure_pa", Type::number, any, 0, required,
+     "Pa; from within on the surface of its cage, as that is then, or in the cage's hollows where it has "
+     "some; "
+     "below 0 it draws the body together",
+     "", ""},
+
     {"ligaments",
      Type::tables,
      {},
@@ -564,6 +583,16 @@ constexpr Key all_keys[] = {
      ""},
     {"goal.above", Type::text, {}, 0, may_lack, "a body: the whole robot ends higher than all of it", "", ""},
     {"goal.below", Type::text, {}, 0, may_lack, "a body: the whole robot ends lower than all of it", "", ""},
+    {"goal.volume",
+     Type::number,
+     {1, 1000, true, false},
+     0,
+     may_lack,
+     "a balloon (planner.max_pressure_pa) ends with its cage at least so many times as large as at rest; "
+     "with "
+     "planner.settle_hold",
+     "",
+     ""},
     {"goal.clear_of", Type::text, {}, 0, may_lack, "a body that the robot does not touch at the end", "", ""},
     {"goal.through",
      Type::names,
@@ -673,6 +702,10 @@ constexpr Key all_keys[] = {
     {"planner.weights.interpolation", Type::number, at_least_zero, 0, "0.1",
      "every node towards its place at the goal; only when aiming at the goal", "", ""},
     {"planner.max_force_n", Type::number, positive, 0, required, "N; on the whole robot", "", ""},
+    {"planner.max_pressure_pa", Type::number, at_least_zero, 0, "0.0",
+     "Pa; > 0: the robot is a balloon, blown up by so much at most "
+     "([planning](planning.md#where-it-is-pushed-and-how-hard-it-may-press))",
+     "", ""},
     {"planner.force_share", Type::range, share, 0, "[0.0, 1.0]",
      "of max_force_n; each force is drawn evenly between the two", "", "[0.8, 1.0]"},
     {"planner.duration_s",

@@ -175,6 +175,10 @@ constexpr const char* one_via = "via=[{ center_of_mass_m = [2, 1, 1.5], radius_m
 constexpr const char* keyed = "camera.keyframes=[{ at = 0, eye_m = [0, -5, 1], target_m = [2, 1, 1] }]";
 constexpr const char* side_keyed =
     "cameras=[{ name = \"side\", keyframes = [{ at = 0, eye_m = [0, -5, 1], target_m = [2, 1, 1] }] }]";
+constexpr const char* balloon =
+    "goal={ center_of_mass_m = [3, 1, 1.2], radius_m = 0.3 }|planner.max_pressure_pa=500|planner.settle_hold="
+    "true";
+constexpr const char* one_pressure = "pressures=[{ body = \"cart\", to_s = 1, pressure_pa = 100 }]";
 constexpr const char* one_force = "forces=[{ body = \"cart\", to_s = 1, force_n = [1, 0, 0] }]";
 constexpr const char* one_ligament =
     "ligaments=[{ name = \"band\", from = \"robot\", from_m = [0.6, 1, 1.3], to = \"block\", to_m = [2, 1, "
@@ -234,6 +238,13 @@ const std::vector<Row> rows{
     {"bodies[].velocity_m_s", "bodies.cart.velocity_m_s=[0, 0, 1]", world},
     {"bodies[].angular_velocity_rad_s", "bodies.cart.angular_velocity_rad_s=[0, 0, 1]", world},
     {"bodies[].gravity_m_s2", "bodies.cart.gravity_m_s2=[0, 0, -1]", world},
+    {"pressures[].body", "pressures=[{ body = \"robot\", to_s = 1, pressure_pa = 100 }]", world,
+     one_pressure},
+    {"pressures[].from_s", "pressures=[{ body = \"cart\", from_s = 0.5, to_s = 1, pressure_pa = 100 }]",
+     world, one_pressure},
+    {"pressures[].to_s", "pressures=[{ body = \"cart\", to_s = 2, pressure_pa = 100 }]", world, one_pressure},
+    {"pressures[].pressure_pa", "pressures=[{ body = \"cart\", to_s = 1, pressure_pa = 90 }]", world,
+     one_pressure},
     {"forces[].body", "forces=[{ body = \"robot\", to_s = 1, force_n = [1, 0, 0] }]", world, one_force},
     {"forces[].from_s", "forces=[{ body = \"cart\", from_s = 0.5, to_s = 1, force_n = [1, 0, 0] }]", world,
      one_force},
@@ -307,6 +318,7 @@ const std::vector<Row> rows{
     {"goal.above", "goal.above=block", world},
     {"goal.below", "goal.below=block", world},
     {"goal.clear_of", "goal.clear_of=block", world},
+    {"goal.volume", "goal.volume=1.2", world | search, balloon},
     {"goal.through", "goal.through=[\"block\"]", world},
     {"goal.shape.axis", "goal.shape.axis=[1, 0, 0]", world},
     {"goal.shape.angle_deg", "goal.shape.angle_deg=20", world},
@@ -336,6 +348,7 @@ const std::vector<Row> rows{
     {"planner.weights.control_point", "planner.weights.control_point=0.4", search},
     {"planner.weights.interpolation", "planner.weights.interpolation=0.2", search},
     {"planner.max_force_n", "planner.max_force_n=90", search},
+    {"planner.max_pressure_pa", "planner.max_pressure_pa=500", search},
     {"planner.force_share", "planner.force_share=[0.5, 1]", search},
     {"planner.duration_s", "planner.duration_s=[0.2, 2]", search},
     {"planner.control_point_radius_m", "planner.control_point_radius_m=0.2", search},

@@ -212,7 +212,13 @@ List of_the_plan() {
     Control& c = p.tree.controls[leaf_of(p)];
     c.manipulation = Manipulation::body, c.force_n = Vec3f(150, 0, 0);
   });
+  add("a pressure that nobody may give", "no pressure is above the maximum",
+      [](plan::Plan& p) { p.tree.controls[leaf_of(p)].pressure_pa = 20; });
 
+  add("the path's pressure", replay, [](plan::Plan& p) {
+    p.settings.max_pressure_pa = 500;
+    p.trajectory.controls[0].pressure_pa = 400;
+  });
   add("the path's force", replay, [](plan::Plan& p) { p.trajectory.controls[0].force_n *= 0.99f; });
   add("the path's force and the tree's", replay, [](plan::Plan& p) {
     const std::vector<int> path = plan::path_to(p.tree, p.best_node);

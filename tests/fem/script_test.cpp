@@ -1,5 +1,5 @@
-// What happens by itself: velocities at the start, forces between two times, bodies that go from keyframe to
-// keyframe (docs/simulation.md).
+// What happens by itself: velocities at the start, forces and pressures between two times, bodies that go
+// from keyframe to keyframe (docs/simulation.md).
 #include "fem/script.h"
 
 #include <gtest/gtest.h>
@@ -208,6 +208,126 @@ TEST(Script, WhatBeginsWakesWhatSleeps) {
   EXPECT_NEAR(center_velocity_m_s(thrown, run(thrown, int(3 / thrown.dt_s)), 0).z(), 0.5, thrown.dt_s);
 }
 
+// ---- Pressure ----
+
+// A slab of 3 × 3 × 3 cells, and the tets of its middle one.
+struct Slab {
+  TetMesh whole, hollow;
+  Tets middle;
+};
+Slab slab(const Vec3& center = Vec3::Zero()) {
+  Slab made;
+  made.whole = made.hollow = grid(center - Vec3(0.5, 0.4, 0.3), {1, 0.8, 0.6}, 3, 3, 3);
+  std::vector<Eigen::Index> inside, outside;
+  for (Eigen::Index t = 0; t < made.whole.tets.rows(); ++t) {
+    Vec3 middle = Vec3::Zero();
+    for (int i = 0; i < 4; ++i) middle += made.whole.positions.row(made.whole.tets(t, i)) / 4;
+    const Vec3 away = (middle - center).cwiseQuotient(Vec3(1, 0.8, 0.6)).cwiseAbs();
+    (away.maxCoeff() < 1. / 6 ? inside : outside).push_back(t);
+  }
+  made.middle = made.whole.tets(inside, Eigen::all);
+  made.hollow.tets = made.whole.tets(outside, Eigen::all);
+  return made;
+}
+
+double volume_of(const Tets& tets, const Points& x) {
+  double sum = 0;
+  for (Eigen::Index t = 0; t < tets.rows(); ++t)
+    sum += signed_volume(x.row(tets(t, 0)), x.row(tets(t, 1)), x.row(tets(t, 2)), x.row(tets(t, 3)));
+  return sum;
+}
+
+World blown(TetMesh mesh, MaterialModel model, double pressure_pa) {
+  WorldSpec spec = alone(body(std::move(mesh), BodyKind::deformable));
+  spec.bodies[0].material.model = model;
+  spec.pressures.push_back({0, 0, 100, pressure_pa});
+  return build_world(spec);
+}
+
+// Small pressures dilate a body of one material alike all over, whatever its shape: ΔV/V = p/K.
+TEST(Pressure, ABodyGrowsByThePressureOverItsBulkModulus) {
+  const double bulk_pa = 2e4 / 3 / (1 - 2 * 0.45);
+  for (const double pressure : {400., -400.}) {
+    const World world = blown(slab().whole, MaterialModel::neo_hookean, pressure);
+    const State end = run(world, int(20 / world.dt_s));
+    const Points x = body_positions(world, end, 0);
+    EXPECT_NEAR(volume_m3(world, end, 0) / world.bodies[0].rest_volume_m3 - 1, pressure / bulk_pa,
+                0.01 * std::abs(pressure) / bulk_pa);
+    const Strains all = strains(world, end, 0);
+    EXPECT_LT(*std::max_element(all.von_mises.begin(), all.von_mises.end()), 2e-5);
+  }
+}
+
+// At rest the elastic energy is half of what the pressure gave, p ΔV (Clapeyron): of the body or, where it is
+// hollow, of its hollow.
+TEST(Pressure, AHollowIsBlownUpFromWithin) {
+  const Slab made = slab();
+  for (const MaterialModel model : {MaterialModel::springs, MaterialModel::neo_hookean})
+    for (const bool hollow : {false, true}) {
+      const double pressure = hollow ? 500 : 200;
+      const World world = blown(hollow ? made.hollow : made.whole, model, pressure);
+      const State end = run(world, int(3 / world.dt_s));
+      const Tets& held = hollow ? made.middle : made.whole.tets;
+      const double grown =
+          volume_of(held, body_positions(world, end, 0)) - volume_of(held, world.bodies[0].cage.positions);
+      EXPECT_GT(grown, 0);
+      EXPECT_NEAR(2 * elastic_energy_j(world, end) / (pressure * grown), 1, 0.02) << hollow;
+    }
+}
+
+// A closed surface is neither pushed nor turned, blown up as it may be.
+TEST(Pressure, GivesNeitherMomentumNorTurn) {
+  Slab made = slab();
+  for (Eigen::Index n = 0; n < made.whole.positions.rows(); ++n)  // no symmetry
+    made.whole.positions.row(n) += 0.05 * made.whole.positions.row(n).array().sin().matrix().reverse();
+  made.hollow.positions = made.whole.positions;
+  for (const TetMesh& mesh : {made.whole, made.hollow}) {
+    const World world = blown(mesh, MaterialModel::neo_hookean, 5e3);
+    const State end = run(world, int(0.05 / world.dt_s));
+    EXPECT_GT(mean_speed_m_s(world, end, 0), 1e-3);
+    const Points x = body_positions(world, end, 0);
+    const Vec3 center = center_of_mass_m(world, end, 0);
+    Vec3 turning = Vec3::Zero();
+    double all = 0;
+    for (int n = 0; n < int(x.rows()); ++n) {
+      const Vec3 v = Eigen::Map<const Vec3f>(end.velocities.data() + 3 * n).cast<double>();
+      turning += world.bodies[0].node_mass_kg[std::size_t(n)] * (Vec3(x.row(n)) - center).cross(v);
+      all += world.bodies[0].node_mass_kg[std::size_t(n)] * v.norm();
+    }
+    EXPECT_LT(momentum(world, end).norm(), 1e-4 * all);
+    EXPECT_LT(turning.norm(), 1e-4 * all);
+  }
+}
+
+TEST(Pressure, OfAControlIsThatOfTheWorldBitForBit) {
+  WorldSpec spec = alone(body(slab().whole, BodyKind::deformable));
+  const World plain = build_world(spec);
+  spec.pressures.push_back({0, 0, 200 * plain.dt_s, 700});
+  const World forced = build_world(spec);
+  Control control;
+  control.pressure_pa = 700;
+  const State pushed = run(plain, start_state(plain), 200, control);
+  EXPECT_NE(pushed, run(plain, 200));
+  EXPECT_EQ(run(forced, 200), pushed);
+  EXPECT_EQ(run(forced, 300), run(plain, pushed, 100));
+}
+
+// It sleeps while it is blown up, as it did before.
+TEST(Pressure, WakesWhoSleeps) {
+  WorldSpec spec = alone(body(slab({1.5, 2.4, 3.3}).whole, BodyKind::deformable));
+  spec.rest_speed_m_s = 0.01;
+  spec.pressures.push_back({0, 2, 5, 4e3});
+  const World world = build_world(spec);
+  const auto at = [&](double s) { return run(world, int(s / world.dt_s)); };
+  const auto share = [&](const State& state) {
+    return volume_m3(world, state, 0) / world.bodies[0].rest_volume_m3;
+  };
+  for (const double rests_at_s : {1.9, 4.9})
+    EXPECT_EQ(mean_speed_m_s(world, at(rests_at_s), 0), 0) << rests_at_s;
+  EXPECT_GT(share(at(4.9)), 1.03);
+  EXPECT_NEAR(share(at(7)), 1, 2e-3);
+}
+
 // A result is a function of the state, whose step is its time: however the way there is cut, and whoever goes
 // beside it.
 TEST(Script, CutsAndLanesDoNotChangeABit) {
@@ -215,6 +335,7 @@ TEST(Script, CutsAndLanesDoNotChangeABit) {
   spec.rest_speed_m_s = 0.01;
   spec.forces.push_back({0, 0.2, 0.5, {30, 0, 0}});
   spec.forces.push_back({0, 0.4, 0.9, {0, 40, 0}});
+  spec.pressures.push_back({0, 0.35, 0.8, 2e3});
   const World world = build_world(spec);
   const State start = start_state(world);
   const int n = int(1.2 / world.dt_s);
@@ -240,6 +361,7 @@ TEST(Script, WhatIsWrongIsRefused) {
   const auto refused = [](const WorldSpec& spec) { EXPECT_THROW(build_world(spec), InputError); };
   WorldSpec good = lift(BodyKind::deformable, {{1, {0, 0, 1}, {0, 0, 0}}});
   good.forces.push_back({0, 0, 1, {1, 0, 0}});
+  good.pressures.push_back({0, 0, 1, 10});
   EXPECT_NO_THROW(build_world(good));
   const auto with = [&](auto change) {
     WorldSpec spec = good;
@@ -253,6 +375,12 @@ TEST(Script, WhatIsWrongIsRefused) {
   with([](WorldSpec& s) { s.forces[0].from_s = -1; });
   with([&](WorldSpec& s) { s.forces[0].to_s = nan; });
   with([&](WorldSpec& s) { s.forces[0].force_n.x() = nan; });
+  with([](WorldSpec& s) { s.pressures[0].body = 2; });
+  with([](WorldSpec& s) { s.pressures[0].body = 1; });
+  with([](WorldSpec& s) { s.bodies[0].kind = BodyKind::rigid; });
+  with([](WorldSpec& s) { s.pressures[0].to_s = 0; });
+  with([](WorldSpec& s) { s.pressures[0].from_s = -1; });
+  with([&](WorldSpec& s) { s.pressures[0].pressure_pa = nan; });
   with([&](WorldSpec& s) { s.bodies[0].velocity_m_s.x() = nan; });
   with([](WorldSpec& s) { s.bodies[1].track.keyframes[0].at_s = 0; });
   with([](WorldSpec& s) { s.bodies[1].track.keyframes.push_back(s.bodies[1].track.keyframes[0]); });

@@ -82,6 +82,19 @@ TEST(Goal, PredicatesAreAboutAllOfABody) {
   EXPECT_NE(is_above.hash(), is_below.hash()) << "another goal is another search";
 }
 
+TEST(Goal, ABalloonIsBlownUpSoFar) {
+  const fem::World world = fem::build_world(brick_over_slab());
+  GoalRules rules;
+  rules.volume = 1.5;
+  const FemSystem blown(world, rules), any(world, {});
+  for (const double stretch : {1.0, 1.14, 1.15, 1.3}) {
+    const State state = with_robot_at(world, stretch * world.bodies[0].cage.positions);
+    EXPECT_EQ(blown.goal_holds(state), stretch * stretch * stretch >= 1.5) << stretch;
+    EXPECT_TRUE(any.goal_holds(state));
+  }
+  EXPECT_NE(blown.hash(), any.hash());
+}
+
 // A ring of radius 0.5 m in the plane x = 0, and a cord of 4 m beside it, in it, or bent so that it goes
 // there and back, through the hole or round it.
 TEST(Goal, PiecesInTheHoleOfARingAreCounted) {

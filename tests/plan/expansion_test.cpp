@@ -122,6 +122,34 @@ TEST(Control, PushesAlongTheWayAndNeverAboveTheMaximum) {
   }
 }
 
+// Half of the pushes are slack, and all towards the goal; the others are of any pressure up to the largest.
+TEST(Control, ABalloonIsBlownUpInHalfOfItsPushes) {
+  const Toy toy(5, false, false, 99);
+  Settings s = toy_settings();
+  EXPECT_EQ(control_of(draw_sample(s, toy, 3), s, {3, 2, 1}).pressure_pa, 0);
+  s.max_pressure_pa = 700, s.settle.pressure_pa = 600;
+  int slack = 0, low = 0, all = 0;
+  for (int i = 0; i < draws; ++i) {
+    const Sample d = draw_sample(s, toy, i);
+    Sample without = draw_sample(toy_settings(), toy, i);
+    const Control c = control_of(d, s, {3, 2, 1});
+    ASSERT_EQ(d.point, without.point);  // all else is drawn as ever
+    ASSERT_LE(c.pressure_pa, 700);
+    if (d.towards_goal) {
+      ASSERT_EQ(c.pressure_pa, 0);
+      continue;
+    }
+    ++all, slack += c.pressure_pa == 0, low += c.pressure_pa > 0 && c.pressure_pa < 350;
+  }
+  EXPECT_NEAR(double(slack) / all, 0.5, 0.05);
+  EXPECT_NEAR(double(low) / all, 0.25, 0.05);
+  EXPECT_EQ(settle_control(s, 5).pressure_pa, 600);
+  EXPECT_EQ(goal_control(s, 5).pressure_pa, 0);
+  s.via.push_back({s.goal, true});
+  EXPECT_EQ(settings_of_leg(s, 0).settle.pressure_pa, 0);
+  EXPECT_EQ(settings_of_leg(s, 1).settle.pressure_pa, 600);
+}
+
 TEST(Control, AtThePointItselfThereIsNoDirectionAndNoForce) {
   Sample d;
   d.manipulation = Manipulation::body;

@@ -58,6 +58,26 @@ TEST_F(PlanFileTest, SecondCarriersComeBack) {
   EXPECT_EQ(back.plan.tree.controls, p.tree.controls);
 }
 
+// Likewise, and settings that nobody has are not in the file, as in those of before.
+TEST_F(PlanFileTest, PressuresComeBack) {
+  Settings settings = toy_settings();
+  EXPECT_FALSE(json_of(settings).contains("max_pressure_pa"));
+  settings.max_pressure_pa = 300, settings.settle.pressure_pa = 200;
+  Plan p = plan(Toy(5, true, true, 1.6f), settings);
+  Plan slack = p;
+  for (std::vector<Control>* controls : {&slack.trajectory.controls, &slack.tree.controls})
+    for (Control& control : *controls) control.pressure_pa = 0;
+  EXPECT_FALSE(npz_of(slack, {}).arrays.contains("path_pressure_pa"));
+  EXPECT_TRUE(std::any_of(p.tree.controls.begin(), p.tree.controls.end(),
+                          [](const Control& control) { return control.pressure_pa > 0; }));
+  EXPECT_NE(hash_of(p.tree), hash_of(slack.tree));
+  write_plan(file(), p, {});
+  const PlanFile back = read_plan(file());
+  expect_same(back.plan, p);
+  EXPECT_EQ(back.plan.tree.controls, p.tree.controls);
+  EXPECT_EQ(back.plan.settings.settle.pressure_pa, 200);
+}
+
 TEST_F(PlanFileTest, RoundTrip) {
   const Json given = {{"scene", "name = \"toy\"\n"}, {"version", "0.1"}};
   Settings settings = toy_settings();

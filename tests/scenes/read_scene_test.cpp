@@ -527,6 +527,27 @@ TEST(Script, StandsInTheSceneOrInAFileOfItsOwn) {
   EXPECT_EQ(read_scene(good, "s.toml", {}, {"# nothing", "c.toml"}).forces.size(), 0U);
 }
 
+TEST(Script, PressuresAreInSoftBodies) {
+  const std::string pressure = "[[pressures]]\nbody = \"gate\"\nto_s = 1\npressure_pa = 300\n";
+  const Scene scene = read_scene(good + pressure, "s.toml");
+  ASSERT_EQ(scene.pressures.size(), 1u);
+  EXPECT_EQ(scene.pressures[0].body, 1);
+  EXPECT_EQ(scene.pressures[0].pressure_pa, 300);
+  EXPECT_EQ(all_of(scene), all_of(read_scene(good, "s.toml", {}, {pressure, "c.toml"})));
+  const std::string balloon = replaced(good, "max_force_n = 500", "max_force_n = 500\nmax_pressure_pa = 400");
+  EXPECT_EQ(read_scene(balloon, "s.toml", {"goal.volume=1.5", "planner.settle_hold=true"}).goal.volume, 1.5);
+  const auto says = [](const std::string& text, const std::vector<std::string>& sets, const char* what) {
+    EXPECT_NE(complaint(text, sets).find(what), std::string::npos) << complaint(text, sets);
+  };
+  says(good + pressure, {"pressures.0.to_s=0"}, "not after from_s");
+  says(good + pressure, {"bodies.gate.kind=rigid"}, "is rigid, which no pressure blows up");
+  says(balloon, {"bodies.robot.kind=rigid"}, "the robot is rigid, which no pressure blows up");
+  says(good, {"goal.volume=1.5", "planner.settle_hold=true"}, "nothing blows the robot up");
+  says(balloon, {"goal.volume=1.5", "planner.settle_hold=false"}, "drawn into its shape");
+  says(balloon, {"goal.volume=1.5", "planner.settle_time_s=0", "planner.settle_hold=true"},
+       "no time to blow");
+}
+
 TEST(Ligaments, AreBetweenTwoBodiesOrABodyAndTheWorld) {
   const std::string band =
       "[[ligaments]]\nname = \"band\"\nfrom = \"robot\"\nfrom_m = [1, 2, 3]\nto = \"gate\"\nto_m = [4, 5, "
@@ -714,6 +735,8 @@ std::string another_value(const Key& key) {
       {"cameras[].keyframes[].target_m", "[0, 0.5, 1]"},
       {"bodies[].role", "\"free\""},
       {"planner.duration_s", "[0.3, 0.4]"},
+      {"pressures[].body", "\"gate\""},
+      {"goal.volume", "1.5"},
       {"forces[].body", "\"gate\""},
       {"forces[].box_m", "[[0, 0, 0], [1, 2, 2]]"},
       {"motions[].body", "\"shutter\""},
@@ -810,6 +833,8 @@ TEST(Keys, EveryKeyChangesTheScene) {
                   ? "bodies.robot.parts=[{ box_m = [[0, 0, 0], [1, 1, 1]], density_kg_m3 = 1 }]"
                   : "bodies.robot.parts=[{ shell = 0, density_kg_m3 = 1 }]"};
     if (key.parent() == "forces[]") sets = {"forces=[{ body = \"robot\", to_s = 1, force_n = [1, 0, 0] }]"};
+    if (key.parent() == "pressures[]") sets = {"pressures=[{ body = \"robot\", to_s = 1, pressure_pa = 5 }]"};
+    if (key.path == "goal.volume") sets = {"planner.max_pressure_pa=9", "planner.settle_hold=true"};
     if (key.parent() == "ligaments[]")
       sets = {
           "ligaments=[{ name = \"band\", from = \"robot\", from_m = [0, 0, 0], to = \"gate\", to_m = [1, 0, "
@@ -823,7 +848,7 @@ TEST(Keys, EveryKeyChangesTheScene) {
                                      key.path == "bodies[].triangles"
                                  ? "bodies.gate"
                                  : "bodies.robot";
-    for (const char* list : {"via", "forces", "motions", "ligaments"})
+    for (const char* list : {"via", "forces", "pressures", "motions", "ligaments"})
       if (path.starts_with(list + std::string("[]")))
         path = replaced(path, list + std::string("[]"), list + std::string(".0"));
     if (path.starts_with("bodies[]")) path = replaced(path, "bodies[]", body);
@@ -990,6 +1015,8 @@ std::string all_of(const Scene& s) {
   for (const ForceSpec& f : s.forces)
     t += fmt::format("{} {} {} {} {}\n", f.body, f.from_s, f.to_s, v(f.force_n),
                      f.box_m ? b(*f.box_m) : std::string());
+  for (const PressureSpec& p : s.pressures)
+    t += fmt::format("{} {} {} {}\n", p.body, p.from_s, p.to_s, p.pressure_pa);
   for (const MotionSpec& m : s.motions) {
     t += fmt::format("{}", m.body);
     for (const MotionSpec::Keyframe& k : m.keyframes)
@@ -1021,6 +1048,7 @@ std::string all_of(const Scene& s) {
   t += fmt::format("{} {} {} {} {} {} {} {} {} {} {}\n", p.lag, p.metric, p.time_weight, p.guidance,
                    p.soft_price, p.look_s, p.learn_prices, p.steer, p.stop_in_goal, p.end_hopeless, p.hold);
   t += fmt::format("{} {} {} {}\n", p.shortcut_rounds, p.settle_hold, p.lead, p.carry);
+  t += fmt::format("{} {}\n", p.max_pressure_pa, s.goal.volume);
   for (const Box& patch : p.patches_m) t += b(patch);
   for (const CameraSpec& c : s.cameras) {
     t += fmt::format("{} {} {} {} {}", c.name, v(c.direction), c.fov_deg, c.turn_deg, c.follow);

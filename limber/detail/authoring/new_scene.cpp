@@ -31,10 +31,13 @@ std::vector<PreparedBody> bodies_of(const scenes::Scene& scene, const std::vecto
     const auto organ =
         std::find_if(organs.begin(), organs.end(), [&](const Organ& o) { return o.name == body.name; });
     SurfaceMesh surface = organ != organs.end() ? organ->surface : *scenes::made_surface(body);
-    scenes::transform(scenes::world_from_model(body, surface.positions, organ == organs.end()),
-                      surface.positions);
+    const auto to_world = scenes::world_from_model(body, surface.positions, organ == organs.end());
+    scenes::transform(to_world, surface.positions);
     PreparedBody& prepared = bodies[std::size_t(i)];
-    prepared.cage = meshing::build_cage(surface, {}, {.tets = body.cage.tets}).mesh;
+    if (std::optional<TetMesh> cells = scenes::made_cage(body))
+      scenes::transform(to_world, cells->positions), prepared.cage = std::move(*cells);
+    else
+      prepared.cage = meshing::build_cage(surface, {}, {.tets = body.cage.tets}).mesh;
     prepared.contact = meshing::make_contact_shape(surface, prepared.cage);
     prepared.surface = std::move(surface);
   });
@@ -74,11 +77,10 @@ NewScene scene_of_folder(const NewSceneOptions& options, const std::string& wher
                                  organ_moves(options) ? "soft body (bones, hulls and sheets are none)"
                                                       : "body (hulls and sheets are none)",
                                  fmt::join(candidates, ", ")));
-  if (options.story == Story::instrument && std::any_of(organs.begin(), organs.end(), [](const Organ& organ) {
-        return organ.name == instrument_name;
-      }))
+  const std::string tool = tool_name(options.story);
+  if (std::any_of(organs.begin(), organs.end(), [&](const Organ& organ) { return organ.name == tool; }))
     throw InputError(fmt::format("{}: has a model called {}, as limber calls its own; give it another name",
-                                 options.from.string(), instrument_name));
+                                 options.from.string(), tool));
   for (Organ& organ : organs) organ.file = where + organ.file;
   if (options.only.empty()) leave_out_doubles(organs, notes);
   log::info("making cages");

@@ -246,7 +246,7 @@ class Check {
       look(fmt::format("via {}: ", v + 1), scene_.via[v].goal);
     const scenes::Goal& goal = scene_.goal;
     const bool there = look("", goal), more = goal.shape || goal.above >= 0 || goal.below >= 0 ||
-                                              goal.clear_of >= 0 || !goal.through.empty();
+                                              goal.clear_of >= 0 || goal.volume > 0 || !goal.through.empty();
     if (there && !more && scene_.via.empty()) already_there();
   }
 

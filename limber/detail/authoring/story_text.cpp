@@ -135,34 +135,60 @@ std::string free_side(const std::vector<Organ>& organs, const Organ& robot, doub
   return best;
 }
 
-// Steel, of which most is hollow.
-constexpr double instrument_density_kg_m3 = 4000;
 // What fascia holds gives way to newtons and not to a rod's own weight. Led through so much damping a rod of
 // 40 g that is pushed with 2 N goes at 0.3 m/s, and not as fast as it would be thrown.
 constexpr double force_in_fascia_m_s2 = 50, damping_in_fascia_per_s = 150;
 
-// A rod with round ends that comes to an organ, point first.
-struct Instrument {
+// What comes to an organ: a rod with round ends, point first, or a ball.
+struct ToolKind {
+  const char* name;
+  const char* how;  // it comes
+  double length_m, width_m, density_kg_m3;
+};
+constexpr ToolKind instrument{"instrument", "an instrument comes", 0.15, 0.008,
+                              4000};  // steel, mostly hollow
+constexpr ToolKind endoscope{"endoscope", "a soft endoscope comes", 0.2, 0.01, 1000};
+constexpr ToolKind balloon{"balloon", "a balloon is blown up, where it comes", 0.024, 0.024, 1000};
+constexpr double before_organ_m = 0.002, tissue_beside_m = 0.004;
+// Of rubber so soft that it doubles its volume by half of what may blow it up, and presses with the rest.
+constexpr double balloon_modulus_pa = 6e3, balloon_pressure_pa = 6e3, balloon_volume = 2;
+constexpr double endoscope_modulus_pa = 1e6;
+constexpr int endoscope_cells = 20;
+
+const ToolKind* tool_kind(Story story) {
+  return story == Story::instrument  ? &instrument
+         : story == Story::endoscope ? &endoscope
+         : story == Story::balloon   ? &balloon
+                                     : nullptr;
+}
+
+struct Tool {
+  const ToolKind* kind;
   Vec3 outward;                // unit; from the organ along the rod
   Vec3 at_start_m, at_goal_m;  // its middle
-  double length_m, width_m;
-  double mass_kg() const { return instrument_density_kg_m3 * length_m * width_m * width_m; }
+  double volume_m3() const {
+    const double w = kind->width_m;
+    return kind == &instrument  ? kind->length_m * w * w
+           : kind == &endoscope ? EIGEN_PI / 4 * w * w * kind->length_m
+                                : EIGEN_PI / 6 * w * w * w;
+  }
+  double mass_kg() const { return kind->density_kg_m3 * volume_m3(); }
+  Vec3 tip_m(const Vec3& middle) const { return middle - 0.5 * kind->length_m * outward; }
+  // What leads an endoscope by its tip is the front of it.
+  Vec3 goal_m() const { return kind == &endoscope ? tip_m(at_goal_m) : at_goal_m; }
 };
-
-constexpr double instrument_length_m = 0.15, instrument_width_m = 0.008;
-constexpr double before_organ_m = 0.002, tissue_beside_m = 0.004;
 
 // From before the body, or from above and below there, to that point of the organ that is farthest out on a
 // line through its middle: where nothing is in the way, then where no ribs are, then most from the front.
-Instrument instrument_to(const NewSceneOptions& options, const std::vector<Organ>& organs,
-                         const Organ& target, double scale) {
+Tool tool_to(const ToolKind& kind, const NewSceneOptions& options, const std::vector<Organ>& organs,
+             const Organ& target, double scale) {
   std::vector<SurfaceMesh> solid, ribs;
   for (const Organ& organ : organs)
     if (&organ != &target && (!organ.see_through || organ.bone))
       (organ.see_through ? ribs : solid).push_back(placed_surface(options, organ, scale));
   const SurfaceMesh surface = placed_surface(options, target, scale);
   const Vec3 center = bounding_box(surface.positions).center();
-  Instrument best{};
+  Tool best{};
   double most = -1;
   for (const double around_deg : {0.0, -20.0, 20.0, -40.0, 40.0, -60.0, 60.0, -80.0, 80.0})
     for (const double up_deg : {0.0, 25.0, -25.0, 50.0, -50.0}) {
@@ -181,7 +207,7 @@ Instrument instrument_to(const NewSceneOptions& options, const std::vector<Organ
       tube.row(0) = aim.transpose();
       for (int i = 0; i < 2 * spokes; ++i) {
         const double turn = 2 * EIGEN_PI * i / spokes,
-                     radius = (i < spokes ? 0.5 : 1) * (0.5 * instrument_width_m + tissue_beside_m);
+                     radius = (i < spokes ? 0.5 : 1) * (0.5 * kind.width_m + tissue_beside_m);
         tube.row(1 + i) = (aim + radius * (std::cos(turn) * x + std::sin(turn) * y)).transpose();
       }
       const double free = share_in_sight(tube, outward, solid);
@@ -189,30 +215,68 @@ Instrument instrument_to(const NewSceneOptions& options, const std::vector<Organ
       if (worth <= most) continue;
       most = worth;
       const double way_m = std::max(0.08, 0.6 * scale * target.box.size().maxCoeff());
-      best = {.outward = outward,
-              .at_start_m = aim + (before_organ_m + way_m + 0.5 * instrument_length_m) * outward,
-              .at_goal_m = aim + (before_organ_m + 0.5 * instrument_length_m) * outward,
-              .length_m = instrument_length_m,
-              .width_m = instrument_width_m};
+      const double half_m = 0.5 * kind.length_m * (&kind == &balloon ? std::cbrt(balloon_volume) : 1);
+      best = {.kind = &kind,
+              .outward = outward,
+              .at_start_m = aim + (before_organ_m + way_m + half_m) * outward,
+              .at_goal_m = aim + (before_organ_m + half_m) * outward};
     }
   return best;
 }
 
-std::string body_text(const Instrument& rod, const NewSceneOptions& options) {
-  const Vec3 axis = Vec3::UnitX().cross(rod.outward);
-  const double angle_deg = std::atan2(axis.norm(), rod.outward.x()) * 180 / EIGEN_PI;
+std::string box_text(const Vec3& middle, double half) {
+  return fmt::format("[{}, {}]", vector_text(middle - Vec3::Constant(half)),
+                     vector_text(middle + Vec3::Constant(half)));
+}
+
+std::string body_text(const Tool& tool, const NewSceneOptions& options) {
+  const ToolKind& kind = *tool.kind;
+  const bool hung = options.fascia_hz > 0;
+  std::string text = fmt::format("\n[[bodies]]\nname = \"{}\"\nrole = \"robot\"\n", kind.name), material;
+  if (&kind == &instrument) {
+    const Vec3 axis = Vec3::UnitX().cross(tool.outward);
+    const double angle_deg = std::atan2(axis.norm(), tool.outward.x()) * 180 / EIGEN_PI;
+    text += fmt::format(
+        "kind = \"rigid\"\nmodel = {{ box = {{ size_m = [{:g}, {:g}, {:g}], bevel_m = {:g} }} }}\n"
+        "pose = {{ position_m = {}, axis = {}, angle_deg = {:.5g} }}\ncage = {{ tets = 60 }}\n",
+        kind.length_m, kind.width_m, kind.width_m, 0.49 * kind.width_m, vector_text(tool.at_start_m),
+        axis.norm() > 1e-9 ? vector_text(axis.normalized()) : "[0, 0, 1]", angle_deg);
+  } else if (&kind == &endoscope) {
+    const Vec3 half = 0.5 * kind.length_m * tool.outward;
+    text += fmt::format(
+        "self_contact = false   # as it bends it cannot reach itself\n"
+        "model = {{ tube = {{ path_m = [{}, {}], diameter_m = {:g} }} }}\ncage = {{ cells = [1, 1, {}] }}\n",
+        vector_text(tool.at_start_m + half), vector_text(tool.at_start_m - half), kind.width_m,
+        endoscope_cells);
+    material = fmt::format("youngs_modulus_pa = {:g}, poisson_ratio = 0.4, ", endoscope_modulus_pa);
+  } else {
+    text += fmt::format(
+        "max_volume_change = 4\nmodel = {{ sphere = {{ diameter_m = {:g}, triangle_m = {:g} }} }}\n"
+        "pose = {{ position_m = {} }}\ncage = {{ tets = 200 }}\n",
+        kind.length_m, kind.length_m / 16, vector_text(tool.at_start_m));
+    material = fmt::format("youngs_modulus_pa = {:g}, poisson_ratio = 0.3, ", balloon_modulus_pa);
+  }
+  text += fmt::format("material = {{ {}density_kg_m3 = {:g}, friction = 0.05{} }}\n{}", material,
+                      kind.density_kg_m3,
+                      hung ? fmt::format(", mass_damping_per_s = {:g}", damping_in_fascia_per_s) : "",
+                      &kind == &instrument  ? "color = \"#aab4bd\"\nroughness = 0.3\nmetallic = 0.6\n"
+                      : &kind == &endoscope ? "color = \"#2b3a55\"\n"
+                                            : "color = \"#e8c84a\"\nlook = \"rubber\"\n");
+  return hung ? text + no_gravity : text;
+}
+
+// How a tool is pushed; an endoscope by its tail, and by its tip, which leads it.
+std::string planner_text(const Tool& tool) {
+  const ToolKind& kind = *tool.kind;
+  if (&kind == &instrument)
+    return "weights = { body = 1, control_point = 0, interpolation = 0 }   # it is not turned\n";
+  if (&kind == &balloon) return fmt::format("max_pressure_pa = {:g}\n", balloon_pressure_pa);
+  const double half = 0.9 * kind.width_m;
+  const Vec3 tip = tool.tip_m(tool.at_start_m), tail = 2 * tool.at_start_m - tip;
   return fmt::format(
-             "\n[[bodies]]\nname = \"{}\"\nrole = \"robot\"\nkind = \"rigid\"\n"
-             "model = {{ box = {{ size_m = [{:g}, {:g}, {:g}], bevel_m = {:g} }} }}\n"
-             "pose = {{ position_m = {}, axis = {}, angle_deg = {:.5g} }}\n"
-             "cage = {{ tets = 60 }}\nmaterial = {{ density_kg_m3 = {:g}, friction = 0.05{} }}\n"
-             "color = \"#aab4bd\"\nroughness = 0.3\nmetallic = 0.6\n",
-             instrument_name, rod.length_m, rod.width_m, rod.width_m, 0.49 * rod.width_m,
-             vector_text(rod.at_start_m), axis.norm() > 1e-9 ? vector_text(axis.normalized()) : "[0, 0, 1]",
-             angle_deg, instrument_density_kg_m3,
-             options.fascia_hz > 0 ? fmt::format(", mass_damping_per_s = {:g}", damping_in_fascia_per_s)
-                                   : "") +
-         (options.fascia_hz > 0 ? no_gravity : "");
+      "patches_m = [{}, {}]   # its tip, which leads it and is steered, and its tail\nlead = true\n"
+      "weights = {{ body = 0, control_point = 1, interpolation = 0 }}\nsettle_time_s = 0\n",
+      box_text(tip, half), box_text(tail, half));
 }
 
 struct Views {
@@ -303,7 +367,8 @@ std::string film_text(const std::vector<Organ>& organs, const NewSceneOptions& o
       names.push_back(fmt::format("\"{}\"", organ.name));
     if (!organ.see_through && !organ.bone) soft.include(bounding_box(placed(organ, scale).positions));
   }
-  if (options.story == Story::instrument) names.push_back(fmt::format("\"{}\"", instrument_name));
+  if (const std::string tool = tool_name(options.story); !tool.empty())
+    names.push_back(fmt::format("\"{}\"", tool));
   std::string text = fmt::format(
       "\n[film]\nframes_per_second = 30\nspeed = {:.2g}{}\nlook = \"clinical\"\nbounds_lines = false\n"
       "clock = {}\nscale_bar = true\ncaption = \"{}\"\nlabels = [{}]\n",
@@ -324,13 +389,18 @@ std::string in_words(std::string name) {
 
 }  // namespace
 
+std::string tool_name(Story story) {
+  const ToolKind* kind = tool_kind(story);
+  return kind ? kind->name : "";
+}
+
 std::string scene_text(const std::vector<Organ>& organs, const NewSceneOptions& options, double scale) {
   const Organ& robot = *std::find_if(organs.begin(), organs.end(),
                                      [&](const Organ& organ) { return organ.name == options.robot; });
-  const bool of_instrument = options.story == Story::instrument;
+  const ToolKind* kind = tool_kind(options.story);
   const TetMesh robot_cage = placed(robot, scale);
-  const std::optional<Instrument> rod =
-      of_instrument ? std::optional(instrument_to(options, organs, robot, scale)) : std::nullopt;
+  const std::optional<Tool> tool =
+      kind ? std::optional(tool_to(*kind, options, organs, robot, scale)) : std::nullopt;
   const std::string side = !options.goal.empty()           ? options.goal
                            : options.story == Story::aside ? free_side(organs, robot, scale)
                                                            : "front";
@@ -338,8 +408,8 @@ std::string scene_text(const std::vector<Organ>& organs, const NewSceneOptions& 
   const double along = std::abs(direction.dot(size));
   const double way_m = options.story == Story::aside ? std::max(0.8 * along, 0.5 * size.maxCoeff())
                                                      : way_to_goal(organs, robot, scale, direction);
-  const Vec3 start = rod ? rod->at_start_m : center_of_mass(robot_cage),
-             goal = rod ? rod->at_goal_m : Vec3(start + way_m * direction);
+  const Vec3 start = tool ? tool->at_start_m : center_of_mass(robot_cage),
+             goal = tool ? tool->at_goal_m : Vec3(start + way_m * direction);
   Box bounds;
   for (const std::size_t i : simulated(organs)) {
     // Bones do not move, and may reach out.
@@ -348,24 +418,24 @@ std::string scene_text(const std::vector<Organ>& organs, const NewSceneOptions& 
     const Vec3 more = Vec3::Constant(0.3 * size.maxCoeff());
     bounds.include(box.lower - more), bounds.include(box.upper + more);
   }
-  if (rod) {
-    const Vec3 reach = Vec3::Constant(0.7 * rod->length_m);
+  if (tool) {
+    const Vec3 reach = Vec3::Constant(0.7 * kind->length_m);
     bounds.include(start + reach), bounds.include(start - reach);
   } else if (organ_moves(options)) {
     bounds.include(goal + 1.5 * size), bounds.include(goal - 1.5 * size);
   }
   // At 5 m/s² a body of a metre is pushed for 0.2 to 1 s at a time; times go with the root of the length.
-  const double length = rod ? (goal - start).norm() : size.maxCoeff(), time = std::sqrt(length);
+  const double length = tool ? (goal - start).norm() : size.maxCoeff(), time = std::sqrt(length);
   const double mass =
-      rod ? rod->mass_kg()
-          : std::pow(scale, 3) * robot.volume_m3 * scenes::anatomy_of(robot.name).density_kg_m3;
+      tool ? tool->mass_kg()
+           : std::pow(scale, 3) * robot.volume_m3 * scenes::anatomy_of(robot.name).density_kg_m3;
   const std::string of_true_size = scale < 1
                                        ? fmt::format("{:g} of its true size, about its own middle", scale)
                                        : std::string("of its true size");
   const std::size_t others = simulated(organs).size() - 1;
   const std::string name = in_words(robot.name);
   const std::string description =
-      of_instrument ? fmt::format("an instrument comes to the {} among {} bodies", name, others)
+      tool ? fmt::format("{} to the {} among {} bodies", kind->how, name, others)
       : options.story == Story::aside
           ? fmt::format("the {} is moved aside, to the {}, among {} bodies", name, side, others)
       : options.story == Story::tour
@@ -382,35 +452,38 @@ std::string scene_text(const std::vector<Organ>& organs, const NewSceneOptions& 
       of_true_size, options.out.stem().string(), description, vector_text(bounds.lower),
       vector_text(bounds.upper), options.fascia_hz > 0 ? "-9.81" : "0");
   for (const Organ& organ : organs) text += body_text(organ, options, scale);
-  if (rod) text += body_text(*rod, options);
+  if (tool) text += body_text(*tool, options);
   if (options.story == Story::tour)
     return text + tour_text(organs, robot, scale) + film_text(organs, options, scale, description, 0.1);
 
-  const double radius = rod ? 0.006 : options.story == Story::aside ? 0.2 * length : 0.4 * length;
-  text += fmt::format("\n[goal]\ncenter_of_mass_m = {}\nradius_m = {:.3g}\n", vector_text(goal), radius);
+  const double radius = tool ? 0.006 : options.story == Story::aside ? 0.2 * length : 0.4 * length;
+  text += fmt::format("\n[goal]\ncenter_of_mass_m = {}\nradius_m = {:.3g}\n",
+                      vector_text(tool ? tool->goal_m() : goal), radius);
+  if (kind == &balloon)
+    text += fmt::format("volume = {:g}   # of its own, when it is not blown up\n", balloon_volume);
   text += fmt::format(
       "\n[planner]\npreset = \"fast\"\nmax_force_n = {:.2g}\nduration_s = [{:.2g}, {:.2g}]\n"
       "control_point_radius_m = {:.2g}\nsettle_speed_m_s = {:.2g}\n",
-      (rod && options.fascia_hz > 0 ? force_in_fascia_m_s2 : 5) * mass, 0.2 * time, time, 0.35 * length,
-      0.02 * time);
-  if (rod) text += "weights = { body = 1, control_point = 0, interpolation = 0 }   # it is not turned\n";
+      (tool && options.fascia_hz > 0 ? force_in_fascia_m_s2 : 5) * mass, 0.2 * time, time,
+      kind == &endoscope ? 2 * kind->width_m : 0.35 * length, 0.02 * time);
+  if (tool) text += planner_text(*tool);
   Points looked_at = robot_cage.positions;
-  if (rod) {
+  if (tool) {
     constexpr int places = 60;
     looked_at.resize(places, 3);
     for (int i = 0; i < places; ++i)
       looked_at.row(i) =
-          (start + (double(i) / (places - 1) - 0.5) * rod->length_m * rod->outward).transpose();
+          (start + (double(i) / (places - 1) - 0.5) * kind->length_m * tool->outward).transpose();
   }
   const Views views = views_of(organs, robot, scale, looked_at, goal - start);
-  // Of an instrument's way the organ is where it leads to.
+  // Of a tool's way the organ is where it leads to.
   text += camera_text("[camera]   # from where most of the way is seen", views.best,
-                      rod ? subject_text(robot.name, 0.4) : subject_text(robot.name, 0.45));
+                      tool ? subject_text(robot.name, 0.4) : subject_text(robot.name, 0.45));
   text += camera_text("[[cameras]]\nname = \"side\"", views.side,
-                      rod ? subject_text(robot.name, 0.35) : subject_text(robot.name, 0.45));
-  text += rod ? camera_text("[[cameras]]\nname = \"near\"", views.best, subject_text(robot.name, 0.65))
-              : camera_text("[[cameras]]\nname = \"follow\"", views.best,
-                            fmt::format("follow = \"{}\"\n", robot.name));
+                      tool ? subject_text(robot.name, 0.35) : subject_text(robot.name, 0.45));
+  text += tool ? camera_text("[[cameras]]\nname = \"near\"", views.best, subject_text(robot.name, 0.65))
+               : camera_text("[[cameras]]\nname = \"follow\"", views.best,
+                             fmt::format("follow = \"{}\"\n", robot.name));
   text += camera_text("[[cameras]]\nname = \"whole\"", {1, -0.5, 0.3}, "");
   return text + film_text(organs, options, scale, description, std::clamp(time, 0.05, 1.0));
 }

@@ -8,7 +8,8 @@
 
 namespace limber::detail {
 
-inline constexpr const char* instrument_name = "instrument";  // of the rod that comes to an organ
+// What comes to the organ that the story is about: "instrument", "endoscope", "balloon"; empty: nothing does.
+std::string tool_name(Story);
 // Whether the organ that the story is about is what moves.
 bool organ_moves(const NewSceneOptions&);
 // Of organs that have come apart at that scale.

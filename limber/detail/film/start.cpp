@@ -85,7 +85,7 @@ Start loaded_start(const scenes::Scene& scene, const std::vector<LoadedModel>& m
   scenes::Scene apart = scene;
   apart.walls = false;
   apart.goal.shape.reset();
-  apart.forces.clear(), apart.ligaments.clear();
+  apart.forces.clear(), apart.pressures.clear(), apart.ligaments.clear();
   apart.planner.patches_m.clear(), apart.planner.lead = apart.planner.carry = false;
   apart.contact_offset_m = 0;
   for (std::size_t b = 0; b < models.size(); ++b) {

@@ -117,6 +117,7 @@ Json facts_of_simulation(const plan::Plan& plan, const fem::World& world, const 
   json["simulation"] = {{"duration_s", plan.simulation->duration_s},
                         {"starts_at_s", double(plan.tree.states.steps()[0]) * world.dt_s},
                         {"forces", world.forces.size()},
+                        {"pressures", world.pressures.size()},
                         {"whole", plan.simulation->ending == plan::Simulation::whole}};
   return json;
 }
@@ -164,13 +165,14 @@ plan::Settings settings_of(const scenes::Scene& scene, const PlanOptions& option
   for (const scenes::Via& via : scene.via) s.via.push_back({goal_of(via.goal), via.rest});
   s.goal_bias = p.goal_bias;
   s.weights = {p.weight_body, p.weight_control_point, p.weight_interpolation};
-  s.max_force_n = p.max_force_n;
+  s.max_force_n = p.max_force_n, s.max_pressure_pa = p.max_pressure_pa;
   s.min_force_share = p.min_force_share, s.max_force_share = p.max_force_share;
   s.min_duration_s = p.min_duration_s, s.max_duration_s = p.max_duration_s;
   s.control_point_radius_m = p.control_point_radius_m;
   s.settle = {.max_duration_s = p.settle_time_s,
               .mean_speed_m_s = p.settle_speed_m_s,
               .max_force_share = p.settle_force_share,
+              .pressure_pa = scene.goal.volume > 0 ? p.max_pressure_pa : 0,
               .hold = p.settle_hold && !scene.goal.shape};  // which holding would leave alone
   s.search_options = {.lag = p.lag,
                       .metric = p.metric == "distance" ? plan::Metric::distance : plan::Metric::time_to_go,

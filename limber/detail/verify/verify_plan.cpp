@@ -96,6 +96,12 @@ void check_forces(const plan::Plan& plan, const plan::Settings& settings, const 
             largest <= settings.max_force_n * rounding_factor &&
                 settling <= settings.max_force_n * settings.settle.max_force_share * rounding_factor,
             fmt::format("{:.1f} of {:.1f} N", largest, settings.max_force_n));
+  double pressure = 0;
+  for (const auto* controls : {&plan.tree.controls, &path.controls})
+    for (const Control& control : *controls) pressure = std::max(pressure, double(control.pressure_pa));
+  if (settings.max_pressure_pa > 0 || pressure > 0)
+    table.row("no pressure is above the maximum", pressure <= settings.max_pressure_pa * rounding_factor,
+              fmt::format("{:.4g} of {:.4g} Pa", pressure, settings.max_pressure_pa));
 }
 
 }  // namespace

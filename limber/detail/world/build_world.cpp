@@ -32,8 +32,8 @@ fem::BodyKind kind_of(const scenes::BodySpec& body) {
   return body.role == scenes::Role::obstacle ? fem::BodyKind::immovable : fem::BodyKind::rigid;
 }
 
-// [[forces]] and [[motions]] (docs/simulation.md). A body that has a motion is kinematic: it goes its way and
-// is not pushed. A force on a box of nodes must reach one that is not held.
+// [[forces]], [[pressures]] and [[motions]] (docs/simulation.md). A body that has a motion is kinematic: it
+// goes its way and is not pushed. A force on a box of nodes must reach one that is not held.
 void set_script(const scenes::Scene& scene, const std::vector<PreparedBody>& prepared, fem::WorldSpec& spec) {
   for (const scenes::MotionSpec& motion : scene.motions) {
     fem::BodySpec& body = spec.bodies[std::size_t(motion.body)];
@@ -42,6 +42,8 @@ void set_script(const scenes::Scene& scene, const std::vector<PreparedBody>& pre
     for (const scenes::MotionSpec::Keyframe& k : motion.keyframes)
       body.track.keyframes.push_back({k.at_s, k.position_m, k.angle_deg * std::numbers::pi / 180 * k.axis});
   }
+  for (const scenes::PressureSpec& pressure : scene.pressures)
+    spec.pressures.push_back({pressure.body, pressure.from_s, pressure.to_s, pressure.pressure_pa});
   for (const scenes::ForceSpec& force : scene.forces) {
     fem::ForceSpec& made =
         spec.forces.emplace_back(fem::ForceSpec{force.body, force.from_s, force.to_s, force.force_n});
@@ -223,7 +225,7 @@ GoalRules goal_rules_of(const scenes::Scene& scene) {
       rules.turn_tolerance_deg = goal.shape->turn_tolerance_deg,
       rules.shape_tolerance_m = goal.shape->tolerance_m;
     rules.above = goal.above, rules.below = goal.below, rules.clear_of = goal.clear_of;
-    rules.through = goal.through;
+    rules.through = goal.through, rules.volume = goal.volume;
     return rules;
   };
   GoalRules rules = rules_of(scene.goal);

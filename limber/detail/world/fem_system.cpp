@@ -34,6 +34,12 @@ void add_script(const fem::World& world, Hasher& hasher) {
     hasher.matrix(force.force_n).value(force.mass_kg);
     for (const int n : force.nodes) hasher.value(n);
   }
+  for (const fem::Pressure& pressure : world.pressures)
+    hasher.text("pressure")
+        .value(pressure.body)
+        .value(pressure.first_step)
+        .value(pressure.end_step)
+        .value(pressure.pressure_pa);
   for (const fem::Ligament& ligament : world.ligaments) {
     hasher.text("ligament").value(ligament.stiffness_n_m).value(ligament.damping_n_s_m);
     hasher.value(ligament.rest_length_m).value(int(ligament.pushes));
@@ -291,6 +297,7 @@ FemSystem::FemSystem(const fem::World& world, const GoalRules& goal, std::option
   for (const auto& rule : {goal.lost_below_m, goal.turn_tolerance_deg, goal.shape_tolerance_m})
     hasher.value(int(rule.has_value())).value(rule.value_or(0));
   for (const auto& [ring, pieces] : goal.through) hasher.text("through").value(ring).value(pieces);
+  if (goal.volume > 0) hasher.text("volume").value(goal.volume);
   if (!goal.patches_m.empty()) find_patches(), hasher.text("patches").value(int(goal.lead));
   if (goal.carry) hasher.text("carry");
   // A search of before these were known grew another tree.
@@ -462,6 +469,9 @@ bool FemSystem::goal_holds(const State& state) const {
   };
   if (goal_.above >= 0 && height(world_.robot, false) <= height(goal_.above, true)) return false;
   if (goal_.below >= 0 && height(world_.robot, true) >= height(goal_.below, false)) return false;
+  if (goal_.volume > 0 && fem::volume_m3(world_, state, world_.robot) <
+                              goal_.volume * world_.bodies[std::size_t(world_.robot)].rest_volume_m3)
+    return false;
   for (const auto& [ring, pieces] : goal_.through)
     if (fem::pieces_through(world_, state, ring) != pieces) return false;
   if (goal_.clear_of < 0) return true;

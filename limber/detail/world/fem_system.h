@@ -22,6 +22,7 @@ struct GoalRules {
   std::optional<double> turn_tolerance_deg;  // the robot is turned as fem::World::goal_shape_m is
   std::optional<double> shape_tolerance_m;   // no node is farther from its place in that shape
   int above = -1, below = -1;                // the whole robot is higher, lower than all of this body
+  double volume = 0;                         // > 0: the robot's cage holds so many times what it does at rest
   int clear_of = -1;                         // no contact with this body pushes the robot
   std::map<int, int> through = {};           // so many pieces of the robot are in the hole of this body
   // Where control points are, in world coordinates at the start; empty: at any node. With `lead` the free

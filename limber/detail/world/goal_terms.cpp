@@ -73,6 +73,12 @@ std::vector<GoalTerm> terms_of(const scenes::Scene& scene, const scenes::Goal& g
     terms.push_back(
         {"no contact with " + name(goal.clear_of), contacts == 0, fmt::format("{} contacts", contacts)});
   }
+  if (goal.volume > 0) {
+    const double now =
+        fem::volume_m3(world, state, world.robot) / world.bodies[std::size_t(world.robot)].rest_volume_m3;
+    terms.push_back({fmt::format("blown up to {:g} times its volume", goal.volume), now >= goal.volume,
+                     fmt::format("{:.3f} times", now)});
+  }
   for (const auto& [ring, asked] : goal.through) {
     const int pieces = fem::pieces_through(world, state, ring);
     terms.push_back({fmt::format("{} of the robot's pieces in the hole of {}", asked, name(ring)),

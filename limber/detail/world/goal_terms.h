@@ -15,7 +15,7 @@ namespace limber::detail {
 Vec3 robot_place_m(const scenes::Scene&, const fem::World&, const State&);
 
 // The place of the robot (moved along with goal.moves_with since the start), and then turn, shape,
-// above, below, clear_of and through, as far as the goal asks for them. Speed is not looked at.
+// above, below, clear_of, volume and through, as far as the goal asks for them. Speed is not looked at.
 std::vector<GoalTerm> terms_of(const scenes::Scene&, const scenes::Goal&, const fem::World&, const State&);
 
 // Of the robot: its nodes' mean speed is below planner.settle_speed_m_s.
