@@ -166,6 +166,15 @@ std::optional<Box> start_box(const BodySpec& body) {
   return Box{bounds.lower + shift, bounds.upper + shift};
 }
 
+Box surely_occupied(const BodySpec& body) {
+  if (const std::optional<Box> start = start_box(body)) return *start;
+  const auto* tube = std::get_if<TubeModel>(&body.model);
+  if (!tube || body.pose.anchor != "origin") return {body.pose.position_m, body.pose.position_m};
+  Box path;
+  for (const Vec3& point : tube->path_m) path.include(body.pose.position_m + pose_turn(body.pose) * point);
+  return path;
+}
+
 void transform(const Eigen::Affine3d& map, Points& positions) {
   for (Eigen::Index v = 0; v < positions.rows(); ++v)
     positions.row(v) = (map * Vec3(positions.row(v).transpose())).transpose();

@@ -25,6 +25,8 @@ std::optional<TetMesh> made_cage(const BodySpec&);
 
 // The bounding box at the start, where it follows from the scene alone: boxes, plates, blocks and spheres.
 std::optional<Box> start_box(const BodySpec&);
+// What is in the body's own box at the start, for sure: that box, of a tube its path, else position_m alone.
+Box surely_occupied(const BodySpec&);
 
 // Where a model goes at the start: p_world = world_from_model * p_model. `bounds` is the bounding box of the
 // model as it was made or read from its file. `made` says that it was made (in metres, z up), also as the

@@ -158,10 +158,9 @@ Vec3 read_body_color(const Node& table, Role role) {
   return as_color(text_or(table, "color", usual[int(role)]));
 }
 
-// By its box where the model gives its size (start_box), else by position_m alone.
+// As far as is known without its model's file.
 void check_inside(const BodySpec& body, const Box& bounds, const Node& position, const std::string& what) {
-  const auto start = start_box(body);
-  const Box occupied = start ? *start : Box{body.pose.position_m, body.pose.position_m};
+  const Box occupied = surely_occupied(body);
   const double tolerance_m = 1e-9 * bounds.diagonal();
   for (int i = 0; i < 3; ++i) {
     const bool below = occupied.lower[i] < bounds.lower[i] - tolerance_m;

@@ -102,7 +102,7 @@ TEST_F(NewScene_slow, AFlatRobotsGoalIsOutOfItsReachAtTheStart) {
 
 // Four cameras, names of all but the skin, which is opened; what moves is what the story says.
 TEST_F(NewScene_slow, EachStoryIsAFilmOfFourCameras) {
-  for (const char* story : {"away", "instrument", "aside", "tour"}) {
+  for (const char* story : {"away", "instrument", "endoscope", "balloon", "aside", "tour"}) {
     SCOPED_TRACE(story);
     const Result made = limber_program(words({"--robot", "heart", "--story", story}));
     ASSERT_EQ(made.code, exit_done) << made.err;
@@ -110,7 +110,8 @@ TEST_F(NewScene_slow, EachStoryIsAFilmOfFourCameras) {
     const bool tour = story == std::string("tour"), instrument = story == std::string("instrument");
     EXPECT_EQ(scene.cameras.size(), 4u);
     EXPECT_EQ(scene.film.look, scenes::FilmLook::clinical);
-    EXPECT_EQ(scene.film.labels.size(), instrument ? 4u : 3u);
+    const bool endoscope = story == std::string("endoscope"), balloon = story == std::string("balloon");
+    EXPECT_EQ(scene.film.labels.size(), instrument || endoscope || balloon ? 4u : 3u);
     ASSERT_EQ(scene.film.cuts.size(), 1u);
     EXPECT_EQ(scene.film.cuts[0].bodies, std::vector<int>{int(scene.bodies.size())});  // the skin
     EXPECT_EQ(scene.lacks.empty(), !tour);
@@ -124,6 +125,17 @@ TEST_F(NewScene_slow, EachStoryIsAFilmOfFourCameras) {
       EXPECT_NEAR(left_m, 0.04 + 0.002 + 0.075, 0.02);
       EXPECT_GT((robot.pose.position_m - scene.goal.center_of_mass_m).norm(), 0.07);
     }
+    EXPECT_EQ(scene.planner.lead, endoscope);
+    EXPECT_EQ(scene.planner.max_pressure_pa > 0, balloon);
+    EXPECT_EQ(scene.goal.volume, balloon ? 2 : 0);
+    if (endoscope || balloon) {
+      EXPECT_EQ(robot.name, story);
+      // Of the one the tip is led to 2 mm before the heart, of the other the middle is 38 mm farther out.
+      const double left_m = (scene.goal.center_of_mass_m - Vec3(0, 0, 1)).norm(),
+                   before_m = 0.002 + (balloon ? 0.03 * std::cbrt(2.) : 0);
+      EXPECT_GT(left_m, 0.04 + before_m - 1e-6);
+      EXPECT_LT(left_m, 0.04 * std::sqrt(3.) + before_m + 1e-6);
+    }
     if (story == std::string("aside")) {
       EXPECT_LT((scene.goal.center_of_mass_m - Vec3(0, 0, 1)).norm(), 0.09);
       EXPECT_GT((scene.goal.center_of_mass_m - Vec3(0, 0, 1)).norm(), scene.goal.radius_m + 0.03);
@@ -134,6 +146,21 @@ TEST_F(NewScene_slow, EachStoryIsAFilmOfFourCameras) {
               HasSubstr("does not move"));
   EXPECT_THAT(limber_program(words({"--robot", "spine", "--story", "aside"})).err,
               HasSubstr("there are: heart, lung"));
+}
+
+TEST_F(NewScene_slow, AnEndoscopeAndABalloonGoAsTheyAre) {
+  const std::string file = (folder / "chest.toml").string();
+  for (const char* story : {"endoscope", "balloon"}) {
+    ASSERT_EQ(limber_program(words({"--robot", "heart", "--story", story})).code, exit_done);
+    const Result planned =
+        limber_program({"plan", file, "--data", models().string(), "-o", out(story), "--json"});
+    EXPECT_EQ(planned.code, exit_done) << planned.err;
+    const Result verified = limber_program({"verify", out(story), "--json"});
+    EXPECT_EQ(verified.code, exit_done) << verified.out;
+    EXPECT_EQ(verified.out.find("blown up to 2 times its volume") != std::string::npos,
+              story == std::string("balloon"));
+    fs::remove(file);
+  }
 }
 
 TEST_F(NewScene_slow, AnInstrumentAndATourGoAsTheyAre) {

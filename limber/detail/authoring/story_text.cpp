@@ -139,7 +139,7 @@ std::string free_side(const std::vector<Organ>& organs, const Organ& robot, doub
 // 40 g that is pushed with 2 N goes at 0.3 m/s, and not as fast as it would be thrown.
 constexpr double force_in_fascia_m_s2 = 50, damping_in_fascia_per_s = 150;
 
-// What comes to an organ: a rod with round ends, point first, or a ball.
+// What comes to an organ, point first: a rod with round ends.
 struct ToolKind {
   const char* name;
   const char* how;  // it comes
@@ -148,12 +148,11 @@ struct ToolKind {
 constexpr ToolKind instrument{"instrument", "an instrument comes", 0.15, 0.008,
                               4000};  // steel, mostly hollow
 constexpr ToolKind endoscope{"endoscope", "a soft endoscope comes", 0.2, 0.01, 1000};
-constexpr ToolKind balloon{"balloon", "a balloon is blown up, where it comes", 0.024, 0.024, 1000};
+constexpr ToolKind balloon{"balloon", "a balloon is blown up, where it comes", 0.06, 0.018, 1000};
 constexpr double before_organ_m = 0.002, tissue_beside_m = 0.004;
 // Of rubber so soft that it doubles its volume by half of what may blow it up, and presses with the rest.
 constexpr double balloon_modulus_pa = 6e3, balloon_pressure_pa = 6e3, balloon_volume = 2;
 constexpr double endoscope_modulus_pa = 1e6;
-constexpr int endoscope_cells = 20;
 
 const ToolKind* tool_kind(Story story) {
   return story == Story::instrument  ? &instrument
@@ -168,9 +167,7 @@ struct Tool {
   Vec3 at_start_m, at_goal_m;  // its middle
   double volume_m3() const {
     const double w = kind->width_m;
-    return kind == &instrument  ? kind->length_m * w * w
-           : kind == &endoscope ? EIGEN_PI / 4 * w * w * kind->length_m
-                                : EIGEN_PI / 6 * w * w * w;
+    return (kind == &instrument ? 1 : EIGEN_PI / 4) * kind->length_m * w * w;
   }
   double mass_kg() const { return kind->density_kg_m3 * volume_m3(); }
   Vec3 tip_m(const Vec3& middle) const { return middle - 0.5 * kind->length_m * outward; }
@@ -241,20 +238,20 @@ std::string body_text(const Tool& tool, const NewSceneOptions& options) {
         "pose = {{ position_m = {}, axis = {}, angle_deg = {:.5g} }}\ncage = {{ tets = 60 }}\n",
         kind.length_m, kind.width_m, kind.width_m, 0.49 * kind.width_m, vector_text(tool.at_start_m),
         axis.norm() > 1e-9 ? vector_text(axis.normalized()) : "[0, 0, 1]", angle_deg);
-  } else if (&kind == &endoscope) {
-    const Vec3 half = 0.5 * kind.length_m * tool.outward;
-    text += fmt::format(
-        "self_contact = false   # as it bends it cannot reach itself\n"
-        "model = {{ tube = {{ path_m = [{}, {}], diameter_m = {:g} }} }}\ncage = {{ cells = [1, 1, {}] }}\n",
-        vector_text(tool.at_start_m + half), vector_text(tool.at_start_m - half), kind.width_m,
-        endoscope_cells);
-    material = fmt::format("youngs_modulus_pa = {:g}, poisson_ratio = 0.4, ", endoscope_modulus_pa);
   } else {
+    // A tube's round ends reach beyond its path.
+    const Vec3 half = 0.5 * (kind.length_m - kind.width_m) * tool.outward;
+    const int across = &kind == &balloon ? 2 : 1;
     text += fmt::format(
-        "max_volume_change = 4\nmodel = {{ sphere = {{ diameter_m = {:g}, triangle_m = {:g} }} }}\n"
-        "pose = {{ position_m = {} }}\ncage = {{ tets = 200 }}\n",
-        kind.length_m, kind.length_m / 16, vector_text(tool.at_start_m));
-    material = fmt::format("youngs_modulus_pa = {:g}, poisson_ratio = 0.3, ", balloon_modulus_pa);
+        "self_contact = false   # it cannot reach itself\n"
+        "model = {{ tube = {{ path_m = [{}, {}], diameter_m = {:g} }} }}\ncage = {{ cells = [{}, {}, {}] "
+        "}}\n",
+        vector_text(tool.at_start_m + half), vector_text(tool.at_start_m - half), kind.width_m, across,
+        across, int(std::round(across * kind.length_m / kind.width_m)));
+    material = &kind == &balloon
+                   ? fmt::format("youngs_modulus_pa = {:g}, poisson_ratio = 0.3, ", balloon_modulus_pa)
+                   : fmt::format("youngs_modulus_pa = {:g}, poisson_ratio = 0.4, ", endoscope_modulus_pa);
+    if (&kind == &balloon) text += "max_volume_change = 4\n";
   }
   text += fmt::format("material = {{ {}density_kg_m3 = {:g}, friction = 0.05{} }}\n{}", material,
                       kind.density_kg_m3,
