@@ -148,7 +148,7 @@ struct ToolKind {
 constexpr ToolKind instrument{"instrument", "an instrument comes", 0.15, 0.008,
                               4000};  // steel, mostly hollow
 constexpr ToolKind endoscope{"endoscope", "a soft endoscope comes", 0.2, 0.01, 1000};
-constexpr ToolKind balloon{"balloon", "a balloon is blown up, where it comes", 0.06, 0.018, 1000};
+constexpr ToolKind balloon{"balloon", "a balloon is blown up, where it comes", 0.1, 0.018, 1000};
 constexpr double before_organ_m = 0.002, tissue_beside_m = 0.004;
 // Of rubber so soft that it doubles its volume by half of what may blow it up, and presses with the rest.
 constexpr double balloon_modulus_pa = 6e3, balloon_pressure_pa = 6e3, balloon_volume = 2;
@@ -453,7 +453,7 @@ std::string scene_text(const std::vector<Organ>& organs, const NewSceneOptions& 
   if (options.story == Story::tour)
     return text + tour_text(organs, robot, scale) + film_text(organs, options, scale, description, 0.1);
 
-  const double radius = tool ? 0.006 : options.story == Story::aside ? 0.2 * length : 0.4 * length;
+  const double radius = kind == &balloon ? 0.012 : tool ? 0.006 : options.story == Story::aside ? 0.2 * length : 0.4 * length;
   text += fmt::format("\n[goal]\ncenter_of_mass_m = {}\nradius_m = {:.3g}\n",
                       vector_text(tool ? tool->goal_m() : goal), radius);
   if (kind == &balloon)
