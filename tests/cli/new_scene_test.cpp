@@ -7,6 +7,7 @@
 #include <sstream>
 
 #include "core/mesh_files.h"
+#include "meshing/import.h"
 #include "render/image_file.h"
 #include "render/png_file.h"
 #include "scenes/scene.h"
@@ -18,6 +19,7 @@ namespace limber::detail {
 namespace {
 
 using testing::HasSubstr;
+using testing::Not;
 
 // Cubes in millimetres, y to the back: the heart stands 100 behind the lung.
 class NewScene : public Program {
@@ -482,7 +484,7 @@ class SceneOfAnAtlas : public NewScene {
 TEST_F(SceneOfAnAtlas, PartsAreFoundByNameAndId) {
   const Result result = made({"--robot", "heart", "--only", "Heart,left_kidney,fma13322"});
   ASSERT_EQ(result.code, exit_done) << result.err;
-  EXPECT_THAT(result.out, HasSubstr("heart is 2 elements in one"));
+  EXPECT_THAT(result.out, HasSubstr("heart is 2 elements in one; FJ1, FJ2 meet and are united"));
   const scenes::Scene scene = scenes::read_scene_file(folder / "chest.toml");
   std::map<std::string, Vec3> at;
   for (const scenes::BodySpec& body : scene.bodies) at[body.name] = body.pose.position_m;
@@ -491,6 +493,36 @@ TEST_F(SceneOfAnAtlas, PartsAreFoundByNameAndId) {
   EXPECT_LT((at.at("left_kidney") - Vec3(0.1, 0.15, 1)).norm(), 1e-9);
   EXPECT_LT((at.at("lumbar_vertebra") - Vec3(-0.2, 0, 1)).norm(), 1e-9);
   EXPECT_EQ(scene.bodies[2].kind, scenes::Kind::rigid);
+}
+
+// Cubes of 40 mm, 30 above one another: by inclusion and exclusion. FJ7 is off, FJ8 open and in the way.
+TEST_F(SceneOfAnAtlas, ElementsOfAPartAreUnited) {
+  cube("FJ5", {0, 0, 985}, 40), cube("FJ6", {3, 5, 1015}, 40), cube("FJ7", {0, 0, 1100}, 40);
+  cube("FJ8", {0, 0, 1005}, 10);
+  SurfaceMesh open = meshing::import_model(models() / "FJ8.obj").surface;
+  open.triangles.conservativeResize(11, 3);
+  write_obj(models() / "FJ8.obj", open);
+  for (const char* element : {"FJ5", "FJ6", "FJ7", "FJ8"})
+    fs::rename(models() / (std::string(element) + ".obj"), atlas() / (std::string(element) + ".obj"));
+  table("partof_element_parts.txt",
+        "FMA3\tstomach\tFJ5\nFMA3\tstomach\tFJ6\nFMA3\tstomach\tFJ7\n"
+        "FMA4\tspleen\tFJ8\nFMA4\tspleen\tFJ1\n");
+  const Result result = made({"--robot", "stomach", "--only", "stomach,left_kidney"});
+  ASSERT_EQ(result.code, exit_done) << result.err;
+  EXPECT_THAT(result.out, HasSubstr("stomach is 3 elements in one; FJ5, FJ6 meet and are united"));
+  EXPECT_THAT(result.out, Not(HasSubstr("not united")));
+  const meshing::ImportedModel model = meshing::import_model(folder / "chest_models" / "stomach.ply");
+  EXPECT_NEAR(volume(model.surface), 3 * 40 * 40 * 40 - 37 * 35 * 10, 1e-6);
+  EXPECT_TRUE(model.left.closed());
+  EXPECT_EQ(model.left.self_intersecting_pairs.count, 0);
+  EXPECT_TRUE(model.left.all_self_intersections_counted);
+
+  fs::remove(folder / "chest.toml"), fs::remove_all(folder / "chest_models");
+  const Result beside = made({"--robot", "spleen", "--only", "spleen,left_kidney"});
+  ASSERT_EQ(beside.code, exit_done) << beside.err;
+  EXPECT_THAT(beside.out,
+              HasSubstr("spleen: FJ8 is not united with what it meets, and walls may be left within: "
+                        "it is open"));
 }
 
 TEST_F(SceneOfAnAtlas, BonesAreOneBody) {

@@ -15,6 +15,7 @@
 #include "core/progress.h"
 #include "imaging/surface_nets.h"
 #include "meshing/import.h"
+#include "meshing/unite.h"
 #include "scenes/anatomy.h"
 
 namespace limber::detail {
@@ -41,16 +42,8 @@ std::string lower(std::string text) {
 
 struct Part {
   std::string name;
-  SurfaceMesh surface;  // metres, our frame of models: x to the left, y to the back
+  SurfaceMesh surface;  // millimetres, our frame of models: x to the left, y to the back
 };
-
-void append(SurfaceMesh& mesh, const SurfaceMesh& more) {
-  const Eigen::Index points = mesh.positions.rows(), triangles = mesh.triangles.rows();
-  mesh.positions.conservativeResize(points + more.positions.rows(), 3);
-  mesh.positions.bottomRows(more.positions.rows()) = more.positions;
-  mesh.triangles.conservativeResize(triangles + more.triangles.rows(), 3);
-  mesh.triangles.bottomRows(more.triangles.rows()) = more.triangles.array() + int(points);
-}
 
 // Bones that stand at their places are one body.
 void join(std::vector<Part>& parts, const char* name, const std::function<bool(const std::string&)>& is_one,
@@ -61,7 +54,7 @@ void join(std::vector<Part>& parts, const char* name, const std::function<bool(c
   Part joined{name, {Points(0, 3), Triangles(0, 3)}};
   std::vector<std::string> names;
   for (auto part = first; part != parts.end(); ++part)
-    append(joined.surface, part->surface), names.push_back(part->name);
+    meshing::append(joined.surface, part->surface), names.push_back(part->name);
   parts.erase(first, parts.end());
   parts.push_back(std::move(joined));
   notes.push_back(fmt::format("{} is {} {} in one: {}", name, names.size(), what, fmt::join(names, ", ")));
@@ -147,6 +140,7 @@ std::vector<Part> parts_of_scan(const PartSource& source, std::vector<std::strin
     if (labels[i].islands_dropped > 0)
       notes.push_back(fmt::format("{}: left out {} small pieces, {} voxels in all", name,
                                   labels[i].islands_dropped, labels[i].voxels_dropped));
+    labels[i].surface.positions *= units_a_metre;
     if (labels[i].voxels > 0) parts.push_back({name, std::move(labels[i].surface)});
   }
   if (parts.empty()) throw InputError(fmt::format("{}: no label is more than crumbs", source.from.string()));
@@ -230,6 +224,34 @@ const Concept& concept_of(const std::map<std::string, Concept>& concepts, const 
                                near.empty() ? "" : fmt::format("; did you mean {}?", fmt::join(near, ", "))));
 }
 
+std::string listed(const std::vector<std::string>& names) {
+  constexpr std::size_t most = 12;
+  if (names.size() <= most) return fmt::format("{}", fmt::join(names, ", "));
+  return fmt::format("{} and {} more", fmt::join(names.begin(), names.begin() + most, ", "),
+                     names.size() - most);
+}
+
+SurfaceMesh united(const std::string& part, const std::vector<std::string>& names,
+                   const std::vector<SurfaceMesh>& elements, std::vector<std::string>& notes) {
+  if (elements.size() == 1) return elements[0];
+  log::info("{}: uniting {} elements where they meet", part, elements.size());
+  meshing::United united = meshing::unite(elements);
+  const auto named = [&](const std::vector<int>& rows) {
+    std::vector<std::string> of_rows;
+    for (const int row : rows) of_rows.push_back(names[std::size_t(row)]);
+    return listed(of_rows);
+  };
+  std::string note = fmt::format("{} is {} elements in one", part, elements.size());
+  for (const std::vector<int>& together : united.together)
+    note += fmt::format("; {} meet and are united", named(together));
+  notes.push_back(note);
+  for (const meshing::United::Beside& beside : united.beside)
+    notes.push_back(fmt::format("{}: {} {} not united with what {}, and walls may be left within: {}", part,
+                                named(beside.elements), beside.elements.size() == 1 ? "is" : "are",
+                                beside.elements.size() == 1 ? "it meets" : "they meet", beside.why));
+  return std::move(united.surface);
+}
+
 std::vector<Part> parts_of_atlas(const PartSource& source, std::vector<std::string>& notes) {
   std::map<std::string, Concept> concepts;
   for (const char* table : table_names) read_elements(source.from / table, concepts);
@@ -243,8 +265,8 @@ std::vector<Part> parts_of_atlas(const PartSource& source, std::vector<std::stri
   std::map<std::string, std::string> whose;
   for (const std::string& word : source.only) {
     const Concept& one = concept_of(concepts, word, source.from);
-    Part part{one.name, {Points(0, 3), Triangles(0, 3)}};
-    std::vector<std::string> missing;
+    std::vector<std::string> names, missing;
+    std::vector<SurfaceMesh> elements;
     for (const std::string& element : one.elements) {
       throw_if_stopped();
       const auto file = files.find(element);
@@ -256,16 +278,14 @@ std::vector<Part> parts_of_atlas(const PartSource& source, std::vector<std::stri
         throw InputError(fmt::format("{}: {} is a part of {} and of {}; leave one out of --only",
                                      source.from.string(), element, other->second, one.name));
       log::info("reading {}", file->second.string());
-      append(part.surface, meshing::import_model(file->second, {.count_self_intersections = false}).surface);
+      names.push_back(element);
+      elements.push_back(meshing::import_model(file->second, {.count_self_intersections = false}).surface);
     }
     if (!missing.empty())
       throw InputError(fmt::format("{}: {} ({}) is made of {} elements, and {} of them are not here: {}",
                                    source.from.string(), one.name, one.id, one.elements.size(),
                                    missing.size(), fmt::join(missing, ", ")));
-    if (one.elements.size() > 1)
-      notes.push_back(fmt::format("{} is {} elements in one", one.name, one.elements.size()));
-    part.surface.positions /= units_a_metre;  // the atlas' are millimetres
-    parts.push_back(std::move(part));
+    parts.push_back({one.name, united(one.name, names, elements, notes)});
   }
   join_bones(parts, "parts", notes);
   return parts;
@@ -301,7 +321,6 @@ PartModels make_part_models(const PartSource& source, const fs::path& folder) {
     make_folder(folder);
     for (std::size_t i = 0; i < parts.size(); ++i) {
       throw_if_stopped();
-      parts[i].surface.positions *= units_a_metre;
       write_ply(folder / (made.names[i] + ".ply"), parts[i].surface);
     }
   } catch (...) {

@@ -20,7 +20,7 @@ struct PartSource {
 
 struct PartModels {
   std::vector<std::string> names;  // NAME.ply each; millimetres, x to the left, y to the back, z up
-  std::vector<std::string> notes;  // what was joined, left out, renamed
+  std::vector<std::string> notes;  // what was joined, united or not, left out, renamed
 };
 
 // A folder with BodyParts3D's tables of elements (isa_element_parts.txt, partof_element_parts.txt).
