@@ -249,7 +249,8 @@ std::string body_text(const Tool& tool, const NewSceneOptions& options) {
         vector_text(tool.at_start_m + half), vector_text(tool.at_start_m - half), kind.width_m, across,
         across, int(std::round(across * kind.length_m / kind.width_m)));
     material = &kind == &balloon
-                   ? fmt::format("youngs_modulus_pa = {:g}, poisson_ratio = 0.3, ", balloon_modulus_pa)
+                   ? fmt::format("model = \"neo_hookean\", youngs_modulus_pa = {:g}, poisson_ratio = 0.3, ",
+                                 balloon_modulus_pa)
                    : fmt::format("youngs_modulus_pa = {:g}, poisson_ratio = 0.4, ", endoscope_modulus_pa);
     if (&kind == &balloon) text += "max_volume_change = 4\n";
   }
@@ -453,7 +454,10 @@ std::string scene_text(const std::vector<Organ>& organs, const NewSceneOptions& 
   if (options.story == Story::tour)
     return text + tour_text(organs, robot, scale) + film_text(organs, options, scale, description, 0.1);
 
-  const double radius = kind == &balloon ? 0.012 : tool ? 0.006 : options.story == Story::aside ? 0.2 * length : 0.4 * length;
+  const double radius = kind == &balloon                ? 0.012
+                        : tool                          ? 0.006
+                        : options.story == Story::aside ? 0.2 * length
+                                                        : 0.4 * length;
   text += fmt::format("\n[goal]\ncenter_of_mass_m = {}\nradius_m = {:.3g}\n",
                       vector_text(tool ? tool->goal_m() : goal), radius);
   if (kind == &balloon)
