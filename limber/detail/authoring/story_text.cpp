@@ -212,7 +212,7 @@ Tool tool_to(const ToolKind& kind, const NewSceneOptions& options, const std::ve
       if (worth <= most) continue;
       most = worth;
       const double way_m = std::max(0.08, 0.6 * scale * target.box.size().maxCoeff());
-      const double half_m = 0.5 * kind.length_m * (&kind == &balloon ? std::cbrt(balloon_volume) : 1);
+      const double half_m = 0.5 * kind.length_m;
       best = {.kind = &kind,
               .outward = outward,
               .at_start_m = aim + (before_organ_m + way_m + half_m) * outward,
@@ -482,9 +482,12 @@ std::string scene_text(const std::vector<Organ>& organs, const NewSceneOptions& 
                       tool ? subject_text(robot.name, 0.4) : subject_text(robot.name, 0.45));
   text += camera_text("[[cameras]]\nname = \"side\"", views.side,
                       tool ? subject_text(robot.name, 0.35) : subject_text(robot.name, 0.45));
-  text += tool ? camera_text("[[cameras]]\nname = \"near\"", views.best, subject_text(robot.name, 0.65))
-               : camera_text("[[cameras]]\nname = \"follow\"", views.best,
-                             fmt::format("follow = \"{}\"\n", robot.name));
+  // A balloon is seen from beside.
+  text += kind == &balloon
+              ? camera_text("[[cameras]]\nname = \"near\"", views.side, subject_text(kind->name, 0.7))
+          : tool ? camera_text("[[cameras]]\nname = \"near\"", views.best, subject_text(robot.name, 0.65))
+                 : camera_text("[[cameras]]\nname = \"follow\"", views.best,
+                               fmt::format("follow = \"{}\"\n", robot.name));
   text += camera_text("[[cameras]]\nname = \"whole\"", {1, -0.5, 0.3}, "");
   return text + film_text(organs, options, scale, description, std::clamp(time, 0.05, 1.0));
 }
