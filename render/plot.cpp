@@ -123,11 +123,36 @@ void draw_line(Image8& image, double x1, double y1, double x2, double y2, double
     }
 }
 
+// Names below the plot, one after the other; where a row is full the next begins. The picture has room for
+// two rows, and grows by those that are more.
+constexpr double legend_row_px = 18;
+struct LegendPlace {
+  double x, y;
+};
+std::vector<LegendPlace> legend_places(const std::vector<double>& widths, const Layout& at,
+                                       const PlotLook& look) {
+  std::vector<LegendPlace> places;
+  double x = at.left, y = look.height_px - 28.0;
+  for (const double width : widths) {
+    if (x + width > at.right && x > at.left) x = at.left, y += legend_row_px;
+    places.push_back({x, y});
+    x += width;
+  }
+  return places;
+}
+int height_with(const std::vector<LegendPlace>& legend, const PlotLook& look) {
+  const double second_row = look.height_px - 28.0 + legend_row_px;
+  return look.height_px + (legend.empty() ? 0 : int(std::max(0.0, legend.back().y - second_row)));
+}
+
 }  // namespace
 
 std::string plot_svg(const std::vector<Curve>& curves, const PlotLook& look) {
   const Layout at = layout_of(curves, look);
   const double left = at.left, right = at.right, top = at.top, bottom = at.bottom;
+  std::vector<double> widths;  // of letters they are estimated
+  for (const Curve& curve : curves) widths.push_back(44 + 7.5 * double(curve.name.size()));
+  const std::vector<LegendPlace> legend = legend_places(widths, at, look);
 
   std::string svg = fmt::format(
       "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n"
@@ -135,7 +160,7 @@ std::string plot_svg(const std::vector<Curve>& curves, const PlotLook& look) {
       "data-left=\"{2}\" data-right=\"{3}\" data-low=\"{4}\" data-high=\"{5}\" font-family=\"sans-serif\" "
       "font-size=\"13\" fill=\"#333\">\n"
       "<rect width=\"{0}\" height=\"{1}\" fill=\"#fff\"/>\n",
-      look.width_px, look.height_px, left, right, at.x_ticks.front(), at.x_ticks.back());
+      look.width_px, height_with(legend, look), left, right, at.x_ticks.front(), at.x_ticks.back());
   const auto text = [&](double at_x, double at_y, const char* anchor, const std::string& more,
                         const std::string& words) {
     svg += fmt::format("<text x=\"{:.1f}\" y=\"{:.1f}\" text-anchor=\"{}\"{}>{}</text>\n", at_x, at_y, anchor,
@@ -179,15 +204,11 @@ std::string plot_svg(const std::vector<Curve>& curves, const PlotLook& look) {
           hex_color(curve.color_srgb));
   }
 
-  // The legend, below, breaks into a second row where the first is full. Widths of letters are estimated.
-  double at_x = left, at_y = look.height_px - 28.0;
-  for (const Curve& curve : curves) {
-    const double width = 44 + 7.5 * double(curve.name.size());
-    if (at_x + width > right && at_x > left) at_x = left, at_y += 18;
-    svg += fmt::format("<rect x=\"{:.1f}\" y=\"{:.1f}\" width=\"20\" height=\"4\" fill=\"{}\"/>\n", at_x,
-                       at_y - 6.5, hex_color(curve.color_srgb));
-    text(at_x + 27, at_y, "start", "", curve.name);
-    at_x += width;
+  for (std::size_t c = 0; c < curves.size(); ++c) {
+    const auto [x, y] = legend[c];
+    svg += fmt::format("<rect x=\"{:.1f}\" y=\"{:.1f}\" width=\"20\" height=\"4\" fill=\"{}\"/>\n", x,
+                       y - 6.5, hex_color(curves[c].color_srgb));
+    text(x + 27, y, "start", "", curves[c].name);
   }
   return svg + "</svg>\n";
 }
@@ -197,7 +218,10 @@ Image8 plot_image(const std::vector<Curve>& curves, const PlotLook& look) {
   const Vec3 ink = Vec3::Constant(0.2), axis = Vec3::Constant(0.6), grid = Vec3::Constant(0.9),
              red(0.7, 0.33, 0.33);
   constexpr double letter = 8;  // height of a capital
-  Image8 image = filled(look.width_px, look.height_px, Vec3::Ones());
+  std::vector<double> widths;
+  for (const Curve& curve : curves) widths.push_back(44 + detail::text_width(curve.name, letter));
+  const std::vector<LegendPlace> legend = legend_places(widths, at, look);
+  Image8 image = filled(look.width_px, height_with(legend, look), Vec3::Ones());
   const auto text = [&](double x, double y, double share_left, const std::string& words, double size) {
     detail::draw_text(image, words, x - share_left * detail::text_width(words, size), y,
                       {.height_px = size, .color_srgb = ink});
@@ -218,18 +242,16 @@ Image8 plot_image(const std::vector<Curve>& curves, const PlotLook& look) {
   for (const double limit : look.limits)
     for (double x = at.left; at.shows(limit) && x < at.right; x += 11)
       draw_line(image, x, at.py(limit), std::min(x + 6, at.right), at.py(limit), 1, red);
-  double at_x = at.left, at_y = look.height_px - 28.0;
-  for (const Curve& curve : curves) {
+  for (std::size_t c = 0; c < curves.size(); ++c) {
+    const Curve& curve = curves[c];
     for (std::size_t i = 1; i < curve.x.size(); ++i) {
       const double y1 = curve.y[i - 1], y2 = curve.y[i];
       if (std::isfinite(y1) && std::isfinite(y2))
         draw_line(image, at.px(curve.x[i - 1]), at.py(y1), at.px(curve.x[i]), at.py(y2), 2, curve.color_srgb);
     }
-    const double width = 44 + detail::text_width(curve.name, letter);
-    if (at_x + width > at.right && at_x > at.left) at_x = at.left, at_y += 18;
-    draw_line(image, at_x, at_y - 4, at_x + 20, at_y - 4, 4, curve.color_srgb);
-    text(at_x + 27, at_y, 0, curve.name, letter);
-    at_x += width;
+    const auto [x, y] = legend[c];
+    draw_line(image, x, y - 4, x + 20, y - 4, 4, curve.color_srgb);
+    text(x + 27, y, 0, curve.name, letter);
   }
   return image;
 }

@@ -102,6 +102,31 @@ TEST(Plot, NamesAreEscapedAndTagsAreBalanced) {
             2);  // the gap
 }
 
+// As of thirty organs: all names are in the picture, which else keeps its size.
+TEST(Plot, ALegendOfManyNamesHasRoom) {
+  const PlotLook look{"title", "time (s)", "strain", 900, 480, {}};
+  std::vector<Curve> curves;
+  for (int i = 0; i < 31; ++i) curves.push_back({"lung_lower_lobe_left", {1, 0, 0}, {0, 1}, {0, double(i)}});
+  const std::string svg = plot_svg(curves, look);
+  const std::regex height("<svg [^>]*height=\"([0-9]+)\""), rect("<rect x=\"[0-9.]+\" y=\"([0-9.]+)\"");
+  std::smatch all;
+  ASSERT_TRUE(std::regex_search(svg, all, height));
+  int names = 0;
+  for (std::sregex_iterator m(svg.begin(), svg.end(), rect), end; m != end; ++m, ++names)
+    EXPECT_LT(std::stod((*m)[1]) + 10, std::stod(all[1]));
+  EXPECT_EQ(names, 31);
+  const Image8 image = plot_image(curves, look);
+  EXPECT_GT(image.height, 480 + 18);
+  bool red = false;  // in the last row
+  for (int x = 0; x < 900; ++x) {
+    const std::uint8_t* p = &image.rgb[3 * (std::size_t(image.height - 14) * 900 + std::size_t(x))];
+    red = red || (p[0] > 250 && p[1] < 10 && p[2] < 10);
+  }
+  EXPECT_TRUE(red);
+  curves.resize(1);
+  EXPECT_EQ(plot_image(curves, look).height, 480);
+}
+
 TEST(Plot, NothingToShowIsStillAPlot) {
   EXPECT_NE(plot_svg({}, {}).find("</svg>"), std::string::npos);
   EXPECT_NE(plot_svg({{"flat", {0, 0, 0}, {0, 1}, {0, 0}}}, {}).find("<path"), std::string::npos);
