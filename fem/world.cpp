@@ -144,7 +144,9 @@ Pressure make_pressure(const PressureSpec& spec, const World& world) {
     refuse(fmt::format("a pressure is in body {}, and there are {}", spec.body, world.bodies.size()));
   const Body& body = world.bodies[std::size_t(spec.body)];
   if (!body.pushed() || body.kind != BodyKind::deformable)
-    refuse(fmt::format("body {}: a pressure is in it, and it is not soft", body.name));
+    refuse(fmt::format(
+        "body {}: a pressure is in it, and nothing of it can be blown up: it is rigid, or all of it is held",
+        body.name));
   if (!(spec.from_s >= 0 && spec.to_s > spec.from_s && spec.to_s / world.dt_s < 1e15))
     refuse(fmt::format("body {}: a pressure is in it from {} to {} s, which is no time", body.name,
                        spec.from_s, spec.to_s));

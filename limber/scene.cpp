@@ -104,7 +104,8 @@ void require_states(const States& states, int nodes) {
       if (!std::isfinite(x)) throw InputError("states: a position or a velocity is not finite");
 }
 
-Control control_of(const Push& push, int row, int robot_nodes) {
+Control control_of(const Push& push, int row, const fem::Body& robot) {
+  const int robot_nodes = robot.node_count();
   const auto require = [&](bool holds, const std::string& what) {
     if (!holds) throw InputError(fmt::format("push {}: {}", row, what));
   };
@@ -117,6 +118,8 @@ Control control_of(const Push& push, int row, int robot_nodes) {
     require(std::isfinite(x), "a number of it is not finite");
   require(push.max_force_n >= 0 && push.radius_m >= 0, "max_force_n and radius_m must not be negative");
   require(push.pressure_pa >= 0, "pressure_pa must not be negative");
+  require(push.pressure_pa == 0 || robot.kind == fem::BodyKind::deformable,
+          "pressure_pa blows up soft robots alone, and this one is rigid; leave it 0");
   if (push.kind == Push::Kind::control_point)
     require(push.node >= 0 && push.node < robot_nodes,
             fmt::format("node is {}; the robot has the nodes 0 … {}", push.node, robot_nodes - 1));
@@ -244,12 +247,13 @@ States Problem::rollout(const States& states, const std::vector<Push>& pushes, c
   if (int(pushes.size()) != states.count)
     throw InputError(
         fmt::format("{} pushes for {} states; there must be one a state", pushes.size(), states.count));
-  const int robot_nodes = impl_->system.robot_nodes();
+  const fem::World& world = impl_->world;
+  const fem::Body& robot = world.bodies[std::size_t(world.robot)];
   std::vector<State> from;
   std::vector<plan::Rollout> rollouts(pushes.size());
   for (int i = 0; i < states.count; ++i) from.push_back(state_of(states, i));
   for (std::size_t i = 0; i < rollouts.size(); ++i)
-    rollouts[i].from = &from[i], rollouts[i].control = control_of(pushes[i], int(i), robot_nodes);
+    rollouts[i].from = &from[i], rollouts[i].control = control_of(pushes[i], int(i), robot);
 
   return working_for(context, [&] {
     const int lanes = std::max(1, impl_->system.lanes());

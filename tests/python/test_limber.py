@@ -278,6 +278,20 @@ class Scenes(unittest.TestCase):
         if ends.steps[-1] == state.steps[0]:
             np.testing.assert_array_equal(ends.positions[-1], state.positions[0])
 
+    def test_a_pressure_blows_a_soft_robot_up_and_moves_it_nowhere(self):
+        world = world_of("barriers1")
+        robot = world.nodes_of("robot")
+        ends = world.rollout(world.start(2), limber.pushes(2, "none", pressure_pa=[0, 2000], steps=400))
+        places = ends.positions.reshape(2, -1, 3)[:, robot]
+        sizes = np.ptp(places, axis=1)
+        self.assertTrue((sizes[1] > 1.02 * sizes[0]).all())
+        np.testing.assert_allclose(places[1].mean(axis=0), places[0].mean(axis=0), atol=1e-3)
+        with self.assertRaisesRegex(limber.InputError, "pressure_pa must not be negative"):
+            world.rollout(world.start(), limber.pushes(1, "none", pressure_pa=-1, steps=1))
+        with self.assertRaisesRegex(limber.InputError, "blows up soft robots alone"):
+            rigid = world_of("barriers1", set={"bodies": {"robot": {"kind": "rigid"}}})
+            rigid.rollout(rigid.start(), limber.pushes(1, "none", pressure_pa=1, steps=1))
+
     def test_rollouts_in_a_batch_are_those_alone(self):
         world = world_of("barriers1")
         robot = world.nodes_of("robot")

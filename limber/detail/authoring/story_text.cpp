@@ -150,7 +150,7 @@ constexpr ToolKind instrument{"instrument", "an instrument comes", 0.15, 0.008,
 constexpr ToolKind endoscope{"endoscope", "a soft endoscope comes", 0.2, 0.01, 1000};
 constexpr ToolKind balloon{"balloon", "a balloon is blown up, where it comes", 0.1, 0.018, 1000};
 constexpr double before_organ_m = 0.002, tissue_beside_m = 0.004;
-// Of rubber so soft that it doubles its volume by half of what may blow it up, and presses with the rest.
+// So soft that three fifths of what may blow it up double its volume; it presses with the rest.
 constexpr double balloon_modulus_pa = 6e3, balloon_pressure_pa = 6e3, balloon_volume = 2;
 constexpr double endoscope_modulus_pa = 1e6;
 
