@@ -41,6 +41,7 @@ namespace {
 double seconds_since(Clock::time_point t) { return std::chrono::duration<double>(Clock::now() - t).count(); }
 
 constexpr int steps_between_looks = 64;  // where no law looks; only so that an end is soon noticed
+constexpr double seconds_untold = 0.5;   // at most, of what goes on
 constexpr double leads_away = 3;         // robot radii of free way that a guided rollout may lose
 
 // What became of a rollout. Of a state that may be a node: the robot's centre of mass, and how far the goal
@@ -175,9 +176,10 @@ class Search {
       search_.give_back(static_cast<Expansion&>(rollout), std::move(outcome));
     }
     bool wanted() override {
-      if (stop_signal() != 0) {
+      if (stop_signal() != 0 || search_.is_long_untold()) {
         const std::lock_guard lock(search_.mutex_);
         search_.look_at_limits();
+        search_.tell_progress();
       }
       return !search_.ended_;
     }
@@ -357,11 +359,24 @@ class Search {
       }
       if (search_options_.lag == 0) aim_overtaken(node);
     }
-    progress_.update(statistics.iterations, fmt::format("{} nodes, {:.3g} m from the goal, {:.0f} a second",
-                                                        plan_.tree.size(), plan_.best_distance_m,
-                                                        double(statistics.iterations - iterations_before_) /
-                                                            seconds_since(leg_started_)));
+    tell_progress();
     if (on_progress_) on_progress_({statistics_now(), plan_.leg(), plan_.tree.size(), plan_.best_distance_m});
+  }
+
+  // Rollouts among thirty organs take minutes, and the first are done all at once: until then the line says
+  // that they are on their way. Asked without the mutex.
+  bool is_long_untold() const { return seconds_since(started_) - told_at_s_ > seconds_untold; }
+  void tell_progress() {
+    told_at_s_ = seconds_since(started_);
+    const std::int64_t done = plan_.statistics.iterations - iterations_before_;
+    const double seconds = seconds_since(leg_started_), a_second = double(done) / seconds;
+    const auto running = std::count_if(queue_.begin(), queue_.end(),
+                                       [](const Expansion& e) { return e.status == Expansion::running; });
+    progress_.update(
+        plan_.statistics.iterations,
+        fmt::format("{} nodes, {:.3g} m from the goal, {}", plan_.tree.size(), plan_.best_distance_m,
+                    a_second >= 1 ? fmt::format("{:.0f} a second", a_second)
+                                  : fmt::format("{} on their way, {:.0f} s", running, seconds)));
   }
 
   Statistics statistics_now() const {
@@ -510,6 +525,7 @@ class Search {
   const std::optional<Guidance> guidance_;  // as the search begins; prices are learnt in the selector's copy
 
   std::atomic<bool> ended_ = false;
+  std::atomic<double> told_at_s_ = 0;  // since started_
   std::mutex mutex_;  // guards all below, and plan_ (states already in the tree are read without it)
   std::condition_variable changed_;
   NodeSelector selector_;

@@ -21,7 +21,7 @@ const std::map<std::string, int> tets_of_scene{
     {"barriers1", 675}, {"barriers2", 2335},      {"bunny_gate", 620},   {"squeeze", 957},
     {"windows", 1710},  {"falling_objects", 503}, {"body_parts", 557},   {"there_and_back", 435},
     {"torso", 1411},    {"heart_and_lung", 500},  {"moving_door", 1790}, {"colon", 1760},
-    {"crowd", 2550},    {"mattress", 2820},       {"knot", 1220}};
+    {"crowd", 2550},    {"mattress", 2820},       {"knot", 1220},        {"dilation", 1600}};
 
 TEST(SceneWorld, EveryScenePreparesBuildsAndSteps) {
   TemporaryFolder folder;

@@ -224,7 +224,7 @@ TEST(Library, UnknownSceneNamesTheNearest) {
     FAIL();
   } catch (const InputError& error) {
     EXPECT_THAT(error.what(), HasSubstr("did you mean \"barriers1\"? known scenes: barriers1, barriers2, "
-                                        "body_parts, bunny_gate, colon, crowd, falling_objects, "
+                                        "body_parts, bunny_gate, colon, crowd, dilation, falling_objects, "
                                         "heart_and_lung, knot, mattress, moving_door, "
                                         "squeeze, there_and_back, torso, windows"));
   }
