@@ -9,6 +9,7 @@
 #include <chrono>
 #include <cmath>
 #include <csignal>
+#include <utility>
 
 #include "core/error.h"
 #include "core/events.h"
@@ -31,6 +32,23 @@ double seconds_now() {
   return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
 }
 
+thread_local std::string name_of_work;  // ProgressOf
+
+// Which thread's the line on the terminal is; 0: nobody's.
+std::atomic<int> line_of{0};
+thread_local int bars = 0;
+
+int this_thread() {
+  static std::atomic<int> threads{0};
+  thread_local const int number = ++threads;
+  return number;
+}
+
+bool has_line() {
+  int nobody = 0;
+  return line_of.compare_exchange_strong(nobody, this_thread()) || nobody == this_thread();
+}
+
 bool on_terminal() { return enabled && ::isatty(STDERR_FILENO) == 1; }
 
 void on_signal(int number) {
@@ -45,13 +63,18 @@ std::string duration_text(double seconds) {
 }  // namespace
 
 Progress::Progress(std::string label, std::int64_t total)
-    : label_(std::move(label)), total_(total), started_(seconds_now()) {
+    : label_(name_of_work.empty() ? std::move(label) : name_of_work + ": " + label),
+      total_(total),
+      started_(seconds_now()) {
+  ++bars;
   events::tell({{"event", "stage"}, {"stage", label_}, {"total", total_}});
 }
 
 Progress::~Progress() {
+  const bool is_its_line = line_of == this_thread();
+  if (is_its_line && drawn_at_ >= 0 && on_terminal()) fmt::print(stderr, "\r\x1b[K");
+  if (--bars == 0 && is_its_line) line_of = 0;
   if (current_job()) return;
-  if (drawn_at_ >= 0 && on_terminal()) fmt::print(stderr, "\r\x1b[K");
   events::tell({{"event", "stage_end"}, {"stage", label_}, {"seconds", seconds_now() - started_}});
 }
 
@@ -66,7 +89,7 @@ void Progress::update(std::int64_t done, const std::string& note, double share) 
   if (another_second)
     events::tell(
         {{"event", "progress"}, {"stage", label_}, {"done", done}, {"total", total_}, {"note", note}});
-  if (!on_terminal()) return;
+  if (!on_terminal() || !has_line()) return;
   constexpr int width = 24;
   std::string line = fmt::format("\r\x1b[K{} ", label_);
   if (total_ > 0) {
@@ -85,6 +108,9 @@ void Progress::update(std::int64_t done, const std::string& note, double share) 
 }
 
 void set_progress_enabled(bool on) { enabled = on; }
+
+ProgressOf::ProgressOf(std::string name) : before_(std::exchange(name_of_work, std::move(name))) {}
+ProgressOf::~ProgressOf() { name_of_work = std::move(before_); }
 
 void install_stop_signals() {
   struct sigaction action = {};

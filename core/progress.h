@@ -1,4 +1,5 @@
-// A bar on stderr when that is a terminal and logging is not quiet; else nothing. And the wish to stop.
+// A bar on stderr when that is a terminal and logging is not quiet; else nothing. And the wish to stop. Where
+// several threads have one at once, the line is the first thread's until that has none any more.
 #pragma once
 
 #include <cstdint>
@@ -22,6 +23,18 @@ class Progress {
   double started_, drawn_at_ = -1;
 };
 void set_progress_enabled(bool);  // false: never draw
+
+// While one lives, what this thread begins is told with its name before it: "heart: decompose".
+class ProgressOf {
+ public:
+  explicit ProgressOf(std::string name);
+  ~ProgressOf();
+  ProgressOf(const ProgressOf&) = delete;
+  ProgressOf& operator=(const ProgressOf&) = delete;
+
+ private:
+  std::string before_;
+};
 
 // SIGINT and SIGTERM set a flag; a second one ends the process.
 void install_stop_signals();

@@ -3,6 +3,7 @@
 #include <tbb/global_control.h>
 #include <tbb/info.h>
 #include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
 
 #include <algorithm>
 #include <atomic>
@@ -33,7 +34,11 @@ int thread_count() {
   return job ? job->threads() : count();
 }
 
-void parallel_for(int n, const std::function<void(int)>& body) {
+namespace {
+
+enum class Waiting { takes_up_any_loop, takes_up_this_loop };
+
+void loop(int n, const std::function<void(int)>& body, [[maybe_unused]] Waiting waiting) {
   const int threads = thread_count();
   if (threads == 1) {
     for (int i = 0; i < n; ++i) body(i);
@@ -62,11 +67,35 @@ void parallel_for(int n, const std::function<void(int)>& body) {
   if (failure) std::rethrow_exception(failure);
 #else
   const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, std::size_t(threads));
-  tbb::parallel_for(0, n, [&](int i) {
-    const WorkingFor working(job);
-    body(i);
-  });
+  const auto all = [&] {
+    tbb::parallel_for(0, n, [&](int i) {
+      const WorkingFor working(job);
+      body(i);
+    });
+  };
+  waiting == Waiting::takes_up_this_loop ? tbb::this_task_arena::isolate(all) : all();
 #endif
+}
+
+}  // namespace
+
+// Who waits for a loop takes up nothing of a loop around it: that is work of another kind, and may be long.
+void parallel_for(int n, const std::function<void(int)>& body) { loop(n, body, Waiting::takes_up_this_loop); }
+
+void side_by_side(int n, const std::function<void(int)>& body) {
+  std::atomic<int> next{0};
+  std::vector<std::exception_ptr> failures(std::size_t(std::max(n, 0)));
+  const auto work = [&](int) {
+    for (int i; (i = next++) < n;) try {
+        body(i);
+      } catch (...) {
+        failures[std::size_t(i)] = std::current_exception();
+        next = n;
+      }
+  };
+  loop(std::min(n, thread_count()), work, Waiting::takes_up_any_loop);
+  for (const std::exception_ptr& failure : failures)
+    if (failure) std::rethrow_exception(failure);
 }
 
 }  // namespace limber

@@ -12,4 +12,8 @@ int thread_count();
 // is passed on.
 void parallel_for(int n, const std::function<void(int)>& body);
 
+// The same for a few long pieces of work that may loop in parallel themselves. They begin in order, none
+// behind one that has thrown; of several exceptions the one of the least i is passed on.
+void side_by_side(int n, const std::function<void(int)>& body);
+
 }  // namespace limber

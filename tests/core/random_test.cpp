@@ -2,9 +2,13 @@
 
 #include <gtest/gtest.h>
 
+#include <atomic>
+#include <chrono>
 #include <cmath>
 #include <functional>
+#include <numeric>
 #include <set>
+#include <thread>
 
 #include "core/error.h"
 #include "core/hash.h"
@@ -130,6 +134,42 @@ TEST(Threads, EachIndexIsVisitedOnceAndExceptionsArrive) {
                               }),
                  InputError);
   }
+  set_thread_count(0);
+}
+
+TEST(Threads, SideBySideEachIsCalledOnceAndMayLoopItself) {
+  for (const int threads : {1, 2, 3}) {
+    set_thread_count(threads);
+    std::vector<int> sums(7, 0);
+    side_by_side(7, [&](int i) {
+      std::vector<int> squares(100);
+      parallel_for(100, [&](int k) { squares[std::size_t(k)] = k * k; });
+      sums[std::size_t(i)] += std::accumulate(squares.begin(), squares.end(), i);
+    });
+    for (int i = 0; i < 7; ++i) EXPECT_EQ(sums[std::size_t(i)], 328350 + i);
+  }
+  set_thread_count(0);
+}
+
+TEST(Threads, SideBySideTheFirstExceptionIsPassedOnAndNoneBeginsBehindIt) {
+  set_thread_count(2);
+  std::atomic<bool> has_thrown{false};
+  std::vector<int> begun(100, 0);
+  try {
+    side_by_side(100, [&](int i) {
+      begun[std::size_t(i)] = 1;
+      // Where there are two cores the other goes on to 3 meanwhile.
+      for (int k = 0; i == 2 && k < 1000 && !has_thrown; ++k)
+        std::this_thread::sleep_for(std::chrono::milliseconds(1));
+      if (i < 2) return;
+      has_thrown = true;
+      throw InputError(std::to_string(i));
+    });
+    FAIL();
+  } catch (const InputError& error) {
+    EXPECT_STREQ(error.what(), "2");
+  }
+  EXPECT_LE(std::accumulate(begun.begin(), begun.end(), 0), 4);
   set_thread_count(0);
 }
 

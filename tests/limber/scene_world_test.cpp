@@ -7,6 +7,7 @@
 #include <cstdlib>
 #include <map>
 
+#include "core/threads.h"
 #include "limber/detail/world/fem_system.h"
 #include "plan/expansion.h"
 #include "scenes/library.h"
@@ -61,6 +62,23 @@ TEST(SceneWorld, EveryScenePreparesBuildsAndSteps) {
     EXPECT_TRUE(system.acceptable(rollout.to));
     EXPECT_NE(rollout.to.positions, start.positions);
   }
+}
+
+TEST(SceneWorld, BodiesThatArePreparedSideBySideHaveTheSameBytes) {
+  TemporaryFolder folder;
+  const scenes::Scene scene = scenes::read_scene_file(scenes::find_scene("barriers1"));
+  std::vector<std::vector<std::map<std::string, std::string>>> hashes;  // of all files, [threads][body]
+  for (const int threads : {1, 3}) {
+    set_thread_count(threads);
+    auto& of_bodies = hashes.emplace_back();
+    for (const PreparedBody& body : prepare_bodies(scene, {}, folder / std::to_string(threads))) {
+      of_bodies.push_back(body.report.files);
+      EXPECT_EQ(body.report.cpu_seconds.empty(), threads > 1) << "the process' costs are not one body's";
+    }
+  }
+  set_thread_count(0);
+  EXPECT_EQ(hashes[0], hashes[1]);
+  EXPECT_EQ(hashes[0].size(), scene.bodies.size());
 }
 
 }  // namespace

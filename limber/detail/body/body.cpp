@@ -110,7 +110,7 @@ BodyReport write_body(const WholeBody& body, const BodySource& source, const Pre
 }
 
 BodyReport prepare_body(const BodySource& source, const PrepareSettings& settings, const fs::path& folder,
-                        const BodyStore* store) {
+                        const BodyStore* store, bool is_alone) {
   const Json input = input_of(source.identity, settings);
   const std::string key = store ? BodyStore::key_of(source, input) : "";
   const auto tell = [&](bool up_to_date) {
@@ -135,15 +135,17 @@ BodyReport prepare_body(const BodySource& source, const PrepareSettings& setting
   log::info("{}: preparing {}", folder.string(), source.model);
   tell(false);
   if (!lock && fs::is_directory(folder)) lock.emplace(folder, FolderLock::alone);
-  Costs costs;
+  Costs costs;  // of the process
   const WholeBody body = make_body(source, settings, [&](const char* stage) { costs.end_stage(stage); });
   make_folder(folder);  // not before: a model that is refused leaves all as it was
   if (!lock) lock.emplace(folder, FolderLock::alone);
   Json told = write_body(body, source, settings, folder).json;
   costs.end_stage("write");
-  told["cpu_seconds"] = costs.cpu_s;
-  told["peak_memory_mb_after"] = costs.peak_mb;
-  told["peak_memory_mb"] = std::round(peak_memory_mb());
+  if (is_alone) {
+    told["cpu_seconds"] = costs.cpu_s;
+    told["peak_memory_mb_after"] = costs.peak_mb;
+    told["peak_memory_mb"] = std::round(peak_memory_mb());
+  }
   if (!store) write_json(folder / "report.json", told);
   BodyReport report = body_report_of(std::move(told), (folder / "report.json").string());
   if (store) store->keep(key, folder, report);

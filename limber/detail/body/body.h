@@ -88,9 +88,9 @@ void clear_body(const fs::path& folder);
 class BodyStore;
 // Writes the files and returns the report; leaves a folder that is up to date as it is. What is in the store
 // is taken from there, what is not is kept there; reports of such folders tell no costs, the one that is
-// returned does.
+// returned does. Costs are the process': where it is not alone with this body, none are told.
 BodyReport prepare_body(const BodySource&, const PrepareSettings&, const fs::path& folder,
-                        const BodyStore* store = nullptr);
+                        const BodyStore* store = nullptr, bool is_alone = true);
 
 struct PreparedBody {
   SurfaceMesh surface;

@@ -341,11 +341,9 @@ class Worker {
       prepare_beside(scene_, options.data, farm_.work());
       return {};
     }
-    std::optional<BodyStore> store;
-    if (!options.store.empty()) store.emplace(options.store);
     for (std::size_t b = 0; b < scene_.bodies.size(); ++b)
       if (scene_.bodies[b].name == unit.body) {
-        prepare_body_of(scene_, scene_.bodies[b], options.data, farm_.work(), store ? &*store : nullptr);
+        prepare_bodies_of(scene_, {b}, options.data, farm_.work(), options.store);
         keep_stiffness_share(scene_, b, farm_.work());  // else each search would find it
       }
     return {};

@@ -328,7 +328,7 @@ void tables(const Findings& f, Page& page) {
                     fmt::format("{:.2f}", 100 * f.figures.largest_volume_change[b])});
     double sum = 0;
     for (const auto& [stage, s] : prepared.report.cpu_seconds) sum += s;
-    times.push_back({"prepare " + body.name, seconds(sum)});
+    if (sum > 0) times.push_back({"prepare " + body.name, seconds(sum)});
   }
   page.table({"body", "kind", "vertices", "triangles", "tets", "mass, kg", "Young's modulus, Pa",
               "volume change at most, %"},

@@ -1,6 +1,8 @@
 // What is promised of a folder, and whether it is kept.
 #pragma once
 
+#include <algorithm>
+#include <iterator>
 #include <string>
 #include <vector>
 
@@ -15,6 +17,11 @@ class Promises {
     all_kept_ = all_kept_ && kept;
   }
   void measured(const std::string& what, const std::string& value) { measured_.push_back({what, value}); }
+  void add(Promises&& others) {  // behind these
+    std::move(others.rows_.begin(), others.rows_.end(), std::back_inserter(rows_));
+    std::move(others.measured_.begin(), others.measured_.end(), std::back_inserter(measured_));
+    all_kept_ = all_kept_ && others.all_kept_;
+  }
   bool all_kept() const { return all_kept_; }
   const std::vector<Promise>& rows() const { return rows_; }
   const std::vector<Finding>& measured() const { return measured_; }

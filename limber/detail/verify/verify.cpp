@@ -6,6 +6,7 @@
 #include "core/hash.h"
 #include "core/json_text.h"
 #include "core/progress.h"
+#include "core/threads.h"
 #include "limber/detail/verify/check_films.h"
 #include "limber/detail/verify/verify_body.h"
 #include "limber/detail/verify/verify_plan.h"
@@ -21,12 +22,16 @@ void check_bodies(const fs::path& folder, const scenes::Scene& scene, const std:
                   const VerifyDepth& depth, Promises& table) {
   const bool is_trusted = depth.trusted.has_value();
   const std::vector<fs::path> data = is_trusted ? depth.trusted->data : std::vector<fs::path>{};
-  for (std::size_t b = 0; b < bodies.size(); ++b) {
+  std::vector<Promises> of_body(bodies.size());
+  side_by_side(int(bodies.size()), [&](int i) {
+    const std::size_t b = std::size_t(i);
     const scenes::BodySpec& body = scene.bodies[b];
+    const ProgressOf progress(body.name);
     const Origin origin = origin_of(scene, body, data, bodies[b]);
-    check_origin(body.name, origin, is_trusted, table);
-    check_body(body.name, bodies[b], body_folder(folder, body), origin.made_cage, depth.remake, table);
-  }
+    check_origin(body.name, origin, is_trusted, of_body[b]);
+    check_body(body.name, bodies[b], body_folder(folder, body), origin.made_cage, depth.remake, of_body[b]);
+  });
+  for (Promises& of_one : of_body) table.add(std::move(of_one));
 }
 
 // A stiffness that is none of its bodies' changes the step, and with it the times of all frames: that is to

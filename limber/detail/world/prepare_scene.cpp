@@ -3,11 +3,9 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <optional>
 
 #include "core/error.h"
 #include "core/words.h"
-#include "limber/detail/body/body_store.h"
 #include "scenes/library.h"
 
 namespace limber::detail {
@@ -24,18 +22,19 @@ PreparedScene prepare_scene(const ScenePrepareOptions& options) {
                                    meant.empty() ? "" : fmt::format(" (did you mean {}?)", meant),
                                    fmt::join(known, ", ")));
     }
-  std::optional<BodyStore> store;
-  if (!options.scene.store.empty()) store.emplace(options.scene.store);
+  std::vector<std::size_t> asked;
+  for (std::size_t b = 0; b < scene.bodies.size(); ++b)
+    if (options.bodies.empty() ||
+        std::count(options.bodies.begin(), options.bodies.end(), scene.bodies[b].name) > 0)
+      asked.push_back(b);
+  const std::vector<BodyReport> reports =
+      prepare_bodies_of(scene, asked, options.scene.data, options.out, options.scene.store);
   PreparedScene prepared{.bodies = {}, .bodies_of_scene = known.size()};
-  for (std::size_t b = 0; b < scene.bodies.size(); ++b) {
-    const scenes::BodySpec& body = scene.bodies[b];
-    if (!options.bodies.empty() && std::count(options.bodies.begin(), options.bodies.end(), body.name) == 0)
-      continue;
-    const BodyReport report =
-        prepare_body_of(scene, body, options.scene.data, options.out, store ? &*store : nullptr);
-    keep_stiffness_share(scene, b, options.out);
-    prepared.bodies.push_back(
-        {body.name, body_folder(options.out, body), report.surface.triangles, report.cage.value().tets});
+  for (std::size_t i = 0; i < asked.size(); ++i) {
+    const scenes::BodySpec& body = scene.bodies[asked[i]];
+    keep_stiffness_share(scene, asked[i], options.out);
+    prepared.bodies.push_back({body.name, body_folder(options.out, body), reports[i].surface.triangles,
+                               reports[i].cage.value().tets});
   }
   if (options.bodies.empty()) prepare_beside(scene, options.scene.data, options.out);
   return prepared;

@@ -7,10 +7,13 @@
 // build_world.cpp.
 #include "limber/detail/world/scene_world.h"
 
+#include <numeric>
+
 #include "core/error.h"
 #include "core/log.h"
 #include "core/mesh_files.h"
 #include "core/progress.h"
+#include "core/threads.h"
 #include "core/version.h"
 #include "limber/detail/body/body_store.h"
 #include "limber/detail/world/body_source.h"
@@ -69,14 +72,6 @@ std::optional<fs::path> find_goal_cage(const scenes::Scene& scene, std::vector<f
   return std::nullopt;
 }
 
-BodyReport prepare_body_of(const scenes::Scene& scene, const scenes::BodySpec& body,
-                           const std::vector<fs::path>& data, const fs::path& work_folder, BodyStore* store) {
-  throw_if_stopped();
-  const BodySource source = source_of(scene, body, data);
-  if (!source.warning.empty()) log::warn("{}", source.warning);
-  return prepare_body(source, settings_of(body), body_folder(work_folder, body), store);
-}
-
 void prepare_beside(const scenes::Scene& scene, const std::vector<fs::path>& data,
                     const fs::path& work_folder) {
   keep_goal_cage(scene, data, work_folder);
@@ -86,12 +81,35 @@ void prepare_beside(const scenes::Scene& scene, const std::vector<fs::path>& dat
   }
 }
 
-std::vector<PreparedBody> prepare_bodies(const scenes::Scene& scene, const std::vector<fs::path>& data,
-                                         const fs::path& work_folder, const fs::path& store_folder) {
+std::vector<BodyReport> prepare_bodies_of(const scenes::Scene& scene, const std::vector<std::size_t>& bodies,
+                                          const std::vector<fs::path>& data, const fs::path& work_folder,
+                                          const fs::path& store_folder) {
   std::optional<BodyStore> store;
   if (!store_folder.empty()) store.emplace(store_folder);
-  for (const scenes::BodySpec& body : scene.bodies)
-    prepare_body_of(scene, body, data, work_folder, store ? &*store : nullptr);
+  std::vector<BodySource> sources;
+  for (const std::size_t b : bodies) {
+    throw_if_stopped();
+    sources.push_back(source_of(scene, scene.bodies[b], data));
+    if (!sources.back().warning.empty()) log::warn("{}", sources.back().warning);
+  }
+  const bool is_alone = thread_count() == 1 || bodies.size() == 1;
+  std::vector<BodyReport> reports(bodies.size());
+  side_by_side(int(bodies.size()), [&](int i) {
+    throw_if_stopped();
+    const scenes::BodySpec& body = scene.bodies[bodies[std::size_t(i)]];
+    const ProgressOf progress(body.name);
+    reports[std::size_t(i)] =
+        prepare_body(sources[std::size_t(i)], settings_of(body), body_folder(work_folder, body),
+                     store ? &*store : nullptr, is_alone);
+  });
+  return reports;
+}
+
+std::vector<PreparedBody> prepare_bodies(const scenes::Scene& scene, const std::vector<fs::path>& data,
+                                         const fs::path& work_folder, const fs::path& store) {
+  std::vector<std::size_t> all(scene.bodies.size());
+  std::iota(all.begin(), all.end(), std::size_t(0));
+  prepare_bodies_of(scene, all, data, work_folder, store);
   prepare_beside(scene, data, work_folder);
   return read_bodies(scene, work_folder);
 }

@@ -19,9 +19,11 @@ fs::path body_folder(const fs::path& work_folder, const scenes::BodySpec&);
 std::vector<PreparedBody> prepare_bodies(const scenes::Scene&, const std::vector<fs::path>& data,
                                          const fs::path& work_folder, const fs::path& store = {});
 
-// The same of one body, or of what the scene has beside its bodies: the goal's shape and scenery.
-BodyReport prepare_body_of(const scenes::Scene&, const scenes::BodySpec&, const std::vector<fs::path>& data,
-                           const fs::path& work_folder, BodyStore* store);
+// The same of some bodies, 0 ≤ body < bodies, or of what the scene has beside its bodies: the goal's shape
+// and scenery.
+std::vector<BodyReport> prepare_bodies_of(const scenes::Scene&, const std::vector<std::size_t>& bodies,
+                                          const std::vector<fs::path>& data, const fs::path& work_folder,
+                                          const fs::path& store = {});
 void prepare_beside(const scenes::Scene&, const std::vector<fs::path>& data, const fs::path& work_folder);
 
 // What prepare begins with. Throw InputError when the model is not found, or is none; scenery that is not
