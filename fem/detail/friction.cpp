@@ -6,9 +6,10 @@
 //
 //     p ← p − u_t / Σ (w²/m),  cut to |p| ≤ μ h N,  and u at once changed by it;
 //
-// twelve times, or until no impulse changes by more than a thousandth of its limit.
+// twelve times, or until no impulse changes by more than a thousandth of its limit. In later substeps of a
+// step they begin as they are, where they take kinetic energy away, and four times do.
 //
-// What always holds: impulses begin from zero in each substep and are found in the fixed order of contacts,
+// What always holds: impulses begin from zero in each step and are found in the fixed order of contacts,
 // so State is all there is, and the bits are the same for any lanes and threads. Both sides get an impulse by
 // the same shares, so momentum is kept; it never makes the kinetic energy larger. Below its limit nothing
 // creeps, above it slides as Coulomb says. Impulses are N s; as forces they are p/h.
@@ -28,9 +29,9 @@
 namespace limber::fem::detail {
 namespace {
 
-// Places are gone through so often at most, and until no impulse changes by more than this share of its
-// limit.
-constexpr int max_sweeps = 12;
+// Places are gone through so often at most, with impulses from zero and from those of the substep before, and
+// until no impulse changes by more than this share of its limit.
+constexpr int max_sweeps = 12, max_sweeps_going_on = 4;
 constexpr float settled = 1e-3f;
 
 // A symmetric matrix, xx xy xz yy yz zz, times a vector.
@@ -64,7 +65,7 @@ template <class Real>
 void Friction<Real>::begin() {
   for (const Slot& slot : slots_) slot_of_node_[std::size_t(slot.node)] = -1;
   for (Spin& spin : spins_) spin.met = false;
-  slots_.clear(), shares_.clear(), slips_.clear(), limited_ = false;
+  slots_.clear(), shares_.clear(), slips_.clear(), limited_ = goes_on_ = false;
   wall_nodes_of_slot_.clear(), wall_nodes_.clear(), wall_tellings_.clear(), wall_shares_.clear();
 }
 
@@ -207,12 +208,15 @@ void Friction<Real>::predict(const LaneView<Real>& view, const std::vector<const
 // u of a place: Σ w u over soft nodes, and ±(u_c + ω × r) of rigid bodies.
 template <class Real>
 void Friction<Real>::find_relative_velocity(const Slip& slip, Real out[3]) const {
-  Velocity sum;
-  sum.row = Row{};
   const SlotShare* const shares = shares_.data();
   const Velocity* const velocities = velocities_.data();
-  for (int k = slip.first_soft; k < slip.last_soft; ++k)
-    sum.row += shares[k].weight * velocities[shares[k].slot].row;
+  Row sums[4] = {};  // four, since a sum must wait for the one before
+  int k = slip.first_soft;
+  for (; k + 4 <= slip.last_soft; k += 4)
+    for (int i = 0; i < 4; ++i) sums[i] += shares[k + i].weight * velocities[shares[k + i].slot].row;
+  for (; k < slip.last_soft; ++k) sums[0] += shares[k].weight * velocities[shares[k].slot].row;
+  Velocity sum;
+  sum.row = (sums[0] + sums[1]) + (sums[2] + sums[3]);
   std::copy_n(sum.at, 3, out);
   if (spins_.empty()) return;
   for (const int k : {0, 1}) {
@@ -308,6 +312,32 @@ Real Friction<Real>::step_of(WallNode& node) {
   return std::sqrt(change2) / node.most;
 }
 
+// Changes the velocities by all impulses as they are, and returns the kinetic energy that this gives or,
+// below 0, takes: p·u + ½ p·Wp of each in its turn, u before it and W the inverse mass along it.
+template <class Real>
+Real Friction<Real>::energy_by_impulses() {
+  Real energy = 0;
+  for (const Slip& slip : slips_) {
+    const Real square = dot(slip.impulse, slip.impulse);
+    if (!(square > 0)) continue;
+    const Real size = std::sqrt(square);
+    const Real along[3] = {slip.impulse[0] / size, slip.impulse[1] / size, slip.impulse[2] / size};
+    Real slipping[3];
+    find_relative_velocity(slip, slipping);
+    energy += dot(slip.impulse, slipping) + square * inverse_mass_along(slip, along) / 2;
+    apply(slip, slip.impulse);
+  }
+  for (const WallNode& node : wall_nodes_) {
+    Velocity& velocity = velocities_[std::size_t(node.slot)];
+    const Real inverse_mass = tables_.inverse_mass[slots_[std::size_t(node.slot)].node];
+    for (int c = 0; c < 3; ++c) {
+      energy += node.impulse[c] * (velocity.at[c] + inverse_mass * node.impulse[c] / 2);
+      velocity.at[c] += inverse_mass * node.impulse[c];
+    }
+  }
+  return energy;
+}
+
 // Solves, and adds the forces p/h to view.f. First nodes at one wall that nothing else moves, which are
 // exact after one step; then sweeps over all others. Those who ask are told each force with its place: that
 // of a wall node is dealt back to the samples that it bears, by their shares.
@@ -317,11 +347,16 @@ void Friction<Real>::add_forces(const LaneView<Real>& view, const std::vector<co
   if (slips_.empty() && wall_nodes_.empty()) return;
   predict(view, pushes);
   if (!limited_) limit_wall_nodes(), limited_ = true;  // once for all substeps
-  for (Slip& slip : slips_) std::fill_n(slip.impulse, 3, Real(0));
-  for (WallNode& node : wall_nodes_) std::fill_n(node.impulse, 3, Real(0));
+  if (goes_on_ && energy_by_impulses() > 0) predict(view, pushes), goes_on_ = false;
+  if (!goes_on_) {
+    for (Slip& slip : slips_) std::fill_n(slip.impulse, 3, Real(0));
+    for (WallNode& node : wall_nodes_) std::fill_n(node.impulse, 3, Real(0));
+  }
   for (WallNode& node : wall_nodes_)
     if (!node.meets_others) step_of(node);
-  for (int sweep = 0; sweep < max_sweeps; ++sweep) {
+  const int sweeps = goes_on_ ? max_sweeps_going_on : max_sweeps;
+  goes_on_ = true;
+  for (int sweep = 0; sweep < sweeps; ++sweep) {
     Real most = 0;
     for (Slip& slip : slips_) most = std::max(most, step_of(slip));
     for (WallNode& node : wall_nodes_)

@@ -96,6 +96,7 @@ class Friction {
             int records);
   void limit_wall_nodes();
   Real step_of(WallNode&);
+  Real energy_by_impulses();
   void predict(const LaneView<Real>& view, const std::vector<const Real*>& pushes);
   Real step_of(Slip&);  // the impulse's change over the most it may be
   void find_relative_velocity(const Slip&, Real out[3]) const;
@@ -113,6 +114,7 @@ class Friction {
   std::vector<std::array<int, 6>> wall_nodes_of_slot_;  // by side; −1: none
   std::vector<WallNode> wall_nodes_;
   bool limited_ = false;              // `most` of wall nodes is known
+  bool goes_on_ = false;              // impulses are those of the substep before
   std::vector<WallLoad> wall_loads_;  // [6 body + side]; empty between steps
   std::vector<WallTelling> wall_tellings_;
   std::vector<WallShare> wall_shares_;

@@ -276,6 +276,24 @@ TEST_F(Simulate_slow, FromAPlansFrameItGoesOnAsThePlanDoes) {
   EXPECT_FALSE(alone.kept.at(fmt::format("it starts as frame {} of another motion", frame)));
 }
 
+// Whoever goes on from a motion prepares none of its bodies again.
+TEST_F(Simulate_slow, BodiesAreCopiedFromTheMotionThatItBeginsAs) {
+  const Result made = run(thrown, "whole", {"--duration", "0.2"});
+  const Result taken = run(thrown, "on", {"--duration", "0.2", "--from", out("whole")});
+  for (const Result* result : {&made, &taken}) ASSERT_EQ(result->code, exit_done) << result->err;
+  for (const std::string name : {"cube", "plate"}) {
+    EXPECT_NE(made.err.find(name + ": preparing"), std::string::npos) << made.err;
+    EXPECT_NE(taken.err.find(name + ": as in " + out("whole") + "/bodies/" + name), std::string::npos);
+    for (const fs::directory_entry& file : fs::directory_iterator(out("whole") + "/bodies/" + name)) {
+      const fs::path of = file.path().filename();
+      if (of == "report.json") continue;  // which tells costs
+      EXPECT_EQ(read_file(fs::path(out("on")) / "bodies" / name / of), read_file(file.path())) << of;
+    }
+  }
+  EXPECT_EQ(taken.err.find("preparing"), std::string::npos) << taken.err;
+  EXPECT_EQ(verify("on").code, exit_done);
+}
+
 // Another script, another start, or frames that are not those of the scene: made to fit, and named.
 TEST_F(Simulate_slow, VerifyNamesWhatWasChanged) {
   simulate(thrown, "out", {"--duration", "1.3", "--control", file("lift.toml", lifting)});

@@ -109,8 +109,34 @@ BodyReport write_body(const WholeBody& body, const BodySource& source, const Pre
   return body_report_of(std::move(report), (folder / "report.json").string());
 }
 
+namespace {
+
+// Makes `folder` the body of `like`, whose report this is; nothing where that is changed meanwhile. With it
+// goes what its stiffness was found to be.
+std::optional<BodyReport> copy_body(const fs::path& like, const BodyReport& report, const std::string& model,
+                                    const fs::path& folder) try {
+  clear_body(folder);
+  for (const auto& [name, hash] : report.files) {
+    const std::string bytes = read_file(like / name);
+    if (hex(hash_of(std::string_view(bytes))) != hash) return std::nullopt;
+    write_file(folder / name, bytes);
+  }
+  if (const fs::path share = like / "stiffness.json"; fs::exists(share))
+    write_file(folder / share.filename(), read_file(share));
+  Json told = report.json;
+  take_costs_out(told);
+  told["model"] = model;
+  write_json(folder / "report.json", told);
+  return body_report_of(std::move(told), (folder / "report.json").string());
+} catch (const InputError&) {
+  return std::nullopt;
+}
+
+}  // namespace
+
 BodyReport prepare_body(const BodySource& source, const PrepareSettings& settings, const fs::path& folder,
-                        const BodyStore* store, bool is_alone) {
+                        const PrepareAid& aid) {
+  const BodyStore* const store = aid.store;
   const Json input = input_of(source.identity, settings);
   const std::string key = store ? BodyStore::key_of(source, input) : "";
   const auto tell = [&](bool up_to_date) {
@@ -132,6 +158,16 @@ BodyReport prepare_body(const BodySource& source, const PrepareSettings& setting
       return *std::move(report);
     }
   }
+  if (const auto other = aid.like.empty() ? std::nullopt : up_to_date_report(aid.like, input)) {
+    make_folder(folder);
+    if (!lock) lock.emplace(folder, FolderLock::alone);
+    if (std::optional<BodyReport> report = copy_body(aid.like, *other, source.model, folder)) {
+      log::info("{}: as in {}", folder.string(), aid.like.string());
+      tell(true);
+      if (store) store->keep(key, folder, *report);
+      return *std::move(report);
+    }
+  }
   log::info("{}: preparing {}", folder.string(), source.model);
   tell(false);
   if (!lock && fs::is_directory(folder)) lock.emplace(folder, FolderLock::alone);
@@ -141,7 +177,7 @@ BodyReport prepare_body(const BodySource& source, const PrepareSettings& setting
   if (!lock) lock.emplace(folder, FolderLock::alone);
   Json told = write_body(body, source, settings, folder).json;
   costs.end_stage("write");
-  if (is_alone) {
+  if (aid.is_alone) {
     told["cpu_seconds"] = costs.cpu_s;
     told["peak_memory_mb_after"] = costs.peak_mb;
     told["peak_memory_mb"] = std::round(peak_memory_mb());

@@ -89,8 +89,14 @@ class BodyStore;
 // Writes the files and returns the report; leaves a folder that is up to date as it is. What is in the store
 // is taken from there, what is not is kept there; reports of such folders tell no costs, the one that is
 // returned does. Costs are the process': where it is not alone with this body, none are told.
+// What is whole and the same in the folder `like`, of a body of another work folder, is copied.
+struct PrepareAid {
+  const BodyStore* store = nullptr;
+  fs::path like = {};
+  bool is_alone = true;
+};
 BodyReport prepare_body(const BodySource&, const PrepareSettings&, const fs::path& folder,
-                        const BodyStore* store = nullptr, bool is_alone = true);
+                        const PrepareAid& = {});
 
 struct PreparedBody {
   SurfaceMesh surface;

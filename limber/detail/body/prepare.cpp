@@ -90,7 +90,7 @@ PreparedFolder prepare(const ModelOptions& options) {
 
   const BodySource source = source_of(options, options.bytes.empty() ? options.model : options.bytes);
   const BodyReport report =
-      prepare_body(source, settings_of(options), options.out, store ? &*store : nullptr);
+      prepare_body(source, settings_of(options), options.out, {.store = store ? &*store : nullptr});
   PreparedFolder prepared{text_of(report.json, 2), {}};
   std::vector<std::string>& written = prepared.also_written;
   if (options.picture) {

@@ -263,7 +263,7 @@ KeptPlan plan(const PlanOptions& options, const scenes::Scene& scene) {
   make_folder(options.out);
   remove_abandoned(options.out);
   const std::vector<PreparedBody> bodies =
-      prepare_bodies(scene, options.scene.data, options.out, options.scene.store);
+      prepare_bodies(scene, options.scene.data, options.out, options.scene.store, options.from);
   const fem::World world = build_world_in(options.out, scene, bodies);
   const Beginning beginning = beginning_of(options.from, options.frame, options.out, scene, world);
   const FemSystem system(world, bodies, goal_rules_of(scene), beginning.start);

@@ -67,7 +67,8 @@ KeptPlan refine(const RefineOptions& options) {
       planned.scene.script);
   make_folder(options.out);
   const FolderLock lock(options.out, FolderLock::alone);
-  const std::vector<PreparedBody> bodies = prepare_bodies(scene, options.data, options.out, options.store);
+  const std::vector<PreparedBody> bodies =
+      prepare_bodies(scene, options.data, options.out, options.store, options.folder);
 
   const fem::World world = build_world_in(options.out, scene, bodies);
   const FemSystem coarse(coarse_world, goal_rules_of(planned.scene)),

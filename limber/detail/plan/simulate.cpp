@@ -122,7 +122,8 @@ KeptPlan simulate(const SimulateOptions& options) {
   const FolderLock lock(options.out, FolderLock::alone);
   remove_abandoned(options.out);
   const std::vector<PreparedBody> bodies =
-      prepare_bodies(scene, options.scene.data, options.out, options.scene.store);
+      prepare_bodies(scene, options.scene.data, options.out, options.scene.store,
+                     options.from.empty() ? options.follow : options.from);
   const fem::World world = build_world_in(options.out, scene, bodies);
   const Beginning beginning = beginning_of(options.from, options.frame, options.out, scene, world);
   const FemSystem system(world, {}, beginning.start);

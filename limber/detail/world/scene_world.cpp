@@ -22,26 +22,34 @@ namespace limber::detail {
 
 namespace {
 
+// Whether a work folder's scenery is what this source makes, whole.
+bool has_scenery(const fs::path& work_folder, const scenes::BodySpec& body, const Json& identity) try {
+  const fs::path origin = scenery_file(work_folder, body, ".json");
+  const SceneryOrigin made = read_fields<SceneryOrigin>(read_json(origin), origin.string(), "");
+  return made.version == version && made.input == identity &&
+         made.hash == hash_of_scenery(scenery_file(work_folder, body, ".ply"), identity);
+} catch (const InputError&) {
+  return false;
+}
+
 // NAME.ply, and beside it NAME.json, which says where it comes from. Of a model that was not found there is
-// no mesh, and the hash is null. Files that are missing or damaged are made anew.
-void prepare_scenery(const scenes::Scene& scene, const scenes::BodySpec& body,
-                     const std::vector<fs::path>& data, const fs::path& work_folder) {
-  const BodySource source = source_of_scenery(scene, body, data);
+// no mesh, and the hash is null. Files that are missing or damaged are made anew, or are those of the work
+// folder `like`, where that has the same.
+void prepare_scenery(const scenes::BodySpec& body, const BodySource& source, const fs::path& work_folder,
+                     const fs::path& like) {
+  if (has_scenery(work_folder, body, source.identity)) return;
   const fs::path mesh = scenery_file(work_folder, body, ".ply"),
                  origin = scenery_file(work_folder, body, ".json");
-  try {
-    const SceneryOrigin made = read_fields<SceneryOrigin>(read_json(origin), origin.string(), "");
-    if (made.version == version && made.input == source.identity &&
-        made.hash == hash_of_scenery(mesh, made.input))
-      return;
-  } catch (const InputError&) {
-  }
-  log::info("{}: reading {}", mesh.string(), source.model);
+  const bool is_there = !like.empty() && has_scenery(like, body, source.identity);
+  log::info("{}: {} {}", mesh.string(), is_there ? "as in" : "reading",
+            is_there ? like.string() : source.model);
   make_folder(mesh.parent_path());
-  if (was_found(source.identity))
-    write_ply(mesh, make_scenery(body, source));
-  else
+  if (!was_found(source.identity))
     fs::remove(mesh);
+  else if (is_there)
+    write_file(mesh, read_file(scenery_file(like, body, ".ply")));
+  else
+    write_ply(mesh, make_scenery(body, source));
   write_json(origin,
              json_of_fields(SceneryOrigin{version, source.identity, hash_of_scenery(mesh, source.identity)}));
 }
@@ -73,17 +81,21 @@ std::optional<fs::path> find_goal_cage(const scenes::Scene& scene, std::vector<f
 }
 
 void prepare_beside(const scenes::Scene& scene, const std::vector<fs::path>& data,
-                    const fs::path& work_folder) {
+                    const fs::path& work_folder, const fs::path& like) {
   keep_goal_cage(scene, data, work_folder);
-  for (const scenes::BodySpec& body : scene.scenery) {
+  std::vector<BodySource> sources;
+  for (const scenes::BodySpec& body : scene.scenery) sources.push_back(source_of_scenery(scene, body, data));
+  side_by_side(int(sources.size()), [&](int i) {
     throw_if_stopped();
-    prepare_scenery(scene, body, data, work_folder);
-  }
+    const scenes::BodySpec& body = scene.scenery[std::size_t(i)];
+    const ProgressOf progress(body.name);
+    prepare_scenery(body, sources[std::size_t(i)], work_folder, like);
+  });
 }
 
 std::vector<BodyReport> prepare_bodies_of(const scenes::Scene& scene, const std::vector<std::size_t>& bodies,
                                           const std::vector<fs::path>& data, const fs::path& work_folder,
-                                          const fs::path& store_folder) {
+                                          const fs::path& store_folder, const fs::path& like) {
   std::optional<BodyStore> store;
   if (!store_folder.empty()) store.emplace(store_folder);
   std::vector<BodySource> sources;
@@ -98,19 +110,20 @@ std::vector<BodyReport> prepare_bodies_of(const scenes::Scene& scene, const std:
     throw_if_stopped();
     const scenes::BodySpec& body = scene.bodies[bodies[std::size_t(i)]];
     const ProgressOf progress(body.name);
+    const PrepareAid aid{store ? &*store : nullptr, like.empty() ? like : body_folder(like, body), is_alone};
     reports[std::size_t(i)] =
-        prepare_body(sources[std::size_t(i)], settings_of(body), body_folder(work_folder, body),
-                     store ? &*store : nullptr, is_alone);
+        prepare_body(sources[std::size_t(i)], settings_of(body), body_folder(work_folder, body), aid);
   });
   return reports;
 }
 
 std::vector<PreparedBody> prepare_bodies(const scenes::Scene& scene, const std::vector<fs::path>& data,
-                                         const fs::path& work_folder, const fs::path& store) {
+                                         const fs::path& work_folder, const fs::path& store,
+                                         const fs::path& like) {
   std::vector<std::size_t> all(scene.bodies.size());
   std::iota(all.begin(), all.end(), std::size_t(0));
-  prepare_bodies_of(scene, all, data, work_folder, store);
-  prepare_beside(scene, data, work_folder);
+  prepare_bodies_of(scene, all, data, work_folder, store, like);
+  prepare_beside(scene, data, work_folder, like);
   return read_bodies(scene, work_folder);
 }
 

@@ -15,16 +15,18 @@ fs::path body_folder(const fs::path& work_folder, const scenes::BodySpec&);
 
 // Prepares what is not up to date; meshes are in world coordinates, where the scene puts them. `data` are
 // folders in which model files are looked for first; bodies are shared with those of `store`, where one is
-// named.
+// named. What is the same in the work folder `like`, where one is named, is copied from there.
 std::vector<PreparedBody> prepare_bodies(const scenes::Scene&, const std::vector<fs::path>& data,
-                                         const fs::path& work_folder, const fs::path& store = {});
+                                         const fs::path& work_folder, const fs::path& store = {},
+                                         const fs::path& like = {});
 
 // The same of some bodies, 0 ≤ body < bodies, or of what the scene has beside its bodies: the goal's shape
 // and scenery.
 std::vector<BodyReport> prepare_bodies_of(const scenes::Scene&, const std::vector<std::size_t>& bodies,
                                           const std::vector<fs::path>& data, const fs::path& work_folder,
-                                          const fs::path& store = {});
-void prepare_beside(const scenes::Scene&, const std::vector<fs::path>& data, const fs::path& work_folder);
+                                          const fs::path& store = {}, const fs::path& like = {});
+void prepare_beside(const scenes::Scene&, const std::vector<fs::path>& data, const fs::path& work_folder,
+                    const fs::path& like = {});
 
 // What prepare begins with. Throw InputError when the model is not found, or is none; scenery that is not
 // found is empty, with a warning.
