@@ -70,23 +70,60 @@ Gaps gaps(const World& world, double offset_m, const Positions& positions) {
   return gaps;
 }
 
+// Of two bodies that begin in touch, and not pressed into one another, how near: the least gap. Half of what
+// begins nearer than the offset does so by less than a third of it, as where one lies on the other, or it is
+// no more than twice what a ball of the smaller one's size has on a plane. By [body, against], body <
+// against. Bodies that lie along each other unevenly, as organs of a scan do, are none of these.
+std::map<std::array<int, 2>, double> touching_gaps(const std::map<std::array<int, 3>, double>& gaps,
+                                                   double offset_m, const World& world) {
+  constexpr double pressed_share = 0.05, small_share = 1.0 / 3, balls = 2;
+  std::map<std::array<int, 2>, std::vector<std::pair<double, double>>> gap_and_area;
+  for (const auto& [key, gap] : gaps)
+    if (const auto [body, against, sample] = key; body != against)
+      gap_and_area[{std::min(body, against), std::max(body, against)}].emplace_back(
+          gap, 0.5 * world.surfaces64.samples[std::size_t(sample)].area);  // seen from both sides
+  const auto size_m = [&](int body) {
+    return bounding_box(world.bodies[std::size_t(body)].cage.positions).size().maxCoeff();
+  };
+  std::map<std::array<int, 2>, double> touching;
+  for (auto& [pair, all] : gap_and_area) {
+    std::sort(all.begin(), all.end());
+    if (all.front().first < -pressed_share * offset_m) continue;
+    double area = 0, of_small = 0;
+    for (const auto& [gap, of_one] : all)
+      area += of_one, of_small += gap <= small_share * offset_m ? of_one : 0;
+    const double of_ball = EIGEN_PI * std::min(size_m(pair[0]), size_m(pair[1])) * offset_m;
+    if (of_small >= 0.5 * area || area <= balls * of_ball) touching[pair] = std::max(all.front().first, 0.0);
+  }
+  return touching;
+}
+
 // From here on a sample that begins nearer than the offset is in contact when it is nearer than that, less
-// what rounding does: so nothing pushes at the start.
+// what rounding does: so nothing pushes at the start. What begins in touch is as near wherever it goes; else
+// it would begin in a hollow, the offset deep, and had to climb out of that to slide or to roll.
 void set_own_offsets(const std::map<std::array<int, 3>, double>& gaps, double offset_m, World& world) {
   constexpr double rounding = 1e-3;  // of the offset
   auto& tables = world.surfaces64;
   const std::size_t bodies = world.bodies.size();
+  for (const auto& [pair, gap] : touching_gaps(gaps, offset_m, world))
+    for (const auto& [a, b] : {pair, std::array{pair[1], pair[0]}}) {
+      const std::size_t at = std::size_t(a) * bodies + std::size_t(b);
+      tables.offset[at] = gap - rounding * offset_m, world.surfaces.offset[at] = float(tables.offset[at]);
+    }
   if (!gaps.empty()) tables.first_own_offset.assign(bodies * bodies, -1);
   for (const auto& [key, gap] : gaps) {
     const auto [body, against, sample] = key;
-    int& first = tables.first_own_offset[std::size_t(body) * bodies + std::size_t(against)];
+    const std::size_t pair = std::size_t(body) * bodies + std::size_t(against);
+    const double own = gap - rounding * offset_m;
+    if (own >= tables.offset[pair]) continue;
+    int& first = tables.first_own_offset[pair];
     if (first < 0) {
       first = int(tables.own_offset.size());
       const auto& tets = tables.bodies[std::size_t(body)].sampled_tets;
       const int samples = tables.first_sample[std::size_t(tets.back()) + 1] - tables.first_sample_of(body);
-      tables.own_offset.insert(tables.own_offset.end(), std::size_t(samples), offset_m);
+      tables.own_offset.insert(tables.own_offset.end(), std::size_t(samples), tables.offset[pair]);
     }
-    tables.own_offset[std::size_t(first + sample - tables.first_sample_of(body))] = gap - rounding * offset_m;
+    tables.own_offset[std::size_t(first + sample - tables.first_sample_of(body))] = own;
   }
   world.surfaces.first_own_offset = tables.first_own_offset;
   world.surfaces.own_offset.assign(tables.own_offset.begin(), tables.own_offset.end());

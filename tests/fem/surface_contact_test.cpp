@@ -19,6 +19,7 @@ namespace {
 
 using testing::ball_surface;
 using testing::cube;
+using testing::grid;
 using testing::Lane;
 using testing::rounded_box_surface;
 using testing::shape_of;
@@ -558,6 +559,76 @@ TEST(SurfaceContacts, ForcesThatAreHeldGiveNoEnergy) {
     EXPECT_LT(highest, before + 0.02 * scale);
     EXPECT_LT(energy(state), before);
   }
+}
+
+// Friction goes on from substep to substep: on a slope of tan θ 0.4 a soft slab stays at μ 0.45 and falls
+// asleep, and slides at μ 0.3 as Coulomb says, however many substeps a step has.
+TEST(SurfaceContacts, FrictionHoldsAndSlidesInSubsteps) {
+  const double angle = std::atan(0.4), g = 9.81;
+  for (const int substeps : {1, 2, 4})
+    for (const double friction : {0.45, 0.3}) {
+      SCOPED_TRACE(fmt::format("{} substeps, friction {}", substeps, friction));
+      Material material;
+      material.youngs_modulus_pa = 2e4, material.friction = friction, material.damping_ratio = 0.3;
+      WorldSpec spec;
+      spec.bodies = {
+          {"slab", grid({1, -0.5, 0}, {1, 1, 0.5}, 4, 4, 2), material, {}, BodyKind::deformable},
+          {"slope", grid({0, -1, -0.5}, {6, 2, 0.5}, 12, 4, 1), material, {}, BodyKind::immovable}};
+      for (BodySpec& body : spec.bodies)
+        body.shape =
+            shape_of(body.cage, rounded_box_surface(bounding_box(body.cage.positions), 0.02), 0.03, 0.04);
+      spec.bodies[0].phong = true;
+      spec.contact_offset_m = 0.005, spec.rest_speed_m_s = 0.001;
+      spec.bounds_m = {Vec3::Constant(-20), Vec3::Constant(20)};
+      spec.gravity_m_s2 = g * Vec3(std::sin(angle), 0, -std::cos(angle));
+      const World world = with_substeps(build_world(spec), substeps);
+      const bool holds = friction > 0.4;
+      Control coast;
+      coast.steps = int((holds ? 6 : 0.5) / world.dt_s);
+      const State landed = propagate(world, rest_state(world), coast).end;
+      coast.steps = int(0.5 / world.dt_s);
+      const State end = propagate(world, landed, coast).end;
+      if (holds) {
+        EXPECT_LE((center_of_mass_m(world, end, 0) - center_of_mass_m(world, landed, 0)).norm(), 5e-4);
+        EXPECT_EQ(mean_speed_m_s(world, end, 0), 0) << "it does not sleep";
+      } else {
+        const auto momentum = [&](const State& state) {  // along the slope
+          double sum = 0;
+          for (int n = 0; n < world.bodies[0].node_count(); ++n)
+            sum += world.tables64.node_mass[n] * state.velocities[3 * n];
+          return sum;
+        };
+        const double gained = (momentum(end) - momentum(landed)) / world.bodies[0].mass_kg,
+                     coulombs = g * (std::sin(angle) - friction * std::cos(angle)) * coast.steps * world.dt_s;
+        EXPECT_NEAR(gained, coulombs, 0.05 * coulombs);
+      }
+    }
+}
+
+// A rigid ball that is put on a slope of tan θ 0.08, in touch, rolls down by itself, though not as far as a
+// ball without facets would, 5/14 g sin θ t².
+TEST(SurfaceContacts, ABallInTouchRolls) {
+  const double angle = std::atan(0.08), g = 9.81, radius = 0.4;
+  Material material;
+  material.friction = 0.5;
+  WorldSpec spec;
+  spec.bodies = {{"ball", cube({0, 0, radius}, 0.9, 3), material, {}, BodyKind::rigid},
+                 {"slope", grid({-1, -1, -0.3}, {4, 2, 0.3}, 8, 4, 1), material, {}, BodyKind::immovable}};
+  spec.bodies[0].shape = shape_of(spec.bodies[0].cage, ball_surface({0, 0, radius}, radius), 0.03, 0.03);
+  spec.bodies[1].shape =
+      shape_of(spec.bodies[1].cage, rounded_box_surface(bounding_box(spec.bodies[1].cage.positions), 0.02),
+               0.03, 0.04);
+  spec.contact_offset_m = 0.004;
+  spec.bounds_m = {Vec3::Constant(-20), Vec3::Constant(20)};
+  spec.gravity_m_s2 = g * Vec3(std::sin(angle), 0, -std::cos(angle));
+  const World world = build_world(spec);
+  Control coast;
+  coast.steps = int(1 / world.dt_s);
+  const State end = propagate(world, rest_state(world), coast).end;
+  const double way = (center_of_mass_m(world, end, 0) - center_of_mass_m(world, rest_state(world), 0)).x(),
+               of_round_ball = 5.0 / 14 * g * std::sin(angle);
+  EXPECT_GT(way, 0.5 * of_round_ball);
+  EXPECT_LT(way, 1.05 * of_round_ball);
 }
 
 // A ball falls on the floor and on a cube there, and all come to rest: what is loaded anew after each step
