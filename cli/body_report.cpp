@@ -4,11 +4,23 @@
 
 namespace limber::cli {
 
+namespace {
+
+std::string size_text(const Json& surface) {  // "0.12 × 0.09 × 0.1"
+  std::string text;
+  for (std::size_t c = 0; c < 3; ++c)
+    text += fmt::format("{}{:.3g}", c > 0 ? " × " : "",
+                        surface.at("upper_m")[c].get<double>() - surface.at("lower_m")[c].get<double>());
+  return text;
+}
+
+}  // namespace
+
 std::string text_of_report(const Json& report) {
   const Json& surface = report.at("surface");
-  std::string text =
-      fmt::format("{}\n  surface      {} vertices, {} triangles\n", report.at("model").get<std::string>(),
-                  surface.at("vertices").get<int>(), surface.at("triangles").get<int>());
+  std::string text = fmt::format("{}\n  surface      {} vertices, {} triangles; {} m\n",
+                                 report.at("model").get<std::string>(), surface.at("vertices").get<int>(),
+                                 surface.at("triangles").get<int>(), size_text(surface));
   if (report.contains("shells")) {
     const Json& shells = report.at("shells");
     text += fmt::format(

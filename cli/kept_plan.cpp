@@ -112,7 +112,9 @@ std::string text_of_motion(const Json& s) {
   return fmt::format(
       "  motion       {:.2f} s in {} frames, time step {:.3g} ms{}\n"
       "  volume       changes at most: {}\n"
-      "  penetration  at most {:.4f} m, {:.2f} % of the robot's size ({})\n"
+      "  cages        in one another by at most {:.4f} m, {:.2f} % of the robot's size ({}); they are larger "
+      "than "
+      "what is seen\n"
       "  surfaces     overlap at most {:.2f} % ({}), in themselves {:.2f} % ({}), gap where they press "
       "{:.2f} % "
       "in the median\n"

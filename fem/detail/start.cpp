@@ -13,6 +13,7 @@
 #include "fem/batch.h"
 #include "fem/detail/surface_contact.h"
 #include "fem/observe.h"
+#include "fem/parting.h"
 
 namespace limber::fem::detail {
 namespace {
@@ -132,8 +133,6 @@ void set_own_offsets(const std::map<std::array<int, 3>, double>& gaps, double of
 // Of the offset: how deep surfaces are pressed that are to part, at first and where that does not part them;
 // how far apart they are that are parted; how far nodes move at most in a stage that ends at rest.
 constexpr double gentle_push = 0.25, firm_push = 1, apart = 0.25, at_rest = 0.02;
-// No more than that share of the smaller body's size is parted: beyond, the nearest way out leads anywhere.
-constexpr double deepest_share = 0.25;
 // Stages without less overlap before more is done about it, and stages after all are apart.
 constexpr int patience = 24, max_resting_stages = 60;
 constexpr int min_steps = 24, max_steps = 400;  // of a stage that goes on to its end
@@ -255,10 +254,11 @@ class Parter {
   void refuse_what_is_too_deep() const {
     for (const auto& [a, b] : pairs_) {
       const std::size_t smaller = size_of(a) < size_of(b) ? a : b;
-      if (-gap(a, b) > deepest_share * size_of(smaller))
+      if (-gap(a, b) > deepest_parted_share * size_of(smaller))
         refuse(a, b,
                fmt::format("that is more than a quarter of {}'s size, {:.3g} m", world_.bodies[smaller].name,
-                           size_of(smaller)));
+                           size_of(smaller)),
+               "move them apart");
     }
   }
   void refuse_what_stays() const {
@@ -276,11 +276,12 @@ class Parter {
     const auto [a, b] = deepest(before_);
     refuse(a, b, why);
   }
-  [[noreturn]] void refuse(std::size_t a, std::size_t b, const std::string& why) const {
-    throw InputError(
-        fmt::format("bodies {} and {} overlap at the start, {:.3g} m deep, and cannot be parted: {}; move "
-                    "them apart, hold less of them fixed, or make one softer",
-                    world_.bodies[a].name, world_.bodies[b].name, -before_[a * bodies_ + b].gap_m, why));
+  [[noreturn]] void refuse(
+      std::size_t a, std::size_t b, const std::string& why,
+      const char* advice = "move them apart, hold less of them fixed, or make one softer") const {
+    throw InputError(fmt::format(
+        "bodies {} and {} overlap at the start, {:.3g} m deep, and cannot be parted: {}; {}",
+        world_.bodies[a].name, world_.bodies[b].name, -before_[a * bodies_ + b].gap_m, why, advice));
   }
 
   World world_;

@@ -114,8 +114,11 @@ TEST_F(PartedStart_slow, IsRefusedWhereTheSceneWantsThatOrItCannotBe) {
       limber_program({"plan", scene(overlapping), "-o", out(), "--set", "world.part_overlaps=false"});
   EXPECT_EQ(refused.code, exit_bad_input);
   EXPECT_NE(refused.err.find("bodies robot and ball overlap at the start"), std::string::npos) << refused.err;
-  const Result deep = limber_program(
-      {"plan", scene(overlapping), "-o", out(), "--set", "bodies.ball.pose.position_m=[1.3, 1, 1]"});
+  const std::string into_it = "bodies.ball.pose.position_m=[1.3, 1, 1]";
+  const Result checked = limber_program({"scene", "check", scene(overlapping), "--set", into_it});
+  EXPECT_EQ(checked.code, exit_bad_input);
+  EXPECT_NE(checked.out.find("too deep to be parted; move them apart"), std::string::npos) << checked.out;
+  const Result deep = limber_program({"plan", scene(overlapping), "-o", out(), "--set", into_it});
   EXPECT_EQ(deep.code, exit_bad_input);
   EXPECT_NE(deep.err.find("cannot be parted: that is more than a quarter of"), std::string::npos) << deep.err;
 }

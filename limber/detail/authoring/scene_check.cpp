@@ -11,6 +11,7 @@
 #include "core/progress.h"
 #include "core/threads.h"
 #include "fem/observe.h"
+#include "fem/parting.h"
 #include "limber/detail/authoring/scene_facts.h"
 #include "limber/detail/film/frame_list.h"
 #include "limber/detail/film/shot.h"
@@ -131,6 +132,7 @@ class Check {
       const SurfaceMesh& surface = loaded->model.surface;
       placed.emplace_back(shapes.emplace_back(surface.positions, surface.triangles), surface.positions);
     }
+    const auto size_of = [&](std::size_t b) { return box_of(int(b)).size().maxCoeff(); };
     struct Pair {
       std::size_t one, other;
       double depth_m = 0, gap_m = 0;
@@ -153,7 +155,16 @@ class Check {
       if (pair.depth_m > 0) {
         found.depth_m = pair.depth_m, found.of_robot_size = pair.depth_m / robot_size_m_;
         found.parted = !cages && scene_.part_overlaps && pair.depth_m > allowed_m;
-        if (pair.depth_m > allowed_m && !*found.parted)
+        const std::size_t smaller = size_of(pair.one) < size_of(pair.other) ? pair.one : pair.other;
+        if (*found.parted && pair.depth_m > fem::deepest_parted_share * size_of(smaller)) {
+          found.parted = false;
+          found_.problems.push_back(
+              fmt::format("{}: bodies {} and {} overlap at the start, {:.3g} m deep, which is more than a "
+                          "quarter of {}'s "
+                          "size, {:.3g} m, and too deep to be parted; move them apart",
+                          scene_.bodies[pair.other].where, found.body, found.other, pair.depth_m,
+                          name(smaller), size_of(smaller)));
+        } else if (pair.depth_m > allowed_m && !*found.parted)
           found_.problems.push_back(
               fmt::format("{}: bodies {} and {} overlap at the start, {:.3g} m deep ({:.3g} % of the robot's "
                           "size; {:.3g} m are let pass); move them apart",

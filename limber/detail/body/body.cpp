@@ -148,6 +148,7 @@ BodyReport prepare_body(const BodySource& source, const PrepareSettings& setting
     if (store) store->keep(key, folder, *report);
     return *std::move(report);
   }
+  const bool was_there = fs::exists(folder);
   std::optional<FolderLock> lock;
   if (store && store->has(key)) {
     make_folder(folder);
@@ -175,6 +176,9 @@ BodyReport prepare_body(const BodySource& source, const PrepareSettings& setting
   const WholeBody body = make_body(source, settings, [&](const char* stage) { costs.end_stage(stage); });
   make_folder(folder);  // not before: a model that is refused leaves all as it was
   if (!lock) lock.emplace(folder, FolderLock::alone);
+  if (!was_there && fs::exists(folder / "report.json"))
+    throw InputError(fmt::format("{}: another limber has made a body there meanwhile; name another with -o",
+                                 folder.string()));
   Json told = write_body(body, source, settings, folder).json;
   costs.end_stage("write");
   if (aid.is_alone) {
@@ -223,8 +227,9 @@ PreparedBody read_body(const fs::path& folder) {
     }
     body.gradients = node_gradients(body.cage);
   } catch (const InputError& error) {
-    throw InputError(fmt::format(
-        "{}; make the body anew with limber prepare, or the scene's bodies with limber plan", error.what()));
+    throw InputError(
+        fmt::format("{}; remove {} and make the body anew, by limber prepare or the scene's plan",
+                    error.what(), folder.string()));
   }
   return body;
 }

@@ -260,12 +260,13 @@ Found make_better(const scenes::Scene& scene, const FemSystem& system, const Pla
 }
 
 KeptPlan plan(const PlanOptions& options, const scenes::Scene& scene) {
+  const std::optional<OtherMotion> other = read_other_motion(options.from, options.frame);
   make_folder(options.out);
   remove_abandoned(options.out);
   const std::vector<PreparedBody> bodies =
       prepare_bodies(scene, options.scene.data, options.out, options.scene.store, options.from);
   const fem::World world = build_world_in(options.out, scene, bodies);
-  const Beginning beginning = beginning_of(options.from, options.frame, options.out, scene, world);
+  const Beginning beginning = beginning_of(other, options.out, scene, world);
   const FemSystem system(world, bodies, goal_rules_of(scene), beginning.start);
   const fs::path file = options.out / "plan.npz";
   if (options.portfolio > 1 && (options.resume || options.stats))

@@ -61,16 +61,33 @@ void require_options(const SimulateOptions& options) {
 
 }  // namespace
 
-Beginning beginning_of(const fs::path& from, std::optional<int> frame, const fs::path& out,
-                       const scenes::Scene& scene, const fem::World& world) {
+namespace {
+
+void require_frame(const fs::path& folder, const PlanFolder& other, int frame) {
+  const std::size_t frames = other.plan.trajectory.frames.size();
+  if (frame < 0 || std::size_t(frame) >= frames)
+    throw InputError(fmt::format("{}: frame {}: there is none; its frames are 0 … {}", folder.string(), frame,
+                                 frames - 1));
+}
+
+}  // namespace
+
+std::optional<OtherMotion> read_other_motion(const fs::path& from, std::optional<int> frame) {
   if (frame && from.empty())
     throw InputError("--frame goes with --from DIR: it is a frame of the motion in that folder");
-  if (from.empty()) return {};
-  const PlanFolder other = read_plan_folder(from);
-  const int chosen = frame.value_or(int(other.plan.trajectory.frames.size()) - 1);
-  return {start_from(from, other, chosen, scene, world),
-          BeginningTold{fs::relative(from, out).generic_string(), chosen,
-                        hex(plan::hash_of(other.plan.trajectory))}};
+  if (from.empty()) return std::nullopt;
+  OtherMotion other{from, read_plan_folder(from), 0};
+  other.frame = frame.value_or(int(other.planned.plan.trajectory.frames.size()) - 1);
+  require_frame(from, other.planned, other.frame);
+  return other;
+}
+
+Beginning beginning_of(const std::optional<OtherMotion>& other, const fs::path& out,
+                       const scenes::Scene& scene, const fem::World& world) {
+  if (!other) return {};
+  return {start_from(other->folder, other->planned, other->frame, scene, world),
+          BeginningTold{fs::relative(other->folder, out).generic_string(), other->frame,
+                        hex(plan::hash_of(other->planned.plan.trajectory))}};
 }
 
 void require_other_folder(const fs::path& from, const fs::path& out) {
@@ -82,10 +99,8 @@ void require_other_folder(const fs::path& from, const fs::path& out) {
 State start_from(const fs::path& folder, const PlanFolder& other, int frame, const scenes::Scene& scene,
                  const fem::World& world) {
   const std::string what = fmt::format("{}: frame {}", folder.string(), frame);
-  const std::vector<State>& frames = other.plan.trajectory.frames;
-  if (frame < 0 || frame >= int(frames.size()))
-    throw InputError(fmt::format("{}: there is none; its frames are 0 … {}", what, frames.size() - 1));
-  const State& there = frames[std::size_t(frame)];
+  require_frame(folder, other, frame);
+  const State& there = other.plan.trajectory.frames[std::size_t(frame)];
   const fem::World world_there = read_world_of(other, folder).world;
   require_bodies_of(world_there, world, what);
   State start = fem::start_state(world);
@@ -118,6 +133,7 @@ KeptPlan simulate(const SimulateOptions& options) {
   require_other_folder(options.from, options.out);
   const scenes::Scene scene =
       scenes::read_scene_file(scenes::find_scene(options.scene.scene), options.scene.sets, options.script);
+  const std::optional<OtherMotion> other = read_other_motion(options.from, options.frame);
   make_folder(options.out);
   const FolderLock lock(options.out, FolderLock::alone);
   remove_abandoned(options.out);
@@ -125,7 +141,7 @@ KeptPlan simulate(const SimulateOptions& options) {
       prepare_bodies(scene, options.scene.data, options.out, options.scene.store,
                      options.from.empty() ? options.follow : options.from);
   const fem::World world = build_world_in(options.out, scene, bodies);
-  const Beginning beginning = beginning_of(options.from, options.frame, options.out, scene, world);
+  const Beginning beginning = beginning_of(other, options.out, scene, world);
   const FemSystem system(world, {}, beginning.start);
   std::optional<FollowedPlan> followed;
   if (!options.follow.empty()) followed.emplace(options.follow, scene, world);

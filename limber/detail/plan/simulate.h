@@ -20,9 +20,17 @@ struct Beginning {
   std::optional<State> start;         // nothing: the scene's
   std::optional<BeginningTold> from;  // what the summary tells of it; nothing likewise
 };
-// `from` may be empty, then there is no frame; the summary is of a motion in `out`. Throws as start_from.
-Beginning beginning_of(const fs::path& from, std::optional<int> frame, const fs::path& out,
-                       const scenes::Scene&, const fem::World&);
+// The motion that another begins from, and which of its frames: without a number the last. Nothing where
+// `from` is empty; then there is no frame either. Throws InputError.
+struct OtherMotion {
+  fs::path folder;
+  PlanFolder planned;
+  int frame;
+};
+std::optional<OtherMotion> read_other_motion(const fs::path& from, std::optional<int> frame);
+// The summary is of a motion in `out`. Throws as start_from.
+Beginning beginning_of(const std::optional<OtherMotion>&, const fs::path& out, const scenes::Scene&,
+                       const fem::World&);
 // Throws InputError where they are one: what begins there would write over it.
 void require_other_folder(const fs::path& from, const fs::path& out);
 

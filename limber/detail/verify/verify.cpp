@@ -2,6 +2,8 @@
 
 #include <fmt/ranges.h>
 
+#include <algorithm>
+
 #include "core/error.h"
 #include "core/hash.h"
 #include "core/json_text.h"
@@ -29,7 +31,11 @@ void check_bodies(const fs::path& folder, const scenes::Scene& scene, const std:
     const ProgressOf progress(body.name);
     const Origin origin = origin_of(scene, body, data, bodies[b]);
     check_origin(body.name, origin, is_trusted, of_body[b]);
-    check_body(body.name, bodies[b], body_folder(folder, body), origin.made_cage, depth.remake, of_body[b]);
+    const bool hangs_on_shells =
+        std::any_of(body.parts.begin(), body.parts.end(),
+                    [](const scenes::PartSpec& part) { return part.shell.has_value(); });
+    check_body(body.name, bodies[b], body_folder(folder, body), origin.made_cage,
+               depth.remake || hangs_on_shells, of_body[b]);
   });
   for (Promises& of_one : of_body) table.add(std::move(of_one));
 }

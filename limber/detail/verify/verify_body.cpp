@@ -280,7 +280,11 @@ Json check_making(const std::string& name, const PreparedBody& body, const Prepa
   const double size = bounding_box(body.surface.positions).diagonal();
   const BodyReport::Shells& said = body.report.shells.value();
   MadeBody made;
-  if (shells_too || body.surface.triangles.rows() <= small_triangles || tells_of_bare_parts(said)) {
+  // Where cutting stopped before, only cutting tells that it did.
+  const bool are_as_many_as_asked =
+      !settings.exact && int(shells.size()) == settings.shells && said.stopped_by == "count";
+  if (shells_too || body.surface.triangles.rows() <= small_triangles || tells_of_bare_parts(said) ||
+      !are_as_many_as_asked) {
     throw_if_stopped();
     made.decomposition = make_shells(body.surface, settings);
     table.row(name + ": shells made again from the surface: the same",
