@@ -312,8 +312,9 @@ Real Friction<Real>::step_of(WallNode& node) {
   return std::sqrt(change2) / node.most;
 }
 
-// Changes the velocities by all impulses as they are, and returns the kinetic energy that this gives or,
-// below 0, takes: p·u + ½ p·Wp of each in its turn, u before it and W the inverse mass along it.
+// Changes the velocities by all impulses that sweeps find, as they are, and returns the kinetic energy that
+// this gives or, below 0, takes: p·u + ½ p·Wp of each in its turn, u before it and W the inverse mass along
+// it.
 template <class Real>
 Real Friction<Real>::energy_by_impulses() {
   Real energy = 0;
@@ -328,6 +329,7 @@ Real Friction<Real>::energy_by_impulses() {
     apply(slip, slip.impulse);
   }
   for (const WallNode& node : wall_nodes_) {
+    if (!node.meets_others) continue;  // solved at once
     Velocity& velocity = velocities_[std::size_t(node.slot)];
     const Real inverse_mass = tables_.inverse_mass[slots_[std::size_t(node.slot)].node];
     for (int c = 0; c < 3; ++c) {
@@ -348,12 +350,12 @@ void Friction<Real>::add_forces(const LaneView<Real>& view, const std::vector<co
   predict(view, pushes);
   if (!limited_) limit_wall_nodes(), limited_ = true;  // once for all substeps
   if (goes_on_ && energy_by_impulses() > 0) predict(view, pushes), goes_on_ = false;
-  if (!goes_on_) {
+  if (!goes_on_)
     for (Slip& slip : slips_) std::fill_n(slip.impulse, 3, Real(0));
-    for (WallNode& node : wall_nodes_) std::fill_n(node.impulse, 3, Real(0));
-  }
-  for (WallNode& node : wall_nodes_)
+  for (WallNode& node : wall_nodes_) {
+    if (!goes_on_ || !node.meets_others) std::fill_n(node.impulse, 3, Real(0));
     if (!node.meets_others) step_of(node);
+  }
   const int sweeps = goes_on_ ? max_sweeps_going_on : max_sweeps;
   goes_on_ = true;
   for (int sweep = 0; sweep < sweeps; ++sweep) {
