@@ -154,7 +154,7 @@ void PendingFile::commit() {
 void make_folder(const fs::path& folder) {
   std::error_code error;
   fs::create_directories(folder, error);
-  if (error == std::errc::not_a_directory || (fs::exists(folder) && !fs::is_directory(folder)))
+  if (error == std::errc::not_a_directory)
     throw DiskError(fmt::format("{}: is a file, or within one, not a folder; name another", folder.string()));
   if (error) throw DiskError(fmt::format("{}: cannot be made: {}", folder.string(), error.message()));
   if (::access(folder.c_str(), W_OK) != 0) throw_disk_error(folder, "getting permission to write into it");

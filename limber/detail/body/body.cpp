@@ -176,9 +176,11 @@ BodyReport prepare_body(const BodySource& source, const PrepareSettings& setting
   const WholeBody body = make_body(source, settings, [&](const char* stage) { costs.end_stage(stage); });
   make_folder(folder);  // not before: a model that is refused leaves all as it was
   if (!lock) lock.emplace(folder, FolderLock::alone);
-  if (!was_there && fs::exists(folder / "report.json"))
+  if (!was_there && fs::exists(folder / "report.json")) {
+    if (std::optional<BodyReport> report = up_to_date_report(folder, input)) return *std::move(report);
     throw InputError(fmt::format("{}: another limber has made a body there meanwhile; name another with -o",
                                  folder.string()));
+  }
   Json told = write_body(body, source, settings, folder).json;
   costs.end_stage("write");
   if (aid.is_alone) {

@@ -59,10 +59,6 @@ void require_options(const SimulateOptions& options) {
                                  options.out.string()));
 }
 
-}  // namespace
-
-namespace {
-
 void require_frame(const fs::path& folder, const PlanFolder& other, int frame) {
   const std::size_t frames = other.plan.trajectory.frames.size();
   if (frame < 0 || std::size_t(frame) >= frames)
