@@ -260,7 +260,9 @@ Json json_of(const Costs& costs) {
 
 void run(const System& system, const Settings& settings, std::span<ControlRollout> courses,
          const ControlRolloutOptions& options) {
-  const std::size_t lanes = std::size_t(std::max(1, system.lanes()));
+  const std::size_t threads = std::size_t(thread_count());
+  const std::size_t lanes = std::min(std::size_t(std::max(1, system.lanes())),
+                                     std::max<std::size_t>(1, (courses.size() + threads - 1) / threads));
   const std::size_t batches = (courses.size() + lanes - 1) / lanes;
   const auto run_one = [&](int b) {
     const std::size_t first = std::size_t(b) * lanes;

@@ -401,45 +401,54 @@ class Search {
   // Of the state to which `control` leads from `parent`, at `place`. Throws Interrupted.
   // A node solves the leg where three things hold: it lies in the goal, the robot comes to rest there, and
   // every frame of the way from the leg's root, rest included, may be shown (System::first_refused, too dear
-  // to ask of every state). The way is run again, now with its frames; it must pass through the tree's states
-  // to the bit.
+  // to ask of every state). The way's edges are run again, now with their frames; each must end in the tree's
+  // next state to the bit.
   Arrival arrival_of(const State& state, const Vec3& place, int parent, const Control& control) const {
     if (!holds(settings_.goal, place)) return {};
-    ControlRollout settle, way;
+    ControlRollout settle;
     settle.from = state;
     plan::run(system_, settings_, {&settle, 1}, {.keep_frames = true, .stoppable = true});
     if (settle.result != ControlRollout::rests_in_goal) return {};
     const Tree& tree = plan_.tree;
     const int root = plan_.legs.back().root;
-    std::vector<int> path;  // from the root, which is not in it, to the parent
+    std::vector<int> path;  // from the root to the parent
     for (int node = parent; node != root; node = tree.parents[std::size_t(node)]) path.push_back(node);
+    path.push_back(root);
     std::reverse(path.begin(), path.end());
-    way.from = tree.states[std::size_t(root)];
-    for (const int node : path) way.controls.push_back(tree.controls[std::size_t(node)]);
-    way.controls.push_back(control);
-    plan::run(system_, settings_, {&way, 1},
+    // Edges begin in states that are known, so all are run side by side.
+    std::vector<ControlRollout> edges(path.size());
+    for (std::size_t i = 0; i < path.size(); ++i) {
+      edges[i].from = tree.states[std::size_t(path[i])];
+      edges[i].controls = {i + 1 < path.size() ? tree.controls[std::size_t(path[i + 1])] : control};
+    }
+    plan::run(system_, settings_, edges,
               {.settle = ControlRolloutOptions::never,
                .keep_frames = true,
                .ask_acceptable = false,
                .stoppable = true});
-    LIMBER_CHECK(way.states.size() == path.size() + 1 && way.end == state, way.states.size(), path.size());
-    for (std::size_t i = 0; i < path.size(); ++i)
-      LIMBER_CHECK(way.states[i] == tree.states[std::size_t(path[i])], i, way.states[i].step);
-
-    Trajectory whole{std::move(way.controls), settle.settle_steps, settings_.frames_per_second,
-                     std::move(way.frames), std::move(settle.end)};
+    Trajectory whole{{}, settle.settle_steps, settings_.frames_per_second, {}, std::move(settle.end)};
+    const auto append = [&](std::vector<State>& frames, std::int64_t after_step) {
+      for (State& frame : frames)
+        if (frame.step > after_step) whole.frames.push_back(std::move(frame));
+    };
+    whole.frames = std::move(edges[0].frames);
+    for (std::size_t i = 0; i < edges.size(); ++i) {
+      LIMBER_CHECK(edges[i].end == (i + 1 < path.size() ? edges[i + 1].from : state), i, edges[i].end.step);
+      whole.controls.push_back(edges[i].controls[0]);
+      if (i > 0) append(edges[i].frames, edges[i].from.step);
+    }
     if (settle.settle_steps > 0) whole.controls.push_back(settle_control(settings_, settle.settle_steps));
-    for (State& frame : settle.frames)
-      if (frame.step > state.step) whole.frames.push_back(std::move(frame));
+    append(settle.frames, state.step);
     // The root's own frame is of the leg before.
     const auto own = std::find_if(whole.frames.begin(), whole.frames.end(),
-                                  [&](const State& frame) { return frame.step > way.from.step; });
+                                  [&](const State& frame) { return frame.step > edges[0].from.step; });
     const std::span<const State> frames(own, whole.frames.end());
     const std::size_t first = system_.first_refused(frames);
     if (first == frames.size()) return {Arrival::rests, 0, std::move(whole)};
-    const auto there = std::find_if(way.states.begin(), way.states.end() - 1,
-                                    [&](const State& end) { return end.step >= frames[first].step; });
-    return {Arrival::refused, int(there - way.states.begin()), {}};
+    const auto there = std::find_if(edges.begin(), edges.end() - 1, [&](const ControlRollout& edge) {
+      return edge.end.step >= frames[first].step;
+    });
+    return {Arrival::refused, int(there - edges.begin()), {}};
   }
 
   // Nothing grows any more from the way to `node` after so many edges: neither from the node behind the edge
