@@ -260,7 +260,7 @@ struct CameraSpec {
   std::vector<Keyframe> keyframes;  // none: framed automatically from `direction`
   double turn_deg = 0;              // over the film, round the target, counter-clockwise from above
   int follow = -1;                  // index of the body that it goes along with; −1: none
-  int subject = -1;                 // index of the body whose motion is framed; −1: all
+  std::vector<int> subjects;        // indices of the bodies whose motion is framed; none: all
   double fill = 0;                  // share of the picture that what is framed takes up, one way or the other
 };
 

@@ -34,7 +34,10 @@ CameraSpec read_camera(const Node& table, const Scene& scene, const std::string&
   camera.fill = number(table, "fill");
   if (const Node* follow = table.find("follow")) camera.follow = body_called(*follow, scene, "follow");
   if (const Node* subject = table.find("subject")) {
-    camera.subject = body_called(*subject, scene, "subject");
+    if (const Array* bodies = subject->array())
+      for (const Node& body : *bodies) camera.subjects.push_back(body_called(body, scene, "subject"));
+    else
+      camera.subjects = {body_called(*subject, scene, "subject")};
     if (camera.follow >= 0 || !camera.keyframes.empty())
       complain(*subject, "a camera with follow or keyframes frames no subject; remove one of them");
   }

@@ -761,7 +761,7 @@ constexpr Key all_keys[] = {
      ""},
     {"planner.lag", Type::integer, from_to(0, 65535), 0, "0",
      "an expansion knows the nodes of all expansions but so many before it, which are computed beside it", "",
-     "7"},
+     "3"},
     {"planner.metric",
      Type::choice,
      {},
@@ -842,11 +842,11 @@ constexpr Key all_keys[] = {
      "",
      ""},
     {"camera.subject",
-     Type::text,
+     Type::bodies,
      {},
      0,
      may_lack,
-     "name of a body: its motion is framed, and not that of all; without follow and keyframes",
+     "a body, or a list of bodies: their motion is framed, and not that of all; without follow and keyframes",
      "",
      ""},
     {"camera.fill",
@@ -881,7 +881,7 @@ constexpr Key all_keys[] = {
     {"cameras[].keyframes[].target_m", Type::vector, any, 3, required, "m", "", ""},
     {"cameras[].turn_deg", Type::number, any, 0, "0.0", "degrees", "", ""},
     {"cameras[].follow", Type::text, {}, 0, may_lack, "name of a body", "", ""},
-    {"cameras[].subject", Type::text, {}, 0, may_lack, "name of a body", "", ""},
+    {"cameras[].subject", Type::bodies, {}, 0, may_lack, "as of `camera`", "", ""},
     {"cameras[].fill", Type::number, {0.01, 1}, 0, "0.88", "as of `camera`", "", ""},
 
     {"film", Type::table, {}, 0, "{}", "what is rendered", "", ""},
@@ -1266,6 +1266,12 @@ void check_names(const Key& key, const std::string& shown, const Node& node) {
     checked_text(key, fmt::format("{}[{}]", shown, i), (*elements)[i]);
 }
 
+void check_bodies(const Key& key, const std::string& shown, const Node& node) {
+  if (std::holds_alternative<std::string>(node.value)) return;
+  check_names(key, shown, node);
+  if (node.array()->empty()) complain(node.where, fmt::format("{} names no body; it must name one", shown));
+}
+
 void check_labels(const Key& key, const std::string& shown, const Node& node) {
   if (std::holds_alternative<bool>(node.value)) return;
   if (!node.table()) return check_names(key, shown, node);
@@ -1322,6 +1328,8 @@ void check_value(const Key& key, const std::string& shown, Node& node, const Com
       return check_fixed(key, shown, node, complaints);
     case Type::names:
       return check_names(key, shown, node);
+    case Type::bodies:
+      return check_bodies(key, shown, node);
     case Type::labels:
       return check_labels(key, shown, node);
     case Type::table:
@@ -1446,6 +1454,8 @@ std::string Key::expected() const {
       return "\"walls\", or a list of \"walls\" and { box_m = [[x, y, z], [x, y, z]] }";
     case Type::names:
       return "a list of texts";
+    case Type::bodies:
+      return "a body, or a list of bodies";
     case Type::labels:
       return "true or false, a list of bodies, or a table BODY = \"name\"";
     case Type::table:
@@ -1466,6 +1476,7 @@ std::string Key::example() const {
     const double inside = std::clamp(1.0, interval.lower, interval.upper);
     switch (type) {
       case Type::text:
+      case Type::bodies:
         return "\"…\"";
       case Type::name:
         return "\"robot\"";

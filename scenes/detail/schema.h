@@ -31,6 +31,7 @@ enum class Type {
   color,
   fixed,
   names,   // a list of texts
+  bodies,  // a text, or a list of texts
   labels,  // true or false, a list of texts, or a table of texts
   table,
   tables

@@ -219,23 +219,28 @@ TEST_F(Filmed_slow, PassesAgreeWithOneAnother) {
   EXPECT_NEAR(key.at("light").at("ground_m"), 0, 1e-12);
 }
 
+// The robot, then robot and block together.
 TEST_F(Filmed_slow, TheSubjectFillsItsShareOfThePicture) {
-  ASSERT_EQ(limber_program({"render", out(), "--as", "try", "--passes", "object", "--set",
-                            "camera.subject=robot", "--set", "camera.fill=0.6", "--set",
-                            "camera.direction=[0,0,1]", "--set", "film.bounds_lines=false"})
-                .code,
-            exit_done);
-  int left = 1 << 20, right = -1, top = 1 << 20, bottom = -1, width = 0, height = 0;
-  for (int f = 0; f < frames; ++f) {
-    const render::Raster16 object = render::read_png_16(picture(fmt::format("{:04}.object.png", f)));
-    width = object.width, height = object.height;
-    for (int y = 0; y < height; ++y)
-      for (int x = 0; x < width; ++x)
-        if (object.levels[std::size_t(y) * std::size_t(width) + std::size_t(x)] == 257)
-          left = std::min(left, x), right = std::max(right, x + 1), top = std::min(top, y),
-          bottom = std::max(bottom, y + 1);
+  for (const bool both : {false, true}) {
+    ASSERT_EQ(limber_program({"render", out(), "--as", "try", "--passes", "object", "--set",
+                              both ? "camera.subject=['robot', 'block']" : "camera.subject=robot", "--set",
+                              "camera.fill=0.6", "--set", "camera.direction=[0,0,1]", "--set",
+                              "film.bounds_lines=false"})
+                  .code,
+              exit_done);
+    int left = 1 << 20, right = -1, top = 1 << 20, bottom = -1, width = 0, height = 0;
+    for (int f = 0; f < frames; ++f) {
+      const render::Raster16 object = render::read_png_16(picture(fmt::format("{:04}.object.png", f)));
+      width = object.width, height = object.height;
+      for (int y = 0; y < height; ++y)
+        for (int x = 0; x < width; ++x)
+          if (const int level = object.levels[std::size_t(y) * std::size_t(width) + std::size_t(x)];
+              level == 257 || (both && level == 514))
+            left = std::min(left, x), right = std::max(right, x + 1), top = std::min(top, y),
+            bottom = std::max(bottom, y + 1);
+    }
+    EXPECT_NEAR(std::max(double(right - left) / width, double(bottom - top) / height), 0.6, 0.01);
   }
-  EXPECT_NEAR(std::max(double(right - left) / width, double(bottom - top) / height), 0.6, 0.01);
   EXPECT_THAT(limber_program({"render", out(), "--set", "camera.subject=robt"}).err,
               HasSubstr("robot, block"));
 }

@@ -360,7 +360,7 @@ const std::vector<Row> rows{
     {"planner.settle_time_s", "planner.settle_time_s=2", search},
     {"planner.settle_speed_m_s", "planner.settle_speed_m_s=0.03", search},
     {"planner.settle_force_share", "planner.settle_force_share=0.5", search},
-    {"planner.lag", "planner.lag=3", search},
+    {"planner.lag", "planner.lag=5", search},
     {"planner.metric", "planner.metric=distance", search},
     {"planner.time_weight", "planner.time_weight=0.5", search},
     {"planner.guidance", "planner.guidance=0.5", search},

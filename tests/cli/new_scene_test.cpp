@@ -76,7 +76,7 @@ TEST_F(NewScene, OrgansAreInTheirPlacesAndRoles) {
   // One and a half lengths of the heart to the front of the middle of its cage.
   EXPECT_LT((scene.goal.center_of_mass_m - Vec3(0.12, 0, 1)).norm(), 0.005);
   ASSERT_EQ(scene.cameras.size(), 4u);
-  EXPECT_EQ(scene.cameras[0].subject, scene.robot);
+  EXPECT_EQ(scene.cameras[0].subjects, std::vector<int>{scene.robot});
   EXPECT_LT(scene.cameras[0].fill, 0.6);
 }
 

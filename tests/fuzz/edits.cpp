@@ -481,9 +481,10 @@ std::string value_for(const scenes::Key& key, const std::vector<std::string>& bo
     case Type::fixed:
       return script.below(2) == 0 ? "walls" : fmt::format("[{{ box_m = {} }}]", box_for(key, script));
     case Type::names:
+    case Type::bodies:
     case Type::labels: {
       const std::string& body = bodies[std::size_t(script.below(int(bodies.size())))];
-      if (key.type == Type::names || script.below(3) == 0) return fmt::format("[\"{}\"]", body);
+      if (key.type != Type::labels || script.below(3) == 0) return fmt::format("[\"{}\"]", body);
       return script.below(2) == 0 ? "true" : fmt::format("{{ {} = \"{}\" }}", body, script.word());
     }
     case Type::choice: {

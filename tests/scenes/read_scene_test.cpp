@@ -346,6 +346,8 @@ TEST(ReadScene, ComplainsWithLineAndColumn) {
       {"max_force_n = 500", "max_force_n = 500\nseed = 9007199254740993", "9007199254740993",
        "out of its range; it must be ≥ 0 and ≤ 9007199254740991"},
       {"follow = \"gate\"", "follow = \"gate\"\nsubject = \"gate\"", "\"gate\"\nkey", "frames no subject"},
+      {"follow = \"gate\"", "subject = [\"gate\", \"robt\"]", "\"robt\"", "not scenery: robot, gate"},
+      {"follow = \"gate\"", "subject = []", "[]", "names no body"},
       {"follow = \"gate\"", "follow = \"robt\"", "\"robt\"", "a body that is not scenery: robot, gate"},
       {"role = \"obstacle\"", "triangles = 500\nrole = \"obstacle\"", "500",
        "bodies.gate is not scenery, so its surface is kept vertex by vertex; remove triangles"},
@@ -1052,7 +1054,7 @@ std::string all_of(const Scene& s) {
   for (const Box& patch : p.patches_m) t += b(patch);
   for (const CameraSpec& c : s.cameras) {
     t += fmt::format("{} {} {} {} {}", c.name, v(c.direction), c.fov_deg, c.turn_deg, c.follow);
-    t += fmt::format(" {} {}", c.subject, c.fill);
+    t += fmt::format(" {} {}", fmt::join(c.subjects, " "), c.fill);
     for (const Keyframe& k : c.keyframes) t += fmt::format(" {} {} {}", k.at, v(k.eye_m), v(k.target_m));
   }
   const FilmSpec& f = s.film;

@@ -322,6 +322,9 @@ std::string camera_text(const char* header, const Vec3& direction, const std::st
 std::string subject_text(const std::string& name, double fill) {
   return fmt::format("subject = \"{}\"\nfill = {:g}\n", name, fill);
 }
+std::string subject_text(const std::string& tool, const std::string& organ, double fill) {
+  return fmt::format("subject = [\"{}\", \"{}\"]\nfill = {:g}\n", tool, organ, fill);
+}
 
 // Of all organs, then to the one it is about, round that, and back.
 std::string tour_text(const std::vector<Organ>& organs, const Organ& about, double scale) {
@@ -483,8 +486,8 @@ std::string scene_text(const std::vector<Organ>& organs, const NewSceneOptions& 
   text += camera_text("[[cameras]]\nname = \"side\"", views.side,
                       tool ? subject_text(robot.name, 0.35) : subject_text(robot.name, 0.45));
   // A balloon is seen from beside.
-  text += kind == &balloon
-              ? camera_text("[[cameras]]\nname = \"near\"", views.side, subject_text(kind->name, 0.7))
+  text += kind == &balloon ? camera_text("[[cameras]]\nname = \"near\"", views.side,
+                                         subject_text(kind->name, robot.name, 0.8))
           : tool ? camera_text("[[cameras]]\nname = \"near\"", views.best, subject_text(robot.name, 0.65))
                  : camera_text("[[cameras]]\nname = \"follow\"", views.best,
                                fmt::format("follow = \"{}\"\n", robot.name));

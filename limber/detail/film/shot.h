@@ -127,8 +127,9 @@ class Shot {
   };
   render::Camera camera_of(int frame) const;
   Box box_of_motion() const;
-  // What the camera is to hold: of the subject, or of all bodies (−1) and the bounds where they are drawn.
-  Points outline_of_motion(int subject) const;
+  // What the camera is to hold: of the subjects, or, if there are none, of all bodies and the bounds where
+  // they are drawn.
+  Points outline_of_motion(const std::vector<int>& subjects) const;
   void lay_out_camera(double aspect);
   void check() const;
   void place_words();

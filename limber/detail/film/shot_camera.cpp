@@ -43,11 +43,11 @@ void stand_upright(std::vector<render::CameraKey>& path) {
 
 // The outermost vertices at every stored state, and the cages' nodes and the bounds where they are drawn. A
 // body that stands still counts once.
-Points Shot::outline_of_motion(int subject) const {
+Points Shot::outline_of_motion(const std::vector<int>& subjects) const {
   std::vector<Vec3> points;
   const bool cages = scene_.film.cages || scene_.film.side_by_side;
   for (std::size_t b = 0; b < bodies_.size(); ++b) {
-    if (subject >= 0 && int(b) != subject) continue;
+    if (!subjects.empty() && std::count(subjects.begin(), subjects.end(), int(b)) == 0) continue;
     const PreparedBody& body = bodies_[b];
     const ffd::Binding part = outermost_part(body);
     Points places;
@@ -59,7 +59,7 @@ Points Shot::outline_of_motion(int subject) const {
       if (!world_.bodies[b].moving) break;
     }
   }
-  if (scene_.film.bounds_lines && subject < 0) {
+  if (scene_.film.bounds_lines && subjects.empty()) {
     const Points edges = render::edges_of(scene_.bounds_m);
     for (Eigen::Index row = 0; row < edges.rows(); ++row) points.push_back(edges.row(row));
   }
@@ -90,7 +90,7 @@ void Shot::lay_out_camera(double aspect) {
     frame(Box{center - reach, center + reach});
   }
   if (!path_.empty()) return;
-  const Points outline = outline_of_motion(camera_->subject);  // a skin is not what the film is about
+  const Points outline = outline_of_motion(camera_->subjects);  // a skin is not what the film is about
   if (camera_->turn_deg == 0)
     frame(outline);
   else

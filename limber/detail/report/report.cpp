@@ -382,11 +382,14 @@ Json motion_meta(const Findings& f, Json bodies) {
   }
   for (const PreparedBody& body : f.bodies) everything.include(bounding_box(body.surface.positions));
   Box shown = everything;
-  const int subject = scene.cameras[0].subject;
-  if (subject >= 0) {
-    shown = bounding_box(f.bodies[std::size_t(subject)].surface.positions);
-    for (const State& state : f.frames())
-      shown.include(bounding_box(fem::body_positions(f.world, state, subject)));
+  const std::vector<int>& subjects = scene.cameras[0].subjects;
+  if (!subjects.empty()) {
+    shown = bounding_box(f.bodies[std::size_t(subjects[0])].surface.positions);
+    for (const int subject : subjects) {
+      shown.include(bounding_box(f.bodies[std::size_t(subject)].surface.positions));
+      for (const State& state : f.frames())
+        shown.include(bounding_box(fem::body_positions(f.world, state, subject)));
+    }
   } else if (scene.film.bounds_lines) {
     shown.include(scene.bounds_m);
   }
