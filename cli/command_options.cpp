@@ -21,6 +21,33 @@ CLI::Validator within(double low, double high) {
       fmt::format("FLOAT in [{:g} - {:g}]", low, high));
 }
 
+CLI::Validator whole_number() {
+  return CLI::Validator(
+      [](std::string& text) {
+        std::uint64_t value = 0;
+        const bool is_whole = CLI::detail::lexical_cast(text, value) && text.front() != '-';
+        return is_whole && value <= std::uint64_t(1) << 53
+                   ? std::string()
+                   : fmt::format("{} is no whole number from 0 to 9007199254740992", text);
+      },
+      "INT in [0 - 2^53]");
+}
+
+CLI::Validator seconds() {
+  const CLI::AsNumberWithUnit units(std::map<std::string, double>{{"s", 1}, {"min", 60}, {"h", 3600}},
+                                    CLI::AsNumberWithUnit::DEFAULT, "s|min|h");
+  return CLI::Validator(
+      [units](std::string& text) {
+        const std::string given = text;
+        try {
+          return units(text);
+        } catch (const CLI::ValidationError&) {
+          return fmt::format("{} is no duration; write 5, 5s, 2min or 1h", given);
+        }
+      },
+      units.get_description());
+}
+
 void add_global(CLI::App& command, GlobalOptions& options) {
   command.add_flag("--json", options.json, "print one JSON document on stdout, and nothing else there");
   command.add_flag("-q,--quiet", options.quiet, "only warnings and errors on stderr; no progress bars");
@@ -117,8 +144,7 @@ void add_limits(CLI::App& command, Options& options) {
   command
       .add_option("--time-limit", options.time_limit_s,
                   "wall time of the search: 30, 30s, 5min or 1h; the best so far is kept; default: none")
-      ->transform(CLI::AsNumberWithUnit(std::map<std::string, double>{{"s", 1}, {"min", 60}, {"h", 3600}},
-                                        CLI::AsNumberWithUnit::DEFAULT, "s|min|h"));
+      ->transform(seconds());
   command
       .add_option("--in-flight", options.in_flight,
                   "expansions computed ahead, 0 … 4096; 0: chosen from threads and lanes. The plan does not "

@@ -25,6 +25,10 @@ struct GlobalOptions {
 
 // CLI::Range, which takes nan.
 CLI::Validator within(double low, double high);
+// Up to 2^53, beyond which JSON has not all.
+CLI::Validator whole_number();
+// A duration with or without its unit, to seconds.
+CLI::Validator seconds();
 // A variable that a farm's script has not set must not mean all.
 CLI::Validator no_empty_list();
 CLI::Validator no_empty_name();

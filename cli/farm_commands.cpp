@@ -14,7 +14,7 @@ std::vector<CLI::Option*> add_result(CLI::App& command, FarmOptions& options) {
   PlanOptions& plan = options.plan;
   FilmOptions& film = options.film;
   std::vector<CLI::Option*> of_result{
-      command.add_option("--seed", plan.seed, "as of limber plan, 0 … 2^53")->check(within(0.0, 0x1p53)),
+      command.add_option("--seed", plan.seed, "as of limber plan, 0 … 2^53")->check(whole_number()),
       command
           .add_option("--portfolio", plan.portfolio,
                       "this many searches, with the seed and those after it, 2 … 1000, a unit each; the one "

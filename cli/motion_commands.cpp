@@ -32,7 +32,7 @@ void add_plan(CLI::App& command, PlanOptions& options) {
       ->required()
       ->type_name("DIR");
   command.add_option("--seed", options.seed, "seed of the random numbers, 0 … 2^53; default: the scene's")
-      ->check(within(0.0, 0x1p53));
+      ->check(whole_number());
   command
       .add_option("--portfolio", options.portfolio,
                   "this many searches in turns, with the seed and those after it, 2 … 1000; the one with the "
@@ -59,8 +59,7 @@ void add_simulate(CLI::App& command, SimulateOptions& options) {
       .add_option("--duration", options.duration_s,
                   "how long, from its start: 5, 5s, 2min or 1h; default: 5s, or as long as the plan that is "
                   "followed")
-      ->transform(CLI::AsNumberWithUnit(std::map<std::string, double>{{"s", 1}, {"min", 60}, {"h", 3600}},
-                                        CLI::AsNumberWithUnit::DEFAULT, "s|min|h"));
+      ->transform(seconds());
   command
       .add_option("--follow", options.follow,
                   "push the robot along the path of the plan in this folder, by feedback, with no more than "

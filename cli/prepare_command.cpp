@@ -90,8 +90,7 @@ std::vector<CLI::Option*> add_model_limits(CLI::App& command, BatchOptions& opti
               "--time-limit", options.time_limit_s,
               "of many models: CPU time that each may take, 1 s … 30 days: 30, 30s, 5min or 1h; by the "
               "clock five times that")
-          ->transform(CLI::AsNumberWithUnit(std::map<std::string, double>{{"s", 1}, {"min", 60}, {"h", 3600}},
-                                            CLI::AsNumberWithUnit::DEFAULT, "s|min|h"))
+          ->transform(seconds())
           ->check(within(1, 30 * 86400.0))
           ->capture_default_str(),
       command

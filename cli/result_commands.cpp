@@ -63,7 +63,7 @@ void DescribedCommands::add_result_commands() {
       ->check(CLI::Range(1, 10000))
       ->capture_default_str();
   robust_command.add_option("--seed", robust_options.seed, "seed of the perturbations, 0 … 2^53")
-      ->check(within(0.0, 0x1p53))
+      ->check(whole_number())
       ->capture_default_str();
   robust_command
       .add_option("--materials", robust_options.material_share,

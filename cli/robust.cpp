@@ -51,7 +51,7 @@ Json json_of(const Tally& tally) {
 std::string text_of(const Tally& tally, const RobustOptions& options, const Robustness& robust) {
   std::string text =
       "  world  end                      from the goal  speed       lasts   volume  stretch      overlap   "
-      "penetration  force    promises\n";
+      "of cages     force    promises\n";
   for (const Fate& f : tally.fates)
     text += fmt::format(
         "  {:5}  {:23}  {:8.3f} m     {:.4f} m/s  {:5.2f} s  {:5.2f} %  {:.2f} … {:.2f}  {:.4f} m  {:.4f} m  "

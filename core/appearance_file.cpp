@@ -122,7 +122,7 @@ Appearance read_appearance(const fs::path& folder, const SurfaceMesh& surface) {
       require_looks(name == name_of_image_file(a, i), folder / name, "is no image of that kind");
     }
   } catch (const Json::exception& trouble) {
-    require_looks(false, path, std::string("meta.json: ") + trouble.what());
+    require_looks(false, path, "meta.json: " + words_of(trouble));
   }
   validate(a, triangles, path.string());
   return a;

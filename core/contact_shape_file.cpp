@@ -130,7 +130,7 @@ ContactShape read_contact_shape(const fs::path& path, const SurfaceMesh& surface
     shape.field = field_of(file, meta);
     require(meta.size() == 7, path, "meta.json has more in it than limber writes");
   } catch (const Json::exception& trouble) {
-    require(false, path, std::string("meta.json: ") + trouble.what());
+    require(false, path, "meta.json: " + words_of(trouble));
   }
   shape.samples = samples_of(file, cage.tets.rows());
   require(!shape.usable || shape.samples.tet_from_sample.size() > 0, path, "it has no samples");

@@ -60,9 +60,9 @@ Json parse_json(const std::string& text, const std::string& what) {
   } catch (const Json::parse_error& error) {
     const auto at = std::min(std::size_t(error.byte), text.size());
     const auto line = 1 + std::count(text.begin(), text.begin() + std::ptrdiff_t(at), '\n');
-    throw InputError(fmt::format("{}:{}: is not valid JSON: {}", what, line, error.what()));
+    throw InputError(fmt::format("{}:{}: is not valid JSON: {}", what, line, words_of(error)));
   } catch (const Json::out_of_range& error) {
-    throw InputError(fmt::format("{}: holds a number that no computer can: {}", what, error.what()));
+    throw InputError(fmt::format("{}: holds a number that no computer can: {}", what, words_of(error)));
   }
 }
 
@@ -71,5 +71,14 @@ std::string text_of(const Json& json, int indent) {
   return json.dump(indent, ' ', false, Json::error_handler_t::replace);
 }
 void write_json(const fs::path& path, const Json& json) { write_file(path, text_of(json, 2) + "\n"); }
+
+// It writes "[json.exception.parse_error.101] parse error at line 1, column 10: syntax error …".
+std::string words_of(const Json::exception& trouble) {
+  const std::string_view all = trouble.what();
+  const auto end = all.starts_with('[') ? all.find("] ") : all.npos;
+  std::string_view words = end == all.npos ? all : all.substr(end + 2);
+  if (words.starts_with("parse error")) words = words.substr(words.find(": ") + 2);
+  return std::string(words);
+}
 
 }  // namespace limber

@@ -17,4 +17,7 @@ Json parse_json(const std::string& text, const std::string& what);
 Json read_json(const fs::path&);
 void write_json(const fs::path&, const Json&);
 
+// What the library says is wrong, without its own numbers of exceptions and places.
+std::string words_of(const Json::exception&);
+
 }  // namespace limber

@@ -62,7 +62,7 @@ Binding read_binding(const fs::path& path, const SurfaceMesh& surface, const Tet
     meta.at("farthest_outside_vertex").get_to(binding.farthest_outside_vertex);
     meta.at("max_outside_distance_m").get_to(binding.max_outside_distance_m);
   } catch (const Json::exception& trouble) {
-    require(false, path, std::string("meta.json: ") + trouble.what());
+    require(false, path, "meta.json: " + words_of(trouble));
   }
   require(binding.outside >= 0 && binding.outside <= vertices, path,
           fmt::format("{} vertices outside are none or more than there are", binding.outside));

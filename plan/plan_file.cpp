@@ -516,7 +516,7 @@ PlanFile read_plan(const fs::path& path) {
     file.given = meta.at("given");
     return file;
   } catch (const Json::exception& trouble) {
-    reader.refuse(std::string("meta.json: ") + trouble.what());
+    reader.refuse("meta.json: " + words_of(trouble));
   }
 }
 

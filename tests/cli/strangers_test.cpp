@@ -284,6 +284,14 @@ TEST_F(Program, AMistypedCommandOrOptionIsNamedWithWhatWasMeant) {
   for (const auto& [words, told] : std::vector<std::pair<std::vector<std::string>, std::string>>{
            {{"render", "x", "--bits", "12"}, "limber: --bits: 12 not in {8,16}; see limber render --help"},
            {{"render", "x", "--passes", "depth,foo"}, "limber: --passes: foo not in"},
+           {{"plan", "x", "-o", "y", "--seed", "1.5"}, "limber: --seed: 1.5 is no whole number from 0 to"},
+           {{"plan", "x", "-o", "y", "--seed", "9007199254740993"}, "limber: --seed: 9007199254740993 is no"},
+           {{"simulate", "x", "-o", "y", "--duration", "nan"},
+            "limber: --duration: nan is no duration; write"},
+           {{"plan", "x", "-o", "y", "--time-limit", "5 days"},
+            "limber: --time-limit: 5 days is no duration"},
+           {{"plan", folder.string(), "-o", "y"},
+            "limber: " + folder.string() + ": a folder without a scene.toml"},
            {{"render", "x", "--as", ""}, "limber: --as: is empty; write a name"}}) {
     const Result result = limber_program(words);
     EXPECT_EQ(result.code, exit_bad_input);

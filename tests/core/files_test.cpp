@@ -208,7 +208,8 @@ TEST(Json, ComplaintNamesTheLine) {
     parse_json("{\n\"a\": 1,\n}", "report.json");
     FAIL();
   } catch (const InputError& error) {
-    EXPECT_NE(std::string(error.what()).find("report.json:3: is not valid JSON"), std::string::npos)
+    EXPECT_NE(std::string(error.what()).find("report.json:3: is not valid JSON: syntax error"),
+              std::string::npos)
         << error.what();
   }
 }

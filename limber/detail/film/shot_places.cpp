@@ -117,11 +117,15 @@ std::array<int, 4> Shot::hidden_by(const std::array<Eigen::Vector4d, 4>& boxes) 
 }
 
 // The corner where they hide least of the bodies over the film; of equals the first. Boxes are those of the
-// longest clock that the film shows. A bar of length is at most a fifth of the width.
+// longest clock that the film shows. A bar of length is at most a fifth of the width, from nearest too.
 void Shot::place_words() {
   const scenes::FilmSpec& film = scene_.film;
   words_.on_dark = look_.ground_srgb.mean() < 0.4;
-  if (film.scale_bar) scale_m_ = round_length_m(0.2 * look_.width / pixels_a_metre(camera_of(0)));
+  if (film.scale_bar) {
+    double nearest = 0;
+    for (int f = 0; f < frames(); ++f) nearest = std::max(nearest, pixels_a_metre(camera_of(f)));
+    scale_m_ = round_length_m(0.2 * look_.width / nearest);
+  }
   std::string clock = clock_at(frames() - 1);  // the longest, of equals the last
   for (int f = 0; f < frames(); ++f)
     if (std::string one = clock_at(f); one.size() > clock.size()) clock = std::move(one);
