@@ -221,6 +221,12 @@ TEST_F(NewScene_slow, FasciaHoldsOrgansInTheirPlaces) {
   EXPECT_LT(at_the_end.at("heart.away_m"), 1e-6) << "nobody pushes it";
   const Result planned = limber_program({"plan", file, "--data", models().string(), "-o", out(), "--json"});
   EXPECT_EQ(planned.code, exit_done) << planned.err;
+  // What a tour is about hangs as the others do, and what is promised is in shares of its size.
+  fs::remove(file);
+  ASSERT_EQ(limber_program(words({"--robot", "lung", "--fascia", "11", "--story", "tour"})).code, exit_done);
+  const scenes::Scene tour = scenes::read_scene_file(file);
+  EXPECT_EQ(tour.bodies[std::size_t(tour.robot)].name, "lung");
+  EXPECT_EQ(tour.bodies[std::size_t(tour.robot)].material.fascia_hz, 11);
 }
 
 // Labels of a scan are apart by their gap, a vein in its tunnel through the liver, too: all stand at their

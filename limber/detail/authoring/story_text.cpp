@@ -29,11 +29,13 @@ std::string vector_text(const Vec3& v) {
 constexpr const char* no_gravity = "gravity_m_s2 = [0, 0, 0]   # whoever leads it bears its weight\n";
 
 std::string body_text(const Organ& organ, const NewSceneOptions& options, double scale) {
-  const bool robot = organ.name == options.robot && organ_moves(options);
+  const bool it = organ.name == options.robot, robot = it && organ_moves(options);
+  // Where none is led, what is promised is in shares of the size of what the tour is about.
+  const bool yardstick = it && options.story == Story::tour && options.fascia_hz > 0 && !organ.bone;
   const Vec3 center = organ.box.center() + organ.way_m;
   std::string text = fmt::format("\n[[bodies]]\nname = \"{}\"\nrole = \"{}\"\n", organ.name,
                                  organ.see_through                      ? "scenery"
-                                 : robot                                ? "robot"
+                                 : robot || yardstick                   ? "robot"
                                  : options.fascia_hz > 0 && !organ.bone ? "free"
                                                                         : "obstacle");
   if (organ.bone && !organ.see_through) text += "kind = \"rigid\"\n";
