@@ -68,7 +68,7 @@ std::string text_of(const Tally& tally, const RobustOptions& options, const Robu
       "  volume       changes by at most {:.2f} %\n"
       "  stretch      within {:.3f} and {:.3f}\n"
       "  surfaces     overlap at most {:.4f} m, in themselves {:.4f} m\n"
-      "  penetration  at most {:.4f} m\n"
+      "  cages        in one another by at most {:.4f} m\n"
       "  force        asked for at most {:.4g} of {:.4g} N; what acted {:.4g} N\n"
       "  promises     all kept in {} of {}\n",
       tally.reached, tally.fates.size(), robust.settles ? "come to rest" : "end",
