@@ -306,7 +306,7 @@ ContactShape make_contact_shape(const SurfaceMesh& surface, const TetMesh& cage,
                                   .max_m = settings.max_spacing * size,
                                   .max_flat_m = settings.max_flat_spacing * size,
                                   .offset_m = offset},
-                                 most);
+                                 most, int(settings.max_tips * most));
       if (samples.empty()) return give_up(no_inside);
     }
     const FieldErrors at_samples = errors(shape.field, samples);

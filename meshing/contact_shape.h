@@ -25,6 +25,7 @@ struct ContactShapeSettings {
   // ends.
   double samples_a_square = 200;
   int fewest_most_samples = 1500, max_samples = 6000;
+  double max_tips = 0.7;  // tips besides, over the most samples
 };
 
 struct ContactShapeReport {

@@ -80,8 +80,9 @@ std::string explain(const Plan& plan) {
   if (statistics.refused > 0)
     text += fmt::format(
         " {} ways to {} were refused: on them surfaces would be seen to overlap, or to press one another "
-        "through air, by more than limber promises.",
-        statistics.refused, goal);
+        "through air, by more than limber promises{}.",
+        statistics.refused, goal,
+        statistics.last_refusal.empty() ? "" : "; on the last, " + statistics.last_refusal);
   return text;
 }
 

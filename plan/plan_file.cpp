@@ -344,6 +344,7 @@ Statistics statistics_from_json(const Reader& reader, const Json& json, int edit
       fmt::format("statistics.iterations is {}; it must be at most {}", s.iterations, iteration_limit));
   s.diverged = count("diverged"), s.rejected = count("rejected");
   if (json.contains("refused")) s.refused = count("refused");  // since edition 2 of the world
+  if (json.contains("last_refusal")) s.last_refusal = json.at("last_refusal").get<std::string>();
   s.rollout_steps = count("rollout_steps");
   if (edition >= first_without_timings) return s;
   s.rollouts = count("rollouts"), s.rollouts_wrong = count("rollouts_wrong");
@@ -354,9 +355,11 @@ Statistics statistics_from_json(const Reader& reader, const Json& json, int edit
 }  // namespace
 
 Json json_of(const Statistics& s) {
-  return {{"iterations", s.iterations}, {"diverged", s.diverged}, {"rejected", s.rejected},
-          {"refused", s.refused},       {"rollouts", s.rollouts}, {"rollouts_wrong", s.rollouts_wrong},
-          {"cpu_s", s.cpu_s},           {"wall_s", s.wall_s},     {"rollout_steps", s.rollout_steps}};
+  Json json{{"iterations", s.iterations}, {"diverged", s.diverged}, {"rejected", s.rejected},
+            {"refused", s.refused},       {"rollouts", s.rollouts}, {"rollouts_wrong", s.rollouts_wrong},
+            {"cpu_s", s.cpu_s},           {"wall_s", s.wall_s},     {"rollout_steps", s.rollout_steps}};
+  if (!s.last_refusal.empty()) json["last_refusal"] = s.last_refusal;
+  return json;
 }
 
 namespace {

@@ -17,6 +17,7 @@ struct Statistics {
   // Of those: no node, System::acceptable said no, or what it grew from was refused meanwhile.
   std::int64_t rejected = 0;
   std::int64_t refused = 0;        // ways to a goal: System::first_refused found one of their frames
+  std::string last_refusal;        // System::why_refused of the last of them
   std::int64_t rollout_steps = 0;  // asked for by those
   // The work really done; varies with threads and in_flight.
   std::int64_t rollouts = 0;        // computed; the surplus over iterations was in vain

@@ -124,6 +124,9 @@ class System {
   // One of a path's frames that must not be shown, though the dynamics lead there; frames.size(): none.
   // Asked of whole ways to a goal alone, for it is dear. Throws Interrupted after a stop signal.
   virtual std::size_t first_refused(std::span<const State> frames) const { return frames.size(); }
+  virtual std::string why_refused(const State&) const {
+    return {};
+  }  // of such a frame: "heart and lung overlap"
   // What else than the place of the robot's centre of mass makes it reach the goal: its turn, its shape, …
   virtual bool goal_holds(const State&) const { return true; }
   // How the robot, a strand led by its end, hangs in the workspace's holes: from its tail to robot_center.

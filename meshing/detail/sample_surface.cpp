@@ -1,5 +1,6 @@
 #include "meshing/detail/sample_surface.h"
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -203,6 +204,22 @@ std::vector<SurfaceSpot> spots_that_stick_out(const SurfaceMesh& surface, const 
   return spots;
 }
 
+// The vertices of what is seen, each with the mean normal of its triangles, by their areas.
+std::vector<SurfaceSpot> seen_vertices(const SurfaceMesh& surface, const std::vector<char>& seen) {
+  Points normals = Points::Zero(surface.positions.rows(), 3);
+  for (int f = 0; f < surface.triangles.rows(); ++f) {
+    if (!seen[std::size_t(f)]) continue;
+    const auto corner = [&](int k) { return Vec3(surface.positions.row(surface.triangles(f, k))); };
+    const Vec3 area_vector = 0.5 * (corner(1) - corner(0)).cross(corner(2) - corner(0));
+    for (int k = 0; k < 3; ++k) normals.row(surface.triangles(f, k)) += area_vector;
+  }
+  std::vector<SurfaceSpot> spots;
+  for (int v = 0; v < normals.rows(); ++v)
+    if (const Vec3 n = normals.row(v); n.norm() > 0)
+      spots.push_back({surface.positions.row(v), n.normalized()});
+  return spots;
+}
+
 // Of each candidate's share of the surface, to the nearest sample of its side.
 void share_area(std::span<const SurfaceSpot> candidates, double area, const PointGrid& grid, double reach,
                 std::vector<SurfaceSample>& samples) {
@@ -227,11 +244,64 @@ void share_area(std::span<const SurfaceSpot> candidates, double area, const Poin
   for (int n : nearest) samples[std::size_t(n)].area_m2 += share;
 }
 
+constexpr int planes = 13;
+// The normal, and those that lean from it by 15 and by 30 degrees.
+Eigen::Matrix<double, 3, planes> normals_about(const Vec3& normal) {
+  Eigen::Matrix<double, 3, planes> all;
+  const Vec3 u = normal.unitOrthogonal(), v = normal.cross(u);
+  all.col(0) = normal;
+  for (int k = 0; k < planes - 1; ++k) {
+    const double lean = (k % 2 + 1) * std::numbers::pi / 12, around = k / 2 * std::numbers::pi / 3;
+    all.col(k + 1) = std::cos(lean) * normal + std::sin(lean) * (std::cos(around) * u + std::sin(around) * v);
+  }
+  return all;
+}
+
+// Tips: vertices that a plane would have inside by more than may be missed when it rests on the samples about
+// them. They are narrower than the spacing, or spacings that had to grow passed over them. Those farthest
+// inside come first; no more than `most` samples in all.
+template <class Hidden>
+void add_tips(const std::vector<SurfaceSpot>& vertices, double scale, const SpacingMap& map,
+              const SampleSpacing& spacing, const Hidden& is_hidden, PointGrid& grid,
+              std::vector<SurfaceSample>& samples, int most) {
+  constexpr double all_round = 2;  // spacings within which there are samples on every side
+  const double missed = 2 * spacing.missed_m;
+  std::vector<double> reach(vertices.size()), depth(vertices.size());
+  const auto depth_now = [&](std::size_t v) {
+    const SurfaceSpot& spot = vertices[v];
+    const auto normals = normals_about(spot.normal);
+    Eigen::Array<double, planes, 1> above = Eigen::Array<double, planes, 1>::Constant(1e300);
+    grid.any_within(spot.position, reach[v], [&](int n, double) {
+      const SurfaceSample& s = samples[std::size_t(n)];
+      if (s.normal.dot(spot.normal) > same_side)
+        above = above.min((normals.transpose() * (spot.position - s.position)).array());
+      return false;
+    });
+    return above.maxCoeff();
+  };
+  in_chunks(int(vertices.size()), [&](int v) {
+    reach[std::size_t(v)] = std::max(all_round, scale) * map.at(vertices[std::size_t(v)]);
+    depth[std::size_t(v)] = depth_now(std::size_t(v));
+  });
+  std::vector<std::size_t> tips;
+  for (std::size_t v = 0; v < vertices.size(); ++v)
+    if (depth[v] > missed) tips.push_back(v);
+  std::stable_sort(tips.begin(), tips.end(),
+                   [&](std::size_t a, std::size_t b) { return depth[a] > depth[b]; });
+  for (const std::size_t v : tips) {
+    if (int(samples.size()) >= most) return;
+    const SurfaceSpot& spot = vertices[v];
+    if (!(depth_now(v) > missed) || is_hidden(spot)) continue;
+    grid.add(spot.position);
+    samples.push_back({spot.position, spot.normal, 0});
+  }
+}
+
 }  // namespace
 
 std::vector<SurfaceSample> sample_surface(const SurfaceMesh& surface, const SeenSurface& seen,
                                           const WindingNumber& winding, const SampleSpacing& spacing,
-                                          int most) {
+                                          int most, int most_tips) {
   if (!(seen.area_m2 > 0)) return {};
   const Box box = bounding_box(surface.positions);
   const SurfaceSpots sequence(seen);
@@ -255,12 +325,13 @@ std::vector<SurfaceSample> sample_surface(const SurfaceMesh& surface, const Seen
           : spots.size();
   enum : char { unknown, yes, no };
   std::vector<char> judgements(doubtful, unknown);
+  const auto hidden_here = [&](const SurfaceSpot& spot) {
+    return !parts_inside_from_outside(winding, spot.position, spot.normal, spacing.offset_m);
+  };
   const auto is_hidden = [&](std::size_t i) {
     if (i >= doubtful) return false;
     char& hidden = judgements[i];
-    if (hidden == unknown)
-      hidden =
-          parts_inside_from_outside(winding, spots[i].position, spots[i].normal, spacing.offset_m) ? no : yes;
+    if (hidden == unknown) hidden = hidden_here(spots[i]) ? yes : no;
     return hidden == yes;
   };
   for (double scale = 1;; scale *= 1.1) {
@@ -278,6 +349,8 @@ std::vector<SurfaceSample> sample_surface(const SurfaceMesh& surface, const Seen
     }
     if (int(samples.size()) > most) continue;
     if (samples.empty()) return {};
+    add_tips(seen_vertices(surface, seen.seen), scale, map, spacing, hidden_here, grid, samples,
+             int(samples.size()) + most_tips);
     share_area(std::span(spread).first(std::size_t(std::min(candidates, 100'000))), seen.area_m2, grid,
                spacing.min_m, samples);
     return samples;

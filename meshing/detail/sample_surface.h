@@ -1,4 +1,5 @@
-// Points of a surface, denser where it bends outwards, corners and creases first.
+// Points of a surface, denser where it bends outwards, corners and creases first, then the tips that stand
+// out between these.
 #pragma once
 
 #include <vector>
@@ -20,9 +21,10 @@ struct SurfaceSample {
   double area_m2;  // of the surface that is nearer to it than to the others
 };
 
-// `seen` is of `surface`. At most `most` samples: for fewer, all spacings grow. Same input, same bytes on any
-// number of threads. Method: docs/contact.md.
+// `seen` is of `surface`. At most `most` samples: for fewer, all spacings grow. At most `most_tips` more.
+// Same input, same bytes on any number of threads. Method: docs/contact.md.
 std::vector<SurfaceSample> sample_surface(const SurfaceMesh& surface, const SeenSurface& seen,
-                                          const WindingNumber&, const SampleSpacing&, int most);
+                                          const WindingNumber&, const SampleSpacing&, int most,
+                                          int most_tips);
 
 }  // namespace limber::meshing::detail

@@ -350,7 +350,7 @@ class Search {
                                       e.outcome.center.cast<float>());
       selector_.add(plan_.tree, node);
       if (arrival.kind == Arrival::refused) {
-        ++statistics.refused;
+        ++statistics.refused, statistics.last_refusal = arrival.why;
         refuse(arrival, node);
         choose_again();
       } else {
@@ -390,7 +390,8 @@ class Search {
   struct Arrival {
     enum { elsewhere, rests, refused } kind = elsewhere;
     int edges_before = 0;  // refused: from the root of the leg to the edge that leads into the refused frame
-    Trajectory way = {};   // rests: from the root of the leg, and the settle
+    std::string why = {};
+    Trajectory way = {};  // rests: from the root of the leg, and the settle
   };
 
   Vec3 place_of(const State& state) const {  // as seen from the goal's start
@@ -444,11 +445,11 @@ class Search {
                                   [&](const State& frame) { return frame.step > edges[0].from.step; });
     const std::span<const State> frames(own, whole.frames.end());
     const std::size_t first = system_.first_refused(frames);
-    if (first == frames.size()) return {Arrival::rests, 0, std::move(whole)};
+    if (first == frames.size()) return {Arrival::rests, 0, {}, std::move(whole)};
     const auto there = std::find_if(edges.begin(), edges.end() - 1, [&](const ControlRollout& edge) {
       return edge.end.step >= frames[first].step;
     });
-    return {Arrival::refused, int(there - edges.begin()), {}};
+    return {Arrival::refused, int(there - edges.begin()), system_.why_refused(frames[first]), {}};
   }
 
   // Nothing grows any more from the way to `node` after so many edges: neither from the node behind the edge

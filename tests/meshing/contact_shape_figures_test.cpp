@@ -87,13 +87,14 @@ TEST(ContactShape, TheSurfaceIsCoveredBySamplesThatKeepApart) {
     const double size = size_of(surface);
     const Points& samples = made.shape.samples.positions_m;
     EXPECT_GT(samples.rows(), 250);
-    EXPECT_LE(samples.rows(), ContactShapeSettings().max_samples);
+    EXPECT_LE(samples.rows(), (1 + ContactShapeSettings().max_tips) * ContactShapeSettings().max_samples);
     EXPECT_GT(made.shape.samples.area_m2.minCoeff(), 0);
+    const double least =
+        ContactShapeSettings().min_spacing * std::max(made.report.characteristic_m, size / 3);
     // No two closer than the least spacing, but for those on the two sides of an edge or a wall.
     int close = 0;
     for (Eigen::Index a = 0; a < samples.rows(); ++a)
-      for (Eigen::Index b = 0; b < a; ++b)
-        close += (samples.row(a) - samples.row(b)).norm() < ContactShapeSettings().min_spacing * size;
+      for (Eigen::Index b = 0; b < a; ++b) close += (samples.row(a) - samples.row(b)).norm() < least;
     EXPECT_LT(close, 0.02 * double(samples.rows()));
     Rng rng(4, 0);
     for (int i = 0; i < 3000; ++i) {
@@ -142,6 +143,30 @@ TEST(ContactShape, RoundedCornersOfAPlateAreSampled) {
               2 * ContactShapeSettings().missed_depth * made.report.characteristic_m)
         << down.transpose();
   }
+}
+
+// Bumps narrower than the spacing of as many samples as there may be: no plane that rests on samples, however
+// it leans, has a bump between them inside by more than may be missed.
+TEST(ContactShape, TipsBetweenSamplesAreSampled) {
+  SurfaceMesh surface = made_sphere(120);
+  for (auto p : surface.positions.rowwise())
+    p *= 1 + 0.04 * std::sin(50 * p.x()) * std::sin(50 * p.y()) * std::sin(50 * p.z());
+  const Made made(surface);
+  const Points& samples = made.shape.samples.positions_m;
+  const Points normals = vertex_normals(surface.positions, surface.triangles);
+  constexpr double radius = 0.2;  // of what is about a vertex
+  Rng rng(7, 0);
+  double worst = 0;
+  for (int i = 0; i < 20'000; ++i) {
+    const int v = rng.below(int(surface.positions.rows()));
+    const Vec3 p = surface.positions.row(v);
+    const Vec3 n = (Vec3(normals.row(v)) + 0.5 * rng.uniform() * rng.direction()).normalized();
+    double above = 1;
+    for (const Vec3 s : samples.rowwise())
+      if ((p - s).squaredNorm() < radius * radius) above = std::min(above, n.dot(p - s));
+    worst = std::max(worst, above);
+  }
+  EXPECT_LT(worst, 2 * ContactShapeSettings().missed_depth * made.report.characteristic_m);
 }
 
 // A small ball of radius R pressed against a face, an edge or a rim finds a sample within the spacing s of

@@ -113,6 +113,7 @@ TEST(SearchOptions, NothingGrowsFromARefusedEdge) {
       }
       EXPECT_EQ(p.statistics.refused, std::int64_t(barren.size()));
       EXPECT_EQ(explain(p).find("were refused") != std::string::npos, !p.solved() && !barren.empty());
+      EXPECT_EQ(p.statistics.last_refusal, barren.empty() ? "" : "it is too high");
       for (int node : path_to(p.tree, p.best_node))
         EXPECT_EQ(std::count(barren.begin(), barren.end(), node), 0) << "the best is of a refused way";
       refused += p.statistics.refused, solved += p.solved();

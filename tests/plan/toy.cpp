@@ -144,6 +144,10 @@ std::size_t Toy::first_refused(std::span<const State> frames) const {
   return std::size_t(std::find_if(frames.begin(), frames.end(), above) - frames.begin());
 }
 
+std::string Toy::why_refused(const State& s) const {
+  return robot_center(s).z() > double(refused_above_z) ? "it is too high" : "";
+}
+
 Measures Toy::measures(const State& s) const {
   Measures m;
   for (int i = 1; i < nodes; ++i) {

@@ -50,6 +50,7 @@ struct Toy final : System {
   std::uint64_t hash() const override;
   bool acceptable(const State&) const override;
   std::size_t first_refused(std::span<const State>) const override;
+  std::string why_refused(const State&) const override;
   bool is_clear(const State& s) const { return robot_center(s).z() <= double(not_clear_above_z); }
   Vec3 goal_shift(const State& s) const override { return goal_velocity_m_s * (double(s.step) * dt_s()); }
   Measures measures(

@@ -51,7 +51,8 @@ Json input_of(const Json& identity, const PrepareSettings& settings) {
             {"most_flat_spacing", c.max_flat_spacing},
             {"samples_a_square", c.samples_a_square},
             {"fewest_most_samples", c.fewest_most_samples},
-            {"most_samples", c.max_samples}}}};
+            {"most_samples", c.max_samples},
+            {"most_tips", c.max_tips}}}};
 }
 
 namespace {

@@ -93,7 +93,7 @@ void check_search(const PlanFolder& planned, const FemSystem& system, const plan
     const plan::Statistics &now = found.statistics, &then = plan.statistics;
     const bool counted = now.iterations == then.iterations && now.diverged == then.diverged &&
                          now.rejected == then.rejected && now.refused == then.refused &&
-                         now.rollout_steps == then.rollout_steps;
+                         now.last_refusal == then.last_refusal && now.rollout_steps == then.rollout_steps;
     searched = found.tree.size();  // none where it went astray
     const bool later = planned.told.shortcut || planned.told.improve;
     same = searched > 0 && searched <= tree.size() && same_nodes(found.tree, tree, searched) &&

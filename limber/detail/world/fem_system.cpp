@@ -455,6 +455,26 @@ std::size_t FemSystem::first_refused(std::span<const State> frames) const {
   };
   return std::size_t(std::find_if(seen.begin(), seen.end(), gapes) - seen.begin());
 }
+std::string FemSystem::why_refused(const State& state) const {
+  const SeenLimits limits;
+  const SeenFrame seen = surfaces_->at(state);
+  const auto name = [&](int body) { return world_.bodies[std::size_t(body)].name; };
+  const auto percent = [&](double m) { return 100 * m / surface_size_m_; };
+  if (seen.overlap_m > limits.overlap * surface_size_m_)
+    return fmt::format("{} and {} overlap by {:.2f} % of the robot's size, beyond {:g} %",
+                       name(seen.overlap_body), name(seen.overlap_other), percent(seen.overlap_m),
+                       100 * limits.overlap);
+  if (seen.self_overlap_m > limits.self_overlap * surface_size_m_)
+    return fmt::format("{} overlaps itself by {:.2f} % of the robot's size, beyond {:g} %",
+                       name(seen.self_overlap_body), percent(seen.self_overlap_m), 100 * limits.self_overlap);
+  const auto widest = std::max_element(
+      seen.gaps.begin(), seen.gaps.end(),
+      [](const SeenFrame::Gap& a, const SeenFrame::Gap& b) { return a.at_contact_m < b.at_contact_m; });
+  if (widest == seen.gaps.end()) return {};
+  return fmt::format("{} and {} press one another through {:.2f} % of the robot's size of air, beyond {:g} %",
+                     name(widest->body), widest->other < 0 ? "a wall" : name(widest->other),
+                     percent(widest->at_contact_m), 100 * limits.worst_gap);
+}
 const plan::System& FemSystem::on_leg(int leg) const {
   return leg < int(via_.size()) ? static_cast<const plan::System&>(*via_[std::size_t(leg)]) : *this;
 }

@@ -71,6 +71,7 @@ class FemSystem final : public plan::System {
   std::unique_ptr<plan::Propagator> make_propagator() const override;
   fem::Cost cost() const;  // of all propagators that have ended
   std::size_t first_refused(std::span<const State> frames) const override;
+  std::string why_refused(const State&) const override;
   const Surfaces* surfaces() const { return surfaces_.get(); }  // nullptr where it was given no bodies
 
  private:
