@@ -110,6 +110,38 @@ TEST_F(SceneCheck_slow, OfARobotThatIsThereItSaysSo) {
   EXPECT_EQ(away.at("warnings").size(), 0u) << away.dump(2);
 }
 
+// The block is 0.4 m thick and 0.9 m high.
+TEST_F(SceneCheck, AGoalWithinARigidBodyIsTold) {
+  const auto is_told = [&](const std::string& kind, const std::string& goal) {
+    std::string text = with(small_scene, "center_of_mass_m = [3.2, 1, 1]\nradius_m = 0.3", goal);
+    text = with(text, "kind = \"deformable\"\nmodel = { box = { size_m = [0.4, 2, 0.9] } }",
+                "kind = \"" + kind + "\"\nmodel = { box = { size_m = [0.4, 2, 0.9] } }");
+    if (kind == "rigid") text = with(text, "fixed = \"walls\"\n", "");
+    const Json json = limber_program({"scene", "check", scene(text), "--json"}).json();
+    return json.at("warnings").dump().find("the goal lies within block") != std::string::npos;
+  };
+  EXPECT_TRUE(is_told("rigid", "center_of_mass_m = [2, 1, 0.45]\nradius_m = 0.19"));
+  EXPECT_FALSE(is_told("rigid", "center_of_mass_m = [2, 1, 0.45]\nradius_m = 0.21"));
+  EXPECT_FALSE(is_told("rigid", "center_of_mass_m = [3.2, 1, 1]\nradius_m = 0.1"));
+  EXPECT_FALSE(is_told("deformable", "center_of_mass_m = [2, 1, 0.45]\nradius_m = 0.19"));
+}
+
+TEST_F(SceneCheck, ABoxBesideTheBodyThatItShouldHoldIsTold) {
+  const auto warnings = [&](double from) {
+    return limber_program({"scene", "check",
+                           scene(with(small_scene, "name = \"robot\"\n",
+                                      fmt::format("name = \"robot\"\nfixed = [{{ box_m = [[{}, 0, 0], "
+                                                  "[{}, 2, 2]] }}]\n",
+                                                  from, from + 0.2))),
+                           "--json"})
+        .json()
+        .at("warnings")
+        .dump();
+  };
+  EXPECT_NE(warnings(1.5).find("is beside the body"), std::string::npos);
+  EXPECT_EQ(warnings(0.8).find("is beside the body"), std::string::npos);
+}
+
 TEST_F(SceneCheck_slow, InAWorkFolderItPreparesAndTries) {
   const Result result = limber_program({"scene", "check", scene(), "--work", out(), "--json"});
   ASSERT_EQ(result.code, exit_done) << result.err;

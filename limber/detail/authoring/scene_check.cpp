@@ -65,7 +65,7 @@ class Check {
     found_.lacks = scene_.lacks;
     load();
     for (std::size_t b = 0; b < models_.size(); ++b)
-      if (models_[b]) look_at_place(b);
+      if (models_[b]) look_at_place(b), look_at_held(b);
     if (found_.problems.empty()) robot_size_m_ = box_of(scene_.robot).size().maxCoeff();
     if (found_.problems.empty()) look_at_pairs();
     look_at_files();
@@ -120,6 +120,34 @@ class Check {
     }
   }
 
+  // What is held are nodes of the cage, which reaches beyond its surface by a few hundredths of the size.
+  void look_at_held(std::size_t b) {
+    const Box body = box_of(int(b));
+    const double margin = 0.1 * body.size().maxCoeff();
+    for (const Box& box : scene_.bodies[b].fixed.boxes_m)
+      if ((box.lower.array() > body.upper.array() + margin).any() ||
+          (box.upper.array() < body.lower.array() - margin).any())
+        found_.warnings.push_back(fmt::format(
+            "{}: bodies.{}.fixed: the box from [{:.6g}] to [{:.6g}] is beside the body, which "
+            "reaches from [{:.6g}] to [{:.6g}]; a box that holds no node of its cage is refused",
+            scene_.bodies[b].where, name(b), fmt::join(box.lower, ", "), fmt::join(box.upper, ", "),
+            fmt::join(body.lower, ", "), fmt::join(body.upper, ", ")));
+  }
+
+  // A goal of which no point is outside a rigid body that stays where it is.
+  void look_at_blocked(const std::string& which, const scenes::Goal& goal,
+                       const std::deque<meshing::PlacedSurface>& placed) {
+    const Vec3 middle = goal.box_m ? goal.box_m->center() : goal.center_of_mass_m;
+    const double radius = goal.box_m ? 0.5 * goal.box_m->diagonal() : goal.radius_m;
+    for (std::size_t b = 0; b < placed.size(); ++b)
+      if (scene_.bodies[b].kind == scenes::Kind::rigid && !moves(scene_.bodies[b]) &&
+          placed[b].winding(middle) > 0.5 && placed[b].distance(middle) >= radius)
+        found_.warnings.push_back(
+            fmt::format("{} lies within {}, which is rigid and stays where it is: the robot's centre of mass "
+                        "comes there only if the robot surrounds it; move the goal",
+                        which, name(b)));
+  }
+
   // Surfaces in one another, or so near that they push.
   void look_at_pairs() {
     const bool cages = all_touched_at_cages(scene_);
@@ -132,6 +160,9 @@ class Check {
       const SurfaceMesh& surface = loaded->model.surface;
       placed.emplace_back(shapes.emplace_back(surface.positions, surface.triangles), surface.positions);
     }
+    for (std::size_t v = 0; v < scene_.via.size(); ++v)
+      look_at_blocked(fmt::format("via {}", v + 1), scene_.via[v].goal, placed);
+    if (scene_.lacks.empty()) look_at_blocked("the goal", scene_.goal, placed);
     const auto size_of = [&](std::size_t b) { return box_of(int(b)).size().maxCoeff(); };
     struct Pair {
       std::size_t one, other;
