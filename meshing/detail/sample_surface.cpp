@@ -204,19 +204,16 @@ std::vector<SurfaceSpot> spots_that_stick_out(const SurfaceMesh& surface, const 
   return spots;
 }
 
-// The vertices of what is seen, each with the mean normal of its triangles, by their areas.
+// The vertices of what is seen, with its normals there.
 std::vector<SurfaceSpot> seen_vertices(const SurfaceMesh& surface, const std::vector<char>& seen) {
-  Points normals = Points::Zero(surface.positions.rows(), 3);
-  for (int f = 0; f < surface.triangles.rows(); ++f) {
-    if (!seen[std::size_t(f)]) continue;
-    const auto corner = [&](int k) { return Vec3(surface.positions.row(surface.triangles(f, k))); };
-    const Vec3 area_vector = 0.5 * (corner(1) - corner(0)).cross(corner(2) - corner(0));
-    for (int k = 0; k < 3; ++k) normals.row(surface.triangles(f, k)) += area_vector;
-  }
+  Triangles triangles(surface.triangles.rows(), 3);
+  Eigen::Index count = 0;
+  for (Eigen::Index f = 0; f < triangles.rows(); ++f)
+    if (seen[std::size_t(f)]) triangles.row(count++) = surface.triangles.row(f);
+  const Points normals = vertex_normals(surface.positions, triangles.topRows(count));
   std::vector<SurfaceSpot> spots;
-  for (int v = 0; v < normals.rows(); ++v)
-    if (const Vec3 n = normals.row(v); n.norm() > 0)
-      spots.push_back({surface.positions.row(v), n.normalized()});
+  for (Eigen::Index v = 0; v < normals.rows(); ++v)
+    if (const Vec3 n = normals.row(v); n.norm() > 0) spots.push_back({surface.positions.row(v), n});
   return spots;
 }
 

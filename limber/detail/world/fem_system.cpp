@@ -467,13 +467,16 @@ std::string FemSystem::why_refused(const State& state) const {
   if (seen.self_overlap_m > limits.self_overlap * surface_size_m_)
     return fmt::format("{} overlaps itself by {:.2f} % of the robot's size, beyond {:g} %",
                        name(seen.self_overlap_body), percent(seen.self_overlap_m), 100 * limits.self_overlap);
-  const auto widest = std::max_element(
-      seen.gaps.begin(), seen.gaps.end(),
-      [](const SeenFrame::Gap& a, const SeenFrame::Gap& b) { return a.at_contact_m < b.at_contact_m; });
-  if (widest == seen.gaps.end()) return {};
+  // Light touches do not count (keep_what_presses), and the strongest is none.
+  const SeenFrame::Gap* strongest = nullptr;
+  for (const SeenFrame::Gap& gap : seen.gaps)
+    if (gap.at_contact_m >= limits.worst_gap * surface_size_m_ &&
+        (!strongest || gap.force_n > strongest->force_n))
+      strongest = &gap;
+  if (!strongest) return {};
   return fmt::format("{} and {} press one another through {:.2f} % of the robot's size of air, beyond {:g} %",
-                     name(widest->body), widest->other < 0 ? "a wall" : name(widest->other),
-                     percent(widest->at_contact_m), 100 * limits.worst_gap);
+                     name(strongest->body), strongest->other < 0 ? "a wall" : name(strongest->other),
+                     percent(strongest->at_contact_m), 100 * limits.worst_gap);
 }
 const plan::System& FemSystem::on_leg(int leg) const {
   return leg < int(via_.size()) ? static_cast<const plan::System&>(*via_[std::size_t(leg)]) : *this;
