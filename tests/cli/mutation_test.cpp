@@ -274,6 +274,7 @@ List of_the_plan() {
   add("how many diverged", counts, [](plan::Plan& p) { ++p.statistics.diverged; });
   add("how many were rejected", counts, [](plan::Plan& p) { ++p.statistics.rejected; });
   add("how many ways were refused", counts, [](plan::Plan& p) { ++p.statistics.refused; });
+  add("why the last way was refused", counts, [](plan::Plan& p) { p.statistics.last_refusal = "it is red"; });
   add("steps of rollouts", counts, [](plan::Plan& p) { --p.statistics.rollout_steps; });
 
   add("another seed", tree, [](plan::Plan& p) { ++p.settings.seed; });
