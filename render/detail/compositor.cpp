@@ -116,11 +116,14 @@ Compositor::Compositor(const Backdrop& backdrop, const Camera& camera, int width
     : backdrop_(backdrop), camera_(camera), width_(width), height_(height) {}
 
 // Samples that are 0 in all parts are most of the picture, and passed by.
-void Compositor::row(int y, const std::uint16_t* samples, int per_side, float* rgba) const {
-  const std::size_t texels = std::size_t(width_) * std::size_t(per_side);
-  const std::uint16_t* lowest = samples + 4 * texels * std::size_t(height_ - 1 - y) * std::size_t(per_side);
+void Compositor::row(int y, const Samples& samples, float* rgba) const {
+  const int per_side = samples.per_side, pixel_row = height_ - 1 - y - samples.above;
+  std::fill_n(rgba, 4 * width_, 0.0f);
+  if (pixel_row < 0 || pixel_row >= samples.rows) return put_over_ground(y, rgba);
+  const std::size_t texels = std::size_t(samples.columns) * std::size_t(per_side);
+  const std::uint16_t* lowest = samples.first + 4 * texels * std::size_t(pixel_row) * std::size_t(per_side);
   const float share = 1 / float(per_side * per_side);
-  for (int x = 0; x < width_; ++x) {
+  for (int x = 0; x < samples.columns; ++x) {
     Floats sum{};
     for (int j = 0; j < per_side; ++j) {
       const std::uint16_t* sample =
@@ -129,7 +132,7 @@ void Compositor::row(int y, const std::uint16_t* samples, int per_side, float* r
         if (!is_zero(sample)) sum += floats_of(sample);
     }
     sum *= share;
-    std::memcpy(rgba + 4 * x, &sum, sizeof sum);
+    std::memcpy(rgba + 4 * (samples.left + x), &sum, sizeof sum);
   }
   put_over_ground(y, rgba);
 }

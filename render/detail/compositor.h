@@ -32,9 +32,15 @@ class Compositor {
   // Shade maps must outlive it.
   Compositor(const Backdrop&, const Camera&, int width, int height);
 
-  // Row y, 0 at the top, of pixels of `per_side`² samples each. `samples` is the lower left corner of the
-  // whole picture: rows upward, four half floats a sample, premultiplied. Writes width × 4 floats.
-  void row(int y, const std::uint16_t* samples, int per_side, float* rgba) const;
+  // What is drawn, in a rectangle of pixels of `per_side`² samples each, its lower left corner `left` and
+  // `above` pixels from the picture's. `samples` begins in that corner: rows upward, four half floats a
+  // sample, premultiplied.
+  struct Samples {
+    const std::uint16_t* first;
+    int per_side, left, columns, above, rows;
+  };
+  // Row y, 0 at the top: width × 4 floats.
+  void row(int y, const Samples&, float* rgba) const;
 
  private:
   void put_over_ground(int y, float* rgba) const;

@@ -11,6 +11,8 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <utility>
+#include <vector>
 
 #include "core/error.h"
 #include "render/detail/grain.h"
@@ -217,19 +219,31 @@ void Renderer::Impl::draw_opaque(bool passes) {
   glCullFace(GL_BACK);
   const float nothing[4] = {0, 0, 0, 0}, no_scalar[4] = {0, 0, 0, NAN}, far[1] = {1};
   const int no_object[4] = {-1, 0, 0, 0};
+  drawn = passes ? Rectangle{0, 0, grid.width, grid.height} : extent_of_drawn();
   if (settings.multisampling) {
     glClearBufferfv(GL_COLOR, 0, nothing);
     glClearBufferfv(GL_DEPTH, 0, far);
-  } else {  // row by row: llvmpipe clears buffers tile by tile, which takes five times as long
-    glClearTexImage(targets.samples.id, 0, GL_RGBA, GL_FLOAT, nothing);
-    glClearTexImage(targets.samples_depth.id, 0, GL_DEPTH_COMPONENT, GL_FLOAT, far);
+  } else if (drawn.right > 0) {  // row by row: llvmpipe clears buffers tile by tile, five times as long
+    const auto clear = [&](const Texture& texture, GLenum format, const float* value) {
+      glClearTexSubImage(texture.id, 0, drawn.left, drawn.top, 0, drawn.right - drawn.left,
+                         drawn.bottom - drawn.top, 1, format, GL_FLOAT, value);
+    };
+    clear(targets.samples, GL_RGBA, nothing);
+    clear(targets.samples_depth, GL_DEPTH_COMPONENT, far);
   }
   if (passes) {
     glClearBufferfv(GL_COLOR, 1, no_scalar);
     glClearBufferiv(GL_COLOR, 2, no_object);
   }
-  for (Mesh& mesh : meshes) {
-    if (!mesh.look.seen || mesh.transparent()) continue;
+  // The nearest first: what it hides is not shaded. Distances are of middles of boxes.
+  std::vector<std::pair<double, const Mesh*>> order;
+  for (const Mesh& mesh : meshes)
+    if (mesh.look.seen && !mesh.transparent())
+      order.emplace_back((mesh.card.box().center() - camera.eye).norm(), &mesh);
+  std::stable_sort(order.begin(), order.end(),
+                   [](const auto& a, const auto& b) { return a.first < b.first; });
+  for (const auto& [distance, drawn] : order) {
+    const Mesh& mesh = *drawn;
     stand_back_for_edges(mesh, settings.multisampling ? 1 : settings.supersampling);
     (hides_its_back(mesh) ? glEnable : glDisable)(GL_CULL_FACE);
     draw_mesh(mesh, passes ? "#define PASSES\n" : "", [](const Program&) {});

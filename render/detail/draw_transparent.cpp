@@ -18,6 +18,7 @@
 #include <GL/glcorearb.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "render/detail/line_quads.h"
 #include "render/detail/renderer_impl.h"
@@ -28,22 +29,51 @@ using detail::line_corner_floats;
 using detail::line_quads;
 using detail::Screen;
 
-// All samples that transparent surfaces may cover: the rectangle round their boxes on the screen; all of the
-// picture where a box reaches behind the eye, whose corners there have no place on the screen.
+// All samples that transparent surfaces may cover: the rectangle round their boxes on the screen.
 Renderer::Impl::Rectangle Renderer::Impl::extent_of_transparent() const {
+  Rectangle all{sample_grid(settings).width, sample_grid(settings).height, 0, 0};
+  for (const Mesh& mesh : meshes)
+    if (mesh.drawn() && mesh.transparent()) all = all.with(extent_of(mesh.card.box()));
+  return all;
+}
+
+// Whole pixels that anything may cover, with room for the width of lines. The rest of the samples is neither
+// cleared nor read.
+Renderer::Impl::Rectangle Renderer::Impl::extent_of_drawn() const {
+  const SampleGrid grid = sample_grid(settings);
+  const int per_side = settings.multisampling ? 1 : settings.supersampling;
+  Rectangle all{grid.width, grid.height, 0, 0};
+  double width_px = 0;
+  for (const Mesh& mesh : meshes) {
+    if (!mesh.drawn()) continue;
+    all = all.with(extent_of(mesh.card.box()));
+    if (mesh.look.edges) width_px = std::max(width_px, mesh.look.edges->width_px);
+  }
+  for (const Lines& l : lines) {
+    if (l.ends.rows() > 0) all = all.with(extent_of(bounding_box(l.ends)));
+    width_px = std::max(width_px, l.look.width_px);
+  }
+  if (all.left >= all.right || all.top >= all.bottom) return {0, 0, 0, 0};
+  const int margin = per_side * (int(std::ceil(width_px)) + 2);
+  const auto down = [&](int x) { return std::max(x - margin, 0) / per_side * per_side; };
+  const auto up = [&](int x, int last) {
+    return std::min((x + margin + per_side - 1) / per_side * per_side, last);
+  };
+  return {down(all.left), down(all.top), up(all.right, grid.width), up(all.bottom, grid.height)};
+}
+
+// All of the picture where a box reaches behind the eye, whose corners there have no place on the screen.
+Renderer::Impl::Rectangle Renderer::Impl::extent_of(const Box& box) const {
   const SampleGrid grid = sample_grid(settings);
   Eigen::Array2d lower(1, 1), upper(-1, -1);  // of the screen, −1 … 1
-  for (const Mesh& mesh : meshes)
-    if (mesh.drawn() && mesh.transparent())
-      for_corners(mesh.card.box(), [&](const Vec3& corner) {
-        const Eigen::Vector4d clip = clip_from_world * corner.homogeneous();
-        if (clip.w() > 0) {
-          lower = lower.min(clip.head<2>().array() / clip.w());
-          upper = upper.max(clip.head<2>().array() / clip.w());
-        } else {  // behind the eye
-          lower.setConstant(-1), upper.setConstant(1);
-        }
-      });
+  bool behind = false;
+  for_corners(box, [&](const Vec3& corner) {
+    const Eigen::Vector4d clip = clip_from_world * corner.homogeneous();
+    behind |= !(clip.w() > 0);
+    lower = lower.min(clip.head<2>().array() / clip.w());
+    upper = upper.max(clip.head<2>().array() / clip.w());
+  });
+  if (behind) return {0, 0, grid.width, grid.height};
   const auto sample = [](double screen, int side) {
     return int(std::clamp(0.5 + 0.5 * screen, 0.0, 1.0) * side);
   };

@@ -34,8 +34,9 @@ void Renderer::Impl::finish(const RowReader& read) {
                       GL_NEAREST);
   }
   glBindFramebuffer(GL_FRAMEBUFFER, frame);
-  halves.resize(4 * std::size_t(grid.width) * std::size_t(grid.height));
-  glReadPixels(0, 0, grid.width, grid.height, GL_RGBA, GL_HALF_FLOAT, halves.data());
+  const int columns = drawn.right - drawn.left, rows = drawn.bottom - drawn.top;
+  halves.resize(4 * std::size_t(columns) * std::size_t(rows));
+  if (columns > 0) glReadPixels(drawn.left, drawn.top, columns, rows, GL_RGBA, GL_HALF_FLOAT, halves.data());
   const GLenum error = glGetError();
   LIMBER_CHECK(error == GL_NO_ERROR, error);
 
@@ -62,7 +63,10 @@ void Renderer::Impl::finish(const RowReader& read) {
   const Compositor finished(backdrop, camera, settings.width, settings.height);
   std::vector<float> row(4 * std::size_t(settings.width));
   for (int y = 0; y < settings.height; ++y) {
-    finished.row(y, halves.data(), per_side, row.data());
+    finished.row(y,
+                 {halves.data(), per_side, drawn.left / per_side, columns / per_side, drawn.top / per_side,
+                  rows / per_side},
+                 row.data());
     read(y, row);
   }
 }

@@ -12,8 +12,8 @@ Program::Program(const char* vertex, const char* fragment, const std::string& de
   for (const auto& [kind, text] :
        {std::pair{GL_VERTEX_SHADER, vertex}, std::pair{GL_FRAGMENT_SHADER, fragment}}) {
     const GLuint shader = glCreateShader(GLenum(kind));
-    const char* texts[] = {"#version 430 core\n", kind == GL_VERTEX_SHADER ? "" : "#define FRAGMENT\n",
-                           defines.c_str(), text};
+    const char* texts[] = {"#version 430 core\n#extension GL_ARB_derivative_control : require\n",
+                           kind == GL_VERTEX_SHADER ? "" : "#define FRAGMENT\n", defines.c_str(), text};
     glShaderSource(shader, 4, texts, nullptr);
     glCompileShader(shader);
     GLint compiled = 0;

@@ -13,6 +13,7 @@
 // matt surface square to the key light sends.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <functional>
 #include <map>
@@ -132,8 +133,14 @@ struct Renderer::Impl {
   void draw_opaque(bool passes);
   struct Rectangle {               // of samples; rows go upward
     int left, top, right, bottom;  // right and bottom are beyond
+    Rectangle with(const Rectangle& other) const {
+      return {std::min(left, other.left), std::min(top, other.top), std::max(right, other.right),
+              std::max(bottom, other.bottom)};
+    }
   };
+  Rectangle extent_of(const Box&) const;
   Rectangle extent_of_transparent() const;
+  Rectangle extent_of_drawn() const;
   void put_transparent(int first_row, int rows);
   void draw_transparent();
   // Where there are transparent surfaces: first what lies before one is put into the lists, then the rest is
@@ -189,7 +196,8 @@ struct Renderer::Impl {
   Plane ground_plane;
   bool ground_seen = false;  // there is one, and the eye is above it
   ShadeMap key_shade, sky_shade;
-  std::vector<std::uint16_t> halves;  // the samples, read back
+  Rectangle drawn = {0, 0, 0, 0};     // whole pixels: beyond it nothing is, and samples are not cleared
+  std::vector<std::uint16_t> halves;  // the samples of it, read back
 };
 
 // Material after material, each by a program that is given to with_program first.

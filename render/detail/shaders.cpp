@@ -181,9 +181,18 @@ uint seen() {
 }
 #endif
 
-// A direction for each sample: Jimenez' interleaved gradient noise (2014), once round a diamond.
+// Four samples that are shaded side by side, 2 × 2, share what each has looked up, since lights and shadows are blurred
+// (Penner, Shader Amortization using Pixel Quad Message Passing, GPU Pro 2, 2011). Of two samples a pixel's side they are
+// one pixel. Where a triangle covers less than four, its plane goes on.
+int of_four() { return int(gl_FragCoord.x) & 1 | (int(gl_FragCoord.y) & 1) << 1; }
+vec2 mean_of_four(vec2 own) {
+  vec2 to_middle = 0.5 - vec2(ivec2(gl_FragCoord.xy) & 1);
+  own += to_middle.x * dFdxFine(own);
+  return own + to_middle.y * dFdyFine(own);
+}
+// A direction for each four: Jimenez' interleaved gradient noise (2014), once round a diamond.
 vec2 around() {
-  float turn = 4.0 * fract(52.9829189 * fract(dot(gl_FragCoord.xy, vec2(0.06711056, 0.00583715))));
+  float turn = 4.0 * fract(52.9829189 * fract(dot(floor(0.5 * gl_FragCoord.xy), vec2(0.06711056, 0.00583715))));
   return normalize(vec2(abs(turn - 2.0) - 1.0, 1.0 - abs(abs(turn - 1.0) - 2.0)));
 }
 
@@ -199,30 +208,36 @@ float key_visibility(vec3 n) {
 #else
 // Percentage-closer soft shadows (Fernando 2005): what hides the light near this place, by how far it is away, says over
 // which disc to ask. The disc lies in the tangent plane, or a slanting surface would shade itself; its taps are on
-// Vogel's spiral, turned from sample to sample.
+// Vogel's spiral, one after the other to the four samples that share them, turned from four to four.
 float key_visibility(vec3 n) {
-  const int searching = 5, taps = 8;
+  const int searching = 2, taps = 4;  // of each of the four
   const mat2 golden = mat2(-0.73736888, 0.67549029, -0.67549029, -0.73736888);  // a turn by the golden angle
+  const mat2 golden2 = golden * golden, golden4 = golden2 * golden2;
   vec3 s = shadow_from_normal * n;
   vec2 slope = -s.xy / min(s.z, -0.15 * length(s));
   slope *= min(1.0, 6.0 / max(length(slope), 1e-6));
+  int own = of_four();
   vec2 along = around();
+  if ((own & 1) != 0) along = golden * along;
+  if ((own & 2) != 0) along = golden2 * along;
+  vec2 first = along;
   float search = clamp(shadow_softness * shadow_place.z, min_shadow, max_shadow);
-  float above = 0.0, blockers = 0.0;
+  vec2 above = vec2(0.0);  // how high what blocks the light is, summed, and how often something does
   for (int i = 0; i < searching; ++i) {
-    vec2 way = search * sqrt((float(i) + 0.5) / float(searching)) * along;
+    vec2 way = search * sqrt((float(4 * i + own) + 0.5) / float(4 * searching)) * along;
     float height = shadow_place.z + dot(slope, way) - texture(shadow_depth, shadow_place.xy + way).r;
-    float blocks = step(0.0, height);
-    above += blocks * height, blockers += blocks;
-    along = golden * along;
+    above += step(0.0, height) * vec2(height, 1.0);
+    along = golden4 * along;
   }
-  float radius = clamp(shadow_softness * above / max(blockers, 1.0), min_shadow, max_shadow), sum = 0.0;
+  above = mean_of_four(above);
+  float radius = clamp(shadow_softness * above.x / max(above.y, 0.25), min_shadow, max_shadow), sum = 0.0;
+  along = first;
   for (int i = 0; i < taps; ++i) {
-    vec2 way = radius * sqrt((float(i) + 0.5) / float(taps)) * along;
+    vec2 way = radius * sqrt((float(4 * i + own) + 0.5) / float(4 * taps)) * along;
     sum += texture(shadow_map, vec3(shadow_place.xy + way, shadow_place.z + dot(slope, way)));
-    along = golden * along;
+    along = golden4 * along;
   }
-  return sum / float(taps);
+  return mean_of_four(vec2(sum)).x / float(taps);
 }
 #endif
 
@@ -295,13 +310,12 @@ void main() {
   // Thickness by the first surface that the light meets (Green, GPU Gems 16); what comes out does so on all sides, most
   // where the light grazes. A colour that the material holds back gets less far.
   // Light spreads sideways as far as it gets, so the mean over a disc counts.
-  vec3 through = vec3(0.0);
   vec2 aside = scatter_radius * around();
-  for (int i = 0; i < 4; ++i) {
-    float thickness = max(shadow_place.z - texture(entry_depth, shadow_place.xy + aside).r, 0.0);
-    through += 0.25 * exp2(-1.442695 * thickness / scatter);
-    aside = vec2(-aside.y, aside.x) * (i == 1 ? 0.5 : 1.0);
-  }
+  if ((of_four() & 1) != 0) aside = vec2(-aside.y, aside.x);
+  if ((of_four() & 2) != 0) aside *= -0.5;
+  float thickness = max(shadow_place.z - texture(entry_depth, shadow_place.xy + aside).r, 0.0);
+  vec3 through = exp2(-1.442695 * thickness / scatter);
+  through = vec3(mean_of_four(through.rg), mean_of_four(through.bb).x);
   key += (0.5 * translucency * smoothstep(0.55, -0.35, dot(smooth_n, toward_key))) * diffuse * through * key_light;
 #endif
 

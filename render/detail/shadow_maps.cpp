@@ -25,6 +25,12 @@ constexpr int ground_key_cells = 768, ground_sky_cells = 384;
 // narrow and half a wide Gaussian (deviations in units of h) keep within 0.03 of what it sums to over a disk.
 constexpr double sky_spreads[] = {0.5, 1.6};
 
+// Row by row, as samples are (detail/draw_bodies.cpp).
+void clear_depth(const Texture& map) {
+  const float far = 1;
+  glClearTexImage(map.id, 0, GL_DEPTH_COMPONENT, GL_FLOAT, &far);
+}
+
 }  // namespace
 
 // Never empty, so that a picture of nothing has planes to lie between.
@@ -112,7 +118,7 @@ void Renderer::Impl::draw_shadow_map() {
   glViewport(0, 0, shadow_size, shadow_size);
   glEnable(GL_DEPTH_TEST);
   glDepthMask(GL_TRUE);
-  glClear(GL_DEPTH_BUFFER_BIT);
+  clear_depth(targets.shadow_map);
   glEnable(GL_POLYGON_OFFSET_FILL);
   glPolygonOffset(1.5f, 2.0f);
   glCullFace(GL_FRONT);
@@ -133,7 +139,7 @@ void Renderer::Impl::draw_shadow_map() {
   entry_map = &targets.entry_map;
   glBindFramebuffer(GL_FRAMEBUFFER, targets.entry_frame);
   glViewport(0, 0, Targets::entry_size, Targets::entry_size);
-  glClear(GL_DEPTH_BUFFER_BIT);
+  clear_depth(targets.entry_map);
   for (Mesh& mesh : meshes) {
     if (!mesh.casts()) continue;
     use_depth(clip_from, mesh.planes);

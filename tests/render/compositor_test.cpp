@@ -57,7 +57,8 @@ class FinishTest : public testing::Test {
   std::vector<float> row(const std::vector<std::uint16_t>& samples, int width, int height, int per_side,
                          int y) const {
     std::vector<float> rgba(4 * std::size_t(width));
-    Compositor(backdrop, camera, width, height).row(y, samples.data(), per_side, rgba.data());
+    Compositor(backdrop, camera, width, height)
+        .row(y, {samples.data(), per_side, 0, width, 0, height}, rgba.data());
     return rgba;
   }
 };

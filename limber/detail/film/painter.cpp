@@ -254,23 +254,34 @@ struct Shot::Painter::View {
     return colors;
   }
 
-  // What the occluders hide of a body's sky, found at the nodes of its cage.
-  Eigen::VectorXd hidden_by(const std::vector<render::Occluder>& occluders, std::size_t b) const {
-    const fem::Body& body = shot.world_.bodies[b];
-    const Points hull_normals = vertex_normals(hulls[b], body.surface);
-    Points points(Eigen::Index(body.surface_nodes.size()), 3), outward(points.rows(), 3);
-    for (Eigen::Index i = 0; i < points.rows(); ++i) {
-      points.row(i) = hulls[b].row(body.surface_nodes[std::size_t(i)]);
-      outward.row(i) = hull_normals.row(body.surface_nodes[std::size_t(i)]);
+  // What the occluders hide of the sky of bodies [first, last), body by body: found at the nodes of their
+  // cages, of all bodies at once, since looking along each direction costs more than asking.
+  std::vector<Eigen::VectorXd> hidden_by(const std::vector<render::Occluder>& occluders, std::size_t first,
+                                         std::size_t last) const {
+    Eigen::Index count = 0;
+    for (std::size_t b = first; b < last; ++b)
+      count += Eigen::Index(shot.world_.bodies[b].surface_nodes.size());
+    Points points(count, 3), outward(count, 3);
+    count = 0;
+    for (std::size_t b = first; b < last; ++b) {
+      const fem::Body& body = shot.world_.bodies[b];
+      const Points hull_normals = vertex_normals(hulls[b], body.surface);
+      for (const int node : body.surface_nodes) {
+        points.row(count) = hulls[b].row(node);
+        outward.row(count++) = hull_normals.row(node);
+      }
     }
     const Eigen::VectorXd hidden = render::sky_occlusion(points, outward, occluders);
-    Eigen::VectorXd of_node = Eigen::VectorXd::Zero(hulls[b].rows());
-    std::vector<bool> on_surface(std::size_t(hulls[b].rows()), false);
-    for (Eigen::Index i = 0; i < points.rows(); ++i) {
-      of_node[body.surface_nodes[std::size_t(i)]] = hidden[i];
-      on_surface[std::size_t(body.surface_nodes[std::size_t(i)])] = true;
+    std::vector<Eigen::VectorXd> of_bodies;
+    count = 0;
+    for (std::size_t b = first; b < last; ++b) {
+      Eigen::VectorXd of_node = Eigen::VectorXd::Zero(hulls[b].rows());
+      std::vector<bool> on_surface(std::size_t(hulls[b].rows()), false);
+      for (const int node : shot.world_.bodies[b].surface_nodes)
+        of_node[node] = hidden[count++], on_surface[std::size_t(node)] = true;
+      of_bodies.push_back(on_mesh(b, of_node, on_surface));
     }
-    return on_mesh(b, of_node, on_surface);
+    return of_bodies;
   }
 
   // The cage knows no crevices: of the sky that it leaves open at rest, the share that the fine surface does.
@@ -284,7 +295,7 @@ struct Shot::Painter::View {
     if (!cuts.empty())
       cage_left = render::cut_coarsely(cage_left, cuts), fine_left = render::cut_coarsely(fine, cuts);
     const SurfaceMesh& hides = cuts.empty() ? fine : fine_left;
-    const Eigen::VectorXd coarse = hidden_by({{cage_left.positions, cage_left.triangles}}, b),
+    const Eigen::VectorXd coarse = hidden_by({{cage_left.positions, cage_left.triangles}}, b, b + 1)[0],
                           hidden =
                               render::sky_occlusion(fine.positions, rest_normals[b],
                                                     {{{hides.positions, hides.triangles}}}, {}, fine_cells);
@@ -306,8 +317,9 @@ struct Shot::Painter::View {
       left.push_back(render::cut_coarsely({hulls[b], shot.world_.bodies[b].surface}, cuts));
       occluders.push_back({left.back().positions, left.back().triangles});
     }
+    std::vector<Eigen::VectorXd> of_bodies = hidden_by(occluders, 0, hulls.size());
     for (std::size_t b = 0; b < hulls.size(); ++b) {
-      Eigen::VectorXd hidden = hidden_by(occluders, b);
+      Eigen::VectorXd& hidden = of_bodies[b];
       if (crevices[b].size() > 0) hidden = 1 - (1 - hidden.array()) * crevices[b];
       renderer.set_occlusion(meshes[b], hidden);
     }
