@@ -7,6 +7,7 @@
 
 #include "core/error.h"
 #include "core/progress.h"
+#include "core/threads.h"
 #include "meshing/detail/cut_search.h"
 #include "meshing/detail/enclosing_shell.h"
 #include "meshing/detail/exact_parts.h"
@@ -57,7 +58,9 @@ class Shells {
     } else {
       parts_ = find_parts(model_, whole(model_, solid_.mesh.triangles), inside_, distance_,
                           {options.max_shells, options.max_concavity * solid_.diagonal});
-      for (const Part& part : parts_) result_.shells.push_back(shell_of(part));
+      result_.shells.resize(parts_.size());
+      parallel_for(int(parts_.size()),
+                   [&](int p) { result_.shells[std::size_t(p)] = shell_of(parts_[std::size_t(p)]); });
     }
     measure_overshoot();
   }
@@ -135,10 +138,14 @@ void Shells::measure_overshoot() {
   }
   std::vector<double> overshoots;
   result_.overshoot_of_shell.assign(shells.size(), 0.0);
-  for (const BoundarySample& sample : boundary_samples(shells, boundary_sample_count / total_area)) {
-    overshoots.push_back(distance_.at(sample.point) / solid_.diagonal);
-    double& largest = result_.overshoot_of_shell[std::size_t(sample.shell)];
-    largest = std::max(largest, overshoots.back());
+  const std::vector<BoundarySample> samples = boundary_samples(shells, boundary_sample_count / total_area);
+  overshoots.resize(samples.size());
+  parallel_for_many(int(samples.size()), [&](int i) {
+    overshoots[std::size_t(i)] = distance_.at(samples[std::size_t(i)].point) / solid_.diagonal;
+  });
+  for (std::size_t i = 0; i < samples.size(); ++i) {
+    double& largest = result_.overshoot_of_shell[std::size_t(samples[i].shell)];
+    largest = std::max(largest, overshoots[i]);
   }
   std::sort(overshoots.begin(), overshoots.end());
   result_.mean_overshoot =
@@ -190,15 +197,17 @@ void Shells::count_uncovered() {
   const std::vector<ConvexShell>& shells = result_.shells;
   std::vector<Box> boxes;
   for (const ConvexShell& shell : shells) boxes.push_back(bounding_box(shell.vertices));
-  for (int v : vertices_of(mesh_.triangles)) {
+  const std::vector<int> vertices = vertices_of(mesh_.triangles);
+  std::vector<char> covered(vertices.size(), 0);
+  parallel_for_many(int(vertices.size()), [&](int i) {
     throw_if_stopped();
-    const Vec3 p = mesh_.positions.row(v);
-    bool covered = false;
-    for (std::size_t s = 0; s < shells.size() && !covered; ++s)
-      covered = (p.array() >= boxes[s].lower.array()).all() && (p.array() <= boxes[s].upper.array()).all() &&
-                encloses(shells[s], p);
-    result_.vertices_uncovered += !covered;
-  }
+    const Vec3 p = mesh_.positions.row(vertices[std::size_t(i)]);
+    char& is = covered[std::size_t(i)];
+    for (std::size_t s = 0; s < shells.size() && !is; ++s)
+      is = (p.array() >= boxes[s].lower.array()).all() && (p.array() <= boxes[s].upper.array()).all() &&
+           encloses(shells[s], p);
+  });
+  result_.vertices_uncovered += std::count(covered.begin(), covered.end(), 0);
   if (options_.exact) {
     result_.triangles_uncovered = triangles_uncovered_by_exact_parts();
     return;

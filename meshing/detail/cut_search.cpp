@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include "core/random.h"
+#include "core/threads.h"
 #include "meshing/detail/sketch.h"
 
 namespace limber::meshing::detail {
@@ -392,14 +393,17 @@ Cut best_cut(const Model& model, const Part& part, InsideTest& inside) {
   std::vector<Start> starts = first_cuts(coarse_sweep, first_directions(model, part, fine, true), offsets);
   starts.resize(std::min(starts.size(), directions_to_refine));
   const bool small = int(fine.points.size()) <= coarse_points;
-  Sweep sweep(fine, part, inside, small ? small_tolerance : fine_tolerance);
+  const Sweep sweep(fine, part, inside, small ? small_tolerance : fine_tolerance);
+  std::vector<Cut> refined(starts.size());
+  parallel_for(int(starts.size()), [&](int i) {
+    Cut& cut = refined[std::size_t(i)];
+    cut = {starts[std::size_t(i)].cut.plane, 0};  // the gain on the coarse sketch is another
+    refine_offset(sweep, starts[std::size_t(i)].step, refinements, cut);
+  });
   Cut best;
   double step = 0;
-  for (const auto& [start, start_step] : starts) {
-    Cut refined{start.plane, 0};  // the gain on the coarse sketch is another
-    refine_offset(sweep, start_step, refinements, refined);
-    if (refined.gain > best.gain) best = refined, step = start_step;
-  }
+  for (std::size_t i = 0; i < starts.size(); ++i)
+    if (refined[i].gain > best.gain) best = refined[i], step = starts[i].step;
   if (best.gain > 0) tilt(sweep, step, tilt_rounds, best);
   return best;
 }
@@ -418,10 +422,13 @@ Cut best_cut_ahead(const Model& model, const Part& part, InsideTest& inside) {
     const auto [low, high] = sweep.extent(direction);
     planes.push_back({direction, 0.5 * (low + high)});
   }
+  std::vector<double> gains(planes.size());
+  parallel_for(int(planes.size()), [&](int i) {
+    gains[std::size_t(i)] = gain_with_next(model, part, planes[std::size_t(i)], inside);
+  });
   Cut ahead = best;
-  for (const Plane& plane : planes)
-    if (const double gain = gain_with_next(model, part, plane, inside); 0.5 * gain > ahead.gain)
-      ahead = {plane, 0.5 * gain, true};
+  for (std::size_t i = 0; i < planes.size(); ++i)
+    if (0.5 * gains[i] > ahead.gain) ahead = {planes[i], 0.5 * gains[i], true};
   return ahead;
 }
 
@@ -433,16 +440,16 @@ Plane cut_through(const Model& model, const Part& part, const Vec3& point, const
     double gain, length;
     Plane plane;
   };
-  std::vector<Tried> tried;
+  std::vector<Tried> tried(turns);
   const Vec3 u = outwards.unitOrthogonal(), v = outwards.cross(u);
-  for (int turn = 0; turn < turns; ++turn) {
+  parallel_for(turns, [&](int turn) {
     const double angle = std::numbers::pi * turn / turns;
     const Vec3 normal = std::cos(angle) * u + std::sin(angle) * v;
     double low = 1e300, high = -1e300;
     for (const Vec3& p : part.hull) low = std::min(low, normal.dot(p)), high = std::max(high, normal.dot(p));
     const Plane plane{normal, normal.dot(point)};
-    tried.push_back({gain_with_next(model, part, plane, inside), high - low, plane});
-  }
+    tried[std::size_t(turn)] = {gain_with_next(model, part, plane, inside), high - low, plane};
+  });
   double most = 0;
   for (const Tried& one : tried) most = std::max(most, one.gain);
   std::erase_if(tried, [&](const Tried& one) { return one.gain < most - same_gain * part.hull_volume; });

@@ -49,7 +49,8 @@ bool surrounds_origin(const std::vector<Vec3>& spokes) {
 }  // namespace
 
 InsideTest::InsideTest(const Points& positions, const Triangles& triangles)
-    : winding_(positions, triangles), voxels_(std::size_t(side * side * side), Voxel::unknown) {
+    : winding_(positions, triangles), voxels_(std::size_t(side * side * side)) {
+  for (std::atomic<Voxel>& voxel : voxels_) voxel.store(Voxel::unknown, std::memory_order_relaxed);
   const Box box = bounding_box(positions);
   voxel_ = box.size().maxCoeff() / (side - 2);
   lower_ = box.center() - Vec3::Constant(0.5 * side * voxel_);
@@ -68,7 +69,8 @@ InsideTest::InsideTest(const Points& positions, const Triangles& triangles)
         for (int x = std::max(from.x(), 0); x <= std::min(to.x(), side - 1); ++x) {
           const Vec3 center = lower_ + voxel_ * Vec3(x + 0.5, y + 0.5, z + 0.5);
           if (std::abs(normal.dot(center - origin)) <= reach)
-            voxels_[std::size_t((z * side + y) * side + x)] = Voxel::at_surface;
+            voxels_[std::size_t((z * side + y) * side + x)].store(Voxel::at_surface,
+                                                                  std::memory_order_relaxed);
         }
   }
 }
@@ -78,10 +80,13 @@ bool InsideTest::operator()(const Vec3& point) {
   if ((at < 0).any() || (at >= side).any()) return false;
   // A surface that is turned inside out bounds a solid too.
   const auto ask = [&](const Vec3& p) { return std::abs(winding_.at(p)) > 0.5; };
-  Voxel& voxel = voxels_[std::size_t((at.z() * side + at.y()) * side + at.x())];
+  std::atomic<Voxel>& known = voxels_[std::size_t((at.z() * side + at.y()) * side + at.x())];
+  Voxel voxel = known.load(std::memory_order_relaxed);
   if (voxel == Voxel::at_surface) return ask(point);
-  if (voxel == Voxel::unknown)
+  if (voxel == Voxel::unknown) {
     voxel = ask(lower_ + voxel_ * (at.cast<double>() + 0.5).matrix()) ? Voxel::inside : Voxel::outside;
+    known.store(voxel, std::memory_order_relaxed);
+  }
   return voxel == Voxel::inside;
 }
 

@@ -5,6 +5,7 @@
 #pragma once
 
 #include <array>
+#include <atomic>
 #include <utility>
 #include <vector>
 
@@ -23,7 +24,8 @@ constexpr double on_plane = 1e-9;
 constexpr double search_tolerance = 1e-4;
 
 // Is a point inside the solid? Asked for places near each other again and again: a grid remembers the answer
-// of voxels that the surface does not enter; in the others the winding number is asked each time.
+// of voxels that the surface does not enter; in the others the winding number is asked each time. Several
+// threads may ask; what they learn of a voxel is the same.
 class InsideTest {
  public:
   InsideTest(const Points&, const Triangles&);
@@ -35,7 +37,7 @@ class InsideTest {
   WindingNumber winding_;
   Vec3 lower_;
   double voxel_ = 0;
-  std::vector<Voxel> voxels_;
+  std::vector<std::atomic<Voxel>> voxels_;
 };
 
 // A convex polytope; each face is a loop of corners.

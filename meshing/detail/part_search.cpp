@@ -7,6 +7,7 @@
 #include <set>
 
 #include "core/progress.h"
+#include "core/threads.h"
 #include "meshing/convex_hull.h"
 #include "meshing/detail/cut_search.h"
 
@@ -110,8 +111,10 @@ std::vector<Part> cut_up(Model& model, Part root, InsideTest& inside, const Surf
       best->cut.gain = 0;  // the sketch promised too much
       continue;
     }
-    *best = seen(std::move(below));
-    leaves.push_back(seen(std::move(above)));
+    Leaf lower, upper;
+    side_by_side(2, [&](int i) { i == 0 ? lower = seen(std::move(below)) : upper = seen(std::move(above)); });
+    *best = std::move(lower);
+    leaves.push_back(std::move(upper));
   }
   std::vector<Part> parts;
   for (Leaf& leaf : leaves)
@@ -150,40 +153,75 @@ void unite_cheapest(std::vector<Part>& parts, InsideTest& inside, const SurfaceD
                     const PartLimits& limits) {
   std::vector<std::optional<Outline>> outlines;  // none: united into another
   for (const Part& part : parts) outlines.emplace_back(part.hull);
-  std::map<std::pair<std::size_t, std::size_t>, double> cost;
-  const auto find_costs = [&](std::size_t i, bool only_near) {
-    for (std::size_t j = 0; j < outlines.size(); ++j) {
-      const auto &a = outlines[i], &b = outlines[j];
-      if (j != i && a && b && (!only_near || a->near(*b)))
-        cost[{std::min(i, j), std::max(i, j)}] = a->volume_with(*b) - a->volume - b->volume;
-    }
+  using PairOfParts = std::pair<std::size_t, std::size_t>;  // the less first
+  std::map<PairOfParts, double> cost;
+  // Of all pairs with a part of [first, last).
+  const auto find_costs = [&](std::size_t first, std::size_t last, bool only_near) {
+    std::vector<std::pair<std::size_t, std::size_t>> pairs;
+    for (std::size_t i = first; i < last; ++i)
+      for (std::size_t j = 0; j < outlines.size(); ++j) {
+        const auto &a = outlines[i], &b = outlines[j];
+        const bool is_of_j = j > i && j < last;  // listed there
+        if (j != i && !is_of_j && a && b && (!only_near || a->near(*b))) pairs.emplace_back(i, j);
+      }
+    std::vector<double> costs(pairs.size());
+    parallel_for(int(pairs.size()), [&](int k) {
+      const Outline &a = *outlines[pairs[std::size_t(k)].first], &b = *outlines[pairs[std::size_t(k)].second];
+      costs[std::size_t(k)] = a.volume_with(b) - a.volume - b.volume;
+    });
+    for (std::size_t k = 0; k < pairs.size(); ++k)
+      cost[std::minmax(pairs[k].first, pairs[k].second)] = costs[k];
   };
-  for (std::size_t i = 0; i < outlines.size(); ++i) find_costs(i, true);
+  find_costs(0, outlines.size(), true);
   // Two slender parts far apart have a common hull of little volume too: no hull may stand off more than the
   // worst did before, while there is a choice.
+  std::vector<double> overshoots(parts.size());
+  parallel_for(int(parts.size()), [&](int i) {
+    overshoots[std::size_t(i)] = hull_overshoot(parts[std::size_t(i)].hull, inside, distance, 0);
+  });
   double worst = limits.max_overshoot;
-  for (const Part& part : parts) worst = std::max(worst, hull_overshoot(part.hull, inside, distance, 0));
-  std::set<std::pair<std::pair<std::size_t, std::size_t>, double>> refused;  // for that limit
+  for (const double overshoot : overshoots) worst = std::max(worst, overshoot);
+  const auto limit_of = [&](double extra, bool too_many) {
+    return too_many || extra <= min_gain ? worst : limits.max_overshoot;
+  };
+  std::set<std::pair<PairOfParts, double>> refused;  // for that limit
   for (std::size_t alive = outlines.size(); alive > 1; --alive) {
     throw_if_stopped();
     const bool too_many = alive > std::size_t(limits.most);
-    if (cost.empty() && too_many)
-      for (std::size_t i = 0; i < outlines.size(); ++i) find_costs(i, false);
-    std::vector<std::pair<double, std::pair<std::size_t, std::size_t>>> by_cost;
+    if (cost.empty() && too_many) find_costs(0, outlines.size(), false);
+    std::vector<std::pair<double, PairOfParts>> by_cost;
     for (const auto& [pair, value] : cost) by_cost.push_back({value, pair});
     std::sort(by_cost.begin(), by_cost.end());
-    auto chosen = std::find_if(by_cost.begin(), by_cost.end(), [&](const auto& entry) {
-      const auto& [value, pair] = entry;
-      const double limit = too_many || value <= min_gain ? worst : limits.max_overshoot;
-      if (limit == 0 || refused.contains({pair, limit})) return false;
-      const std::vector<Vec3> both = outlines[pair.first]->corners_with(*outlines[pair.second]);
-      if (hull_overshoot(both, inside, distance, limit) <= limit) return true;
-      refused.insert({pair, limit});
-      return false;
+    std::optional<PairOfParts> chosen;
+    if (too_many && !by_cost.empty()) chosen = by_cost.front().second;  // where none may be united
+    // The cheapest that may. As many are asked at a time as there are threads; which is the first of
+    // those that may does not depend on it.
+    std::erase_if(by_cost, [&](const auto& entry) {
+      const double limit = limit_of(entry.first, too_many);
+      return limit == 0 || refused.contains({entry.second, limit});
     });
-    if (chosen == by_cost.end() && too_many) chosen = by_cost.begin();
-    if (chosen == by_cost.end()) break;
-    const auto [i, j] = chosen->second;
+    bool found = false;
+    for (std::size_t first = 0; !found && first < by_cost.size();) {
+      const std::size_t last = std::min(first + std::size_t(thread_count()), by_cost.size());
+      std::vector<char> may(by_cost.size());
+      parallel_for(int(last - first), [&](int i) {
+        const std::size_t k = first + std::size_t(i);
+        const auto& [value, pair] = by_cost[k];
+        const double limit = limit_of(value, too_many);
+        const std::vector<Vec3> both = outlines[pair.first]->corners_with(*outlines[pair.second]);
+        may[k] = hull_overshoot(both, inside, distance, limit) <= limit;
+      });
+      for (; !found && first < last; ++first) {
+        const auto& [value, pair] = by_cost[first];
+        found = may[first];
+        if (found)
+          chosen = pair;
+        else
+          refused.insert({pair, limit_of(value, too_many)});
+      }
+    }
+    if (!chosen) break;
+    const auto [i, j] = *chosen;
     parts[i] = unite(parts[i], parts[j]);
     outlines[i].emplace(outlines[i]->corners_with(*outlines[j]));
     outlines[j].reset();
@@ -192,7 +230,7 @@ void unite_cheapest(std::vector<Part>& parts, InsideTest& inside, const SurfaceD
       return a == i || b == i || a == j || b == j;
     };
     std::erase_if(cost, changed), std::erase_if(refused, changed);
-    find_costs(i, true);
+    find_costs(i, i + 1, true);
   }
   std::vector<Part> kept;
   for (std::size_t i = 0; i < parts.size(); ++i)
@@ -213,25 +251,53 @@ void cut_anew(Model& model, std::vector<Part>& parts, InsideTest& inside, const 
   for (const Part& part : parts) outlines.emplace_back(part.hull);
   std::vector<Pair> pairs;
   for (std::size_t b = 0; b < parts.size(); ++b)
-    for (std::size_t a = 0; a < b; ++a) {
-      if (!outlines[a].near(outlines[b])) continue;
-      const double together = outlines[a].volume_with(outlines[b]);
-      const double empty = together - outlines[a].volume - outlines[b].volume;
-      if (empty < nearly_fill * together) pairs.push_back({empty / together, a, b});
-    }
+    for (std::size_t a = 0; a < b; ++a)
+      if (outlines[a].near(outlines[b])) pairs.push_back({0, a, b});
+  parallel_for(int(pairs.size()), [&](int k) {
+    auto& [empty, a, b] = pairs[std::size_t(k)];
+    const double together = outlines[a].volume_with(outlines[b]);
+    empty = (together - outlines[a].volume - outlines[b].volume) / together;
+  });
+  std::erase_if(pairs, [](const Pair& pair) { return !(pair.empty < nearly_fill); });
   std::stable_sort(pairs.begin(), pairs.end(),
                    [](const Pair& p, const Pair& q) { return p.empty < q.empty; });
-  for (const auto& [empty, a, b] : pairs) {
-    throw_if_stopped();
-    const Part both = unite(parts[a], parts[b]);
-    const Cut best = best_cut(model, both, inside);
+  // Pairs one after the other that share no part are looked at side by side, and then cut in their order.
+  std::vector<Part> united(pairs.size());
+  std::vector<Cut> cuts(pairs.size());
+  std::size_t seen = 0;  // pairs
+  const auto look_at_next = [&] {
+    constexpr std::size_t most = 8;
+    const std::size_t first = seen;
+    const auto shares_a_part = [&](std::size_t k) {
+      for (std::size_t i = first; i < k; ++i)
+        for (const std::size_t p : {pairs[i].a, pairs[i].b})
+          if (p == pairs[k].a || p == pairs[k].b) return true;
+      return false;
+    };
+    while (seen < pairs.size() && seen < first + most && !shares_a_part(seen)) ++seen;
+    side_by_side(int(seen - first), [&](int i) {
+      const std::size_t k = first + std::size_t(i);
+      throw_if_stopped();
+      united[k] = unite(parts[pairs[k].a], parts[pairs[k].b]);
+      cuts[k] = best_cut(model, united[k], inside);
+    });
+  };
+  for (std::size_t k = 0; k < pairs.size(); ++k) {
+    if (k == seen) look_at_next();
+    const auto [empty, a, b] = pairs[k];
+    const Part both = std::move(united[k]);
+    const Cut& best = cuts[k];
     if (best.gain <= 0) continue;
     auto [below, above] = cut(model, both, best.plane, inside);
     if (below.hull_volume + above.hull_volume > parts[a].hull_volume + parts[b].hull_volume - min_gain)
       continue;
-    const auto overshoot = [&](const Part& part) { return hull_overshoot(part.hull, inside, distance, 0); };
-    if (std::max(overshoot(below), overshoot(above)) >
-        std::max({overshoot(parts[a]), overshoot(parts[b]), limits.max_overshoot}))
+    double overshoots[4];
+    const Part* const asked[4] = {&below, &above, &parts[a], &parts[b]};
+    parallel_for(4, [&, &below = below](int i) {
+      overshoots[i] = hull_overshoot(asked[i]->hull, inside, distance, 0);
+    });
+    if (std::max(overshoots[0], overshoots[1]) >
+        std::max({overshoots[2], overshoots[3], limits.max_overshoot}))
       continue;
     parts[a] = std::move(below), parts[b] = std::move(above);
   }

@@ -18,21 +18,12 @@ namespace {
 
 constexpr double probes_a_disc = 1.5, candidates_a_disc = 5;  // a square of the least spacing
 constexpr int max_candidates = 400'000;
-constexpr int chunk = 256;         // of what threads take at a time
 constexpr double same_side = 0.2;  // cosine of normals, below which points are not of one side of a sheet
 const double crease_cosine = std::cos(std::numbers::pi / 6), corner_cosine = std::cos(std::numbers::pi / 6);
 
-// body(0 … count − 1), in threads.
-template <class Body>
-void in_chunks(int count, Body body) {
-  parallel_for((count + chunk - 1) / chunk, [&](int c) {
-    for (int i = c * chunk; i < std::min(count, (c + 1) * chunk); ++i) body(i);
-  });
-}
-
 std::vector<SurfaceSpot> first_of(const SurfaceSpots& sequence, int count) {
   std::vector<SurfaceSpot> spots(static_cast<std::size_t>(count));
-  in_chunks(count, [&](int i) { spots[std::size_t(i)] = sequence.at(std::uint32_t(i)); });
+  parallel_for_many(count, [&](int i) { spots[std::size_t(i)] = sequence.at(std::uint32_t(i)); });
   return spots;
 }
 
@@ -124,7 +115,7 @@ class SpacingMap {
  private:
   template <class Body>
   void for_all(Body body) const {
-    in_chunks(int(spots_.size()), [&](int i) { body(std::size_t(i)); });
+    parallel_for_many(int(spots_.size()), [&](int i) { body(std::size_t(i)); });
   }
 
   struct Cell {
@@ -221,7 +212,7 @@ std::vector<SurfaceSpot> seen_vertices(const SurfaceMesh& surface, const std::ve
 void share_area(std::span<const SurfaceSpot> candidates, double area, const PointGrid& grid, double reach,
                 std::vector<SurfaceSample>& samples) {
   std::vector<int> nearest(candidates.size());
-  in_chunks(int(candidates.size()), [&](int i) {
+  parallel_for_many(int(candidates.size()), [&](int i) {
     const SurfaceSpot& spot = candidates[std::size_t(i)];
     int found = -1;
     for (double radius = reach; found < 0; radius *= 2) {
@@ -276,7 +267,7 @@ void add_tips(const std::vector<SurfaceSpot>& vertices, double scale, const Spac
     });
     return above.maxCoeff();
   };
-  in_chunks(int(vertices.size()), [&](int v) {
+  parallel_for_many(int(vertices.size()), [&](int v) {
     reach[std::size_t(v)] = std::max(all_round, scale) * map.at(vertices[std::size_t(v)]);
     depth[std::size_t(v)] = depth_now(std::size_t(v));
   });
@@ -312,7 +303,8 @@ std::vector<SurfaceSample> sample_surface(const SurfaceMesh& surface, const Seen
   const std::vector<SurfaceSpot> spread = first_of(sequence, candidates);
   spots.insert(spots.end(), spread.begin(), spread.end());
   std::vector<double> wanted(spots.size());
-  in_chunks(int(spots.size()), [&](int i) { wanted[std::size_t(i)] = map.at(spots[std::size_t(i)]); });
+  parallel_for_many(int(spots.size()),
+                    [&](int i) { wanted[std::size_t(i)] = map.at(spots[std::size_t(i)]); });
 
   // What is not on a piece that was judged itself, or where pieces may be hidden in part, is judged where it
   // is taken.
