@@ -80,7 +80,7 @@ const std::vector<Contact<Real>>& Contacts<Real>::find(int lane, const LaneView<
     const int ka = (3 * a + c) * view.stride, kb = (3 * b + c) * view.stride;
     if (view.lower[ka] > view.upper[kb] || view.lower[kb] > view.upper[ka]) return contacts_;
   }
-  const auto pair = std::find(pairs_.begin(), pairs_.end(), std::pair(a, b));
+  const auto pair = std::lower_bound(pairs_.begin(), pairs_.end(), std::pair(a, b));  // ascending
   List& list = lists_[lane * pairs_.size() + std::size_t(pair - pairs_.begin())];
   const Real reach = (tables_.skin[a] + tables_.skin[b]) / 2;
   const Real travel = view.travel[a * view.stride] + view.travel[b * view.stride];

@@ -9,6 +9,7 @@
 
 #include "core/error.h"
 #include "core/random.h"
+#include "core/threads.h"
 #include "meshing/convex_hull.h"
 #include "meshing/shell_check.h"
 #include "meshing/winding_number.h"
@@ -139,9 +140,15 @@ TEST(Decompose, TheConcavityBoundIsMetWithAsFewShellsAsItTakes) {
   EXPECT_EQ(decompose(torus, {.max_shells = 3, .max_concavity = 0.015}).stopped_by, "count");
 }
 
-TEST(Decompose, SameInputSameBytes) {
+TEST(Decompose, SameInputSameBytesWithAnyNumberOfThreads) {
   const SurfaceMesh torus = made_torus(0.3, 40, 16);
-  const Decomposition a = decompose(torus, {.max_shells = 9}), b = decompose(torus, {.max_shells = 9});
+  const auto with_threads = [&](int count) {
+    set_thread_count(count);
+    Decomposition result = decompose(torus, {.max_shells = 9});
+    set_thread_count(0);
+    return result;
+  };
+  const Decomposition a = with_threads(1), b = with_threads(4);
   ASSERT_EQ(a.shells.size(), b.shells.size());
   for (std::size_t s = 0; s < a.shells.size(); ++s) {
     EXPECT_EQ(a.shells[s].vertices, b.shells[s].vertices);
