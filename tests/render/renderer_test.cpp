@@ -360,6 +360,41 @@ TEST(Renderer, MovingAMeshIsTheSameAsMakingItThere) {
 }
 
 // Meshes, camera, light and up turned together: the picture stays, but for the grids of the shadow maps.
+// Only what meshes and lines may cover is cleared and read. What an earlier picture left beside it is never
+// seen: each picture is that of a renderer that drew nothing before, and that of one that clears all for its
+// passes.
+TEST(Renderer, NothingIsLeftOfThePictureBefore) {
+  RenderSettings look = small_look();
+  for (const int samples : {1, 2, 3}) {
+    look.supersampling = samples;
+    const SurfaceMesh ball = sphere_mesh({0, 0, 0}, 0.2, 20);
+    MeshLook glass;
+    glass.opacity = 0.4;
+    LineLook thick;
+    thick.width_px = 9;
+    const auto add = [&](Renderer& renderer, const Vec3& at, bool with_line) {
+      const Points moved = ball.positions.rowwise() + at.transpose();
+      renderer.add_mesh(ball.triangles, moved, at.x() < 0 ? glass : MeshLook{});
+      Points ends(2, 3);
+      ends << (at + Vec3(0.4, -0.3, -0.3)).transpose(), (at + Vec3(0.4, -0.3, 0.3)).transpose();
+      if (with_line) renderer.add_lines(ends, thick);
+    };
+    const Camera camera = camera_from({0, -5, 0});
+    for (const Vec3& at :
+         {Vec3(0, 0, 0), Vec3(-1.7, 0, 1.3), Vec3(1.75, 0, -1.2), Vec3(0, 0, 7), Vec3(0, -5, 0)})
+      for (const bool with_line : {true, false}) {
+        Renderer before(look), passes_too(look);
+        Renderer first(look);
+        for (Renderer* renderer : {&before, &first, &passes_too}) add(*renderer, at, with_line);
+        before.draw(camera_from(at - Vec3(0, 0.25, 0), at));  // the ball is all that is seen
+        Passes passes;
+        const Image expected = passes_too.draw(camera, &passes);
+        EXPECT_EQ(first.draw(camera).rgba, expected.rgba) << samples << " at " << at.transpose();
+        EXPECT_EQ(before.draw(camera).rgba, expected.rgba) << samples << " at " << at.transpose();
+      }
+  }
+}
+
 TEST(Renderer, ThePictureDoesNotDependOnTheAxes) {
   Eigen::Matrix3d turn;
   turn << 0, 0, 1, 1, 0, 0, 0, 1, 0;
