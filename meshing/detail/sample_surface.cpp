@@ -45,11 +45,11 @@ class SpacingMap {
       if (of.begin == of.end) of.begin = int(sorted.size());
       sorted.push_back(spots_[std::size_t(i)]);
       of.end = int(sorted.size());
-      const Vec3& p = sorted.back().position;
-      of.box = of.end - of.begin == 1 ? Box{p, p} : Box{of.box.lower.cwiseMin(p), of.box.upper.cwiseMax(p)};
+      of.box.include(sorted.back().position), of.normals.include(sorted.back().normal);
     }
     spots_ = std::move(sorted);
     for (const SurfaceSpot& s : spots_) fine_grid_.add(s.position);
+    parallel_for_many(int(cells_.size()), [&](int c) { find_near(cells_[std::size_t(c)]); });
 
     std::vector<Vec3> smooth(spots_.size());
     spacing_.resize(spots_.size());
@@ -62,40 +62,12 @@ class SpacingMap {
       });
       smooth[i] = sum.normalized();
     });
-    for_all([&](std::size_t i) { spacing_[i] = measured({spots_[i].position, smooth[i]}); });
-  }
-
-  double measured(const SurfaceSpot& at) const {
-    constexpr double rounding = 1e-9;
-    const double flat = 0.1 * limits_.missed_m, least = limits_.min_m * limits_.min_m,
-                 farthest = limits_.max_flat_m * limits_.max_flat_m;
-    double min_squared = limits_.max_m * limits_.max_m, bend = 0;
-    grid_.any_cell(at.position, limits_.max_flat_m, [&](int index) {
-      const Cell& cell = cells_[std::size_t(index)];
-      if (cell.begin == cell.end) return false;
-      // No point of the cell falls farther, or is nearer; most cells of what is flat change nothing.
-      const Vec3 middle = 0.5 * (cell.box.lower + cell.box.upper), half = 0.5 * cell.box.size();
-      const double max_fall = (1 + rounding) * (std::abs((at.position - middle).dot(at.normal)) +
-                                                half.dot(at.normal.cwiseAbs())),
-                   nearest =
-                       (1 - rounding) * ((at.position - middle).cwiseAbs() - half).cwiseMax(0).squaredNorm();
-      if (nearest > farthest || ((bend >= flat || max_fall < flat) &&
-                                 max_fall * min_squared <= 2 * limits_.missed_m * std::max(nearest, least)))
-        return false;
-      for (int n = cell.begin; n < cell.end; ++n) {
-        const SurfaceSpot& other = spots_[std::size_t(n)];
-        const Vec3 way = other.position - at.position;
-        const double squared_distance = way.squaredNorm();
-        if (squared_distance > farthest || other.normal.dot(at.normal) <= same_side) continue;
-        const double fall = -way.dot(at.normal);
-        bend = std::max(bend, std::abs(fall));
-        if (fall > 0 && squared_distance >= least)
-          min_squared = std::min(min_squared, squared_distance * 2 * limits_.missed_m / fall);
-      }
-      return false;
+    parallel_for_many(int(cells_.size()), [&](int c) {
+      const Cell& cell = cells_[std::size_t(c)];
+      for (int i = cell.begin; i < cell.end; ++i)
+        spacing_[std::size_t(i)] =
+            measured_in(cell, {spots_[std::size_t(i)].position, smooth[std::size_t(i)]});
     });
-    if (bend < flat) return limits_.max_flat_m;
-    return std::max(limits_.min_m, std::sqrt(min_squared));
   }
 
   // That of the nearest spot on this side of the surface.
@@ -118,10 +90,99 @@ class SpacingMap {
     parallel_for_many(int(spots_.size()), [&](int i) { body(std::size_t(i)); });
   }
 
+  struct Near {
+    int cell;
+    double distance_m;  // at least
+  };
   struct Cell {
     int begin = 0, end = 0;
-    Box box;
+    Box box, normals;        // round its spots' positions, and their normals
+    std::vector<Near> near;  // those with spots no farther than the largest spacing, nearest first
   };
+  static constexpr double rounding = 1e-9;
+
+  void find_near(Cell& cell) const {
+    if (cell.begin == cell.end) return;
+    const Vec3 middle = 0.5 * (cell.box.lower + cell.box.upper);
+    grid_.any_cell(middle, limits_.max_flat_m + 0.5 * cell.box.diagonal(), [&](int index) {
+      const Cell& other = cells_[std::size_t(index)];
+      if (other.begin == other.end) return false;
+      const Vec3 apart =
+          (other.box.lower - cell.box.upper).cwiseMax(cell.box.lower - other.box.upper).cwiseMax(0);
+      if (const double distance = (1 - rounding) * apart.norm(); distance <= limits_.max_flat_m)
+        cell.near.push_back({index, distance});
+      return false;
+    });
+    std::stable_sort(cell.near.begin(), cell.near.end(),
+                     [](const Near& a, const Near& b) { return a.distance_m < b.distance_m; });
+  }
+
+  // The spacing of one place, cell by cell. In whatever order these come, it is the same.
+  class Measure {
+   public:
+    Measure(const SpacingMap& map, const SurfaceSpot& at) : map_(map), at_(at) {}
+
+    // Nothing so far away changes anything: no point falls by more than it is away.
+    bool is_done_at(double distance_m) const {
+      return bend_ >= flat_ && 2 * map_.limits_.missed_m * distance_m >= min_squared_;
+    }
+
+    void look_at(const Cell& cell) {
+      // No point of the cell falls farther, or is nearer; most cells of what is flat change nothing.
+      const Vec3 middle = 0.5 * (cell.box.lower + cell.box.upper), half = 0.5 * cell.box.size();
+      const double max_fall = (1 + rounding) * (std::abs((at_.position - middle).dot(at_.normal)) +
+                                                half.dot(at_.normal.cwiseAbs())),
+                   nearest =
+                       (1 - rounding) * ((at_.position - middle).cwiseAbs() - half).cwiseMax(0).squaredNorm();
+      if (nearest > farthest_ ||
+          ((bend_ >= flat_ || max_fall < flat_) &&
+           max_fall * min_squared_ <= 2 * map_.limits_.missed_m * std::max(nearest, least_)))
+        return;
+      const Vec3 most =
+          (cell.normals.lower.cwiseProduct(at_.normal)).cwiseMax(cell.normals.upper.cwiseProduct(at_.normal));
+      if (most.sum() <= same_side - rounding) return;  // all are of another side
+      for (int n = cell.begin; n < cell.end; ++n) {
+        const SurfaceSpot& other = map_.spots_[std::size_t(n)];
+        const Vec3 way = other.position - at_.position;
+        const double squared_distance = way.squaredNorm();
+        if (squared_distance > farthest_ || other.normal.dot(at_.normal) <= same_side) continue;
+        const double fall = -way.dot(at_.normal);
+        bend_ = std::max(bend_, std::abs(fall));
+        if (fall > 0 && squared_distance >= least_)
+          min_squared_ = std::min(min_squared_, squared_distance * 2 * map_.limits_.missed_m / fall);
+      }
+    }
+
+    double spacing_m() const {
+      return bend_ < flat_ ? map_.limits_.max_flat_m : std::max(map_.limits_.min_m, std::sqrt(min_squared_));
+    }
+
+   private:
+    const SpacingMap& map_;
+    const SurfaceSpot& at_;
+    const double flat_ = 0.1 * map_.limits_.missed_m, least_ = map_.limits_.min_m * map_.limits_.min_m,
+                 farthest_ = map_.limits_.max_flat_m * map_.limits_.max_flat_m;
+    double min_squared_ = map_.limits_.max_m * map_.limits_.max_m, bend_ = 0;
+  };
+
+  double measured_in(const Cell& home, const SurfaceSpot& at) const {
+    Measure measure(*this, at);
+    for (const Near& near : home.near) {
+      if (measure.is_done_at(near.distance_m)) break;
+      measure.look_at(cells_[std::size_t(near.cell)]);
+    }
+    return measure.spacing_m();
+  }
+
+  double measured(const SurfaceSpot& at) const {
+    Measure measure(*this, at);
+    grid_.any_cell(at.position, limits_.max_flat_m, [&](int index) {
+      const Cell& cell = cells_[std::size_t(index)];
+      if (cell.begin < cell.end) measure.look_at(cell);
+      return false;
+    });
+    return measure.spacing_m();
+  }
 
   SampleSpacing limits_;
   std::vector<SurfaceSpot> spots_;  // by the cells of grid_
