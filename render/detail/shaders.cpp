@@ -196,6 +196,16 @@ vec2 around() {
   return normalize(vec2(abs(turn - 2.0) - 1.0, 1.0 - abs(abs(turn - 1.0) - 2.0)));
 }
 
+// Of four samples the k-th has the looks k, k + 4, … of a spiral: its first direction, and by golden4 the next.
+const mat2 golden = mat2(-0.73736888, 0.67549029, -0.67549029, -0.73736888);  // a turn by the golden angle
+const mat2 golden2 = golden * golden, golden4 = golden2 * golden2;
+vec2 turned_by_own(vec2 along) {
+  int own = of_four();
+  if ((own & 1) != 0) along = golden * along;
+  if ((own & 2) != 0) along = golden2 * along;
+  return along;
+}
+
 #ifdef TRANSPARENT
 // Four bilinear taps: 4 × 4 texels, of even weight but for a soft rim. A transparent surface has many layers, and shadows on it are faint.
 float key_visibility(vec3 n) {
@@ -210,16 +220,12 @@ float key_visibility(vec3 n) {
 // which disc to ask. The disc lies in the tangent plane, or a slanting surface would shade itself; its taps are on
 // Vogel's spiral, one after the other to the four samples that share them, turned from four to four.
 float key_visibility(vec3 n) {
-  const int searching = 2, taps = 4;  // of each of the four
-  const mat2 golden = mat2(-0.73736888, 0.67549029, -0.67549029, -0.73736888);  // a turn by the golden angle
-  const mat2 golden2 = golden * golden, golden4 = golden2 * golden2;
+  const int searching = 3, taps = 4;  // of each of the four
   vec3 s = shadow_from_normal * n;
   vec2 slope = -s.xy / min(s.z, -0.15 * length(s));
   slope *= min(1.0, 6.0 / max(length(slope), 1e-6));
   int own = of_four();
-  vec2 along = around();
-  if ((own & 1) != 0) along = golden * along;
-  if ((own & 2) != 0) along = golden2 * along;
+  vec2 along = turned_by_own(around());
   vec2 first = along;
   float search = clamp(shadow_softness * shadow_place.z, min_shadow, max_shadow);
   vec2 above = vec2(0.0);  // how high what blocks the light is, summed, and how often something does
@@ -310,11 +316,15 @@ void main() {
   // Thickness by the first surface that the light meets (Green, GPU Gems 16); what comes out does so on all sides, most
   // where the light grazes. A colour that the material holds back gets less far.
   // Light spreads sideways as far as it gets, so the mean over a disc counts.
-  vec2 aside = scatter_radius * around();
-  if ((of_four() & 1) != 0) aside = vec2(-aside.y, aside.x);
-  if ((of_four() & 2) != 0) aside *= -0.5;
-  float thickness = max(shadow_place.z - texture(entry_depth, shadow_place.xy + aside).r, 0.0);
-  vec3 through = exp2(-1.442695 * thickness / scatter);
+  const int depths = 3;  // of each of the four
+  vec2 aside = turned_by_own(around());
+  vec3 through = vec3(0.0);
+  for (int i = 0; i < depths; ++i) {
+    vec2 way = scatter_radius * sqrt((float(4 * i + of_four()) + 0.5) / float(4 * depths)) * aside;
+    float thickness = max(shadow_place.z - texture(entry_depth, shadow_place.xy + way).r, 0.0);
+    through += exp2(-1.442695 * thickness / scatter) / float(depths);
+    aside = golden4 * aside;
+  }
   through = vec3(mean_of_four(through.rg), mean_of_four(through.bb).x);
   key += (0.5 * translucency * smoothstep(0.55, -0.35, dot(smooth_n, toward_key))) * diffuse * through * key_light;
 #endif
