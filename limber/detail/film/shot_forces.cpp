@@ -6,6 +6,8 @@
 // robot, and no arrow is longer than twice that.
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <map>
 
 #include "core/threads.h"
 #include "fem/control_forces.h"
@@ -19,6 +21,23 @@ namespace {
 
 constexpr double longest_arrow = 2;   // times that of the strongest push, which is as long as the robot
 constexpr double pane_fade_s = 0.25;  // of the film at its usual speed
+
+// How far along a line from `at` it leaves a surface for the last time, metres; 0 where it misses it. Seen
+// along the line, a triangle is crossed where it lies round the origin.
+double last_crossing(const Points& positions, const Triangles& triangles, const Vec3& at, const Vec3& along) {
+  const Vec3 u = along.unitOrthogonal(), v = along.cross(u);
+  const Points from_line = positions.rowwise() - at.transpose();
+  const Eigen::VectorXd x = from_line * u, y = from_line * v, z = from_line * along;
+  double last = -std::numeric_limits<double>::infinity();
+  for (Eigen::Index t = 0; t < triangles.rows(); ++t) {
+    const int a = triangles(t, 0), b = triangles(t, 1), c = triangles(t, 2);
+    const double of_a = x[b] * y[c] - x[c] * y[b], of_b = x[c] * y[a] - x[a] * y[c],
+                 of_c = x[a] * y[b] - x[b] * y[a], all = of_a + of_b + of_c;
+    if (all == 0 || of_a * all < 0 || of_b * all < 0 || of_c * all < 0) continue;
+    last = std::max(last, (of_a * z[a] + of_b * z[b] + of_c * z[c]) / all);
+  }
+  return std::isfinite(last) ? last : 0;
+}
 
 }  // namespace
 
@@ -124,12 +143,15 @@ Points Shot::arrows_at_stored(int frame) const {
   const Vec3 robot = fem::center_of_mass_m(world_, state, world_.robot);
   const int bodies = int(world_.bodies.size());
   const Points nodes = fem::body_positions(world_, state, world_.robot);
+  std::map<int, Points> surfaces;  // of bodies that were asked for
   // Inside a body nothing would be seen of an arrow: it begins where a line along the force leaves it.
-  const auto put = [&](Points& ends, Eigen::Index row, const Points& body, const Vec3& at,
-                       const Vec3& force_n) {
+  const auto put = [&](Points& ends, Eigen::Index row, int body, const Vec3& at, const Vec3& force_n) {
     if (force_n.norm() == 0) return;
     const Vec3 along = force_n.normalized();
-    const Vec3 from = at + std::max(0.0, (body * along).maxCoeff() - at.dot(along)) * along;
+    const PreparedBody& prepared = bodies_[std::size_t(body)];
+    const auto [surface, is_new] = surfaces.try_emplace(body, prepared.surface.positions);
+    if (is_new) deform(prepared, fem::body_positions(world_, state, body), surface->second);
+    const Vec3 from = at + last_crossing(surface->second, prepared.surface.triangles, at, along) * along;
     ends.row(row) = from.transpose();
     const double length =
         std::min(arrow_m_per_n_ * force_n.norm(), longest_arrow * arrow_m_per_n_ * strongest_push_n_);
@@ -144,9 +166,9 @@ Points Shot::arrows_at_stored(int frame) const {
     Vec3 force_n = control.force_n.cast<double>();
     if (control.manipulation == Manipulation::interpolation || control.manipulation == Manipulation::hold)
       for (const Vec3& on_node : fem::control_forces_n(world_, state, control)) force_n += on_node;
-    put(ends, 0, nodes, at_point ? Vec3(nodes.row(control.node).transpose()) : robot, force_n);
+    put(ends, 0, world_.robot, at_point ? Vec3(nodes.row(control.node).transpose()) : robot, force_n);
     if (at_point && control.second_node >= 0)
-      put(ends, of_second, nodes, nodes.row(control.second_node).transpose(),
+      put(ends, of_second, world_.robot, nodes.row(control.second_node).transpose(),
           control.second_force_n.cast<double>());
   }
   // Each at the middle of its contacts, by their forces.
@@ -162,7 +184,7 @@ Points Shot::arrows_at_stored(int frame) const {
     weight[slot] += contact.force_n.norm();
   }
   for (std::size_t b = 0; b < weight.size(); ++b)
-    if (weight[b] > 0) put(ends, 2 + 2 * Eigen::Index(b), nodes, place[b] / weight[b], force[b]);
+    if (weight[b] > 0) put(ends, 2 + 2 * Eigen::Index(b), world_.robot, place[b] / weight[b], force[b]);
   for (std::size_t i = 0; i < world_.forces.size(); ++i) {
     const fem::Force& given = world_.forces[i];
     if (!acts(given, frame)) continue;
@@ -172,7 +194,7 @@ Points Shot::arrows_at_stored(int frame) const {
     double all = 0;
     for (const int n : given.nodes)
       sum += mass[std::size_t(n)] * body.row(n).transpose(), all += mass[std::size_t(n)];
-    put(ends, 2 * (1 + bodies + Eigen::Index(i)), body, sum / all, given.force_n);
+    put(ends, 2 * (1 + bodies + Eigen::Index(i)), given.body, sum / all, given.force_n);
   }
   return ends;
 }

@@ -258,6 +258,7 @@ void check_film(const fs::path& folder, const std::string& suffix, const Json& w
               film_is ? film.string()
                       : film.string() + " has others, or is not there (another ffmpeg makes others)");
   }
+  if (!entry.sheet) return;  // a false word of manifest.json, which is told
   const fs::path sheet = found(folder, entry, *entry.sheet);
   const bool sheet_is = fs::exists(sheet) && render::read_png(sheet) == filming.sheet();
   table.row(name + "contact sheet made again from its frames: the same pixels", sheet_is, sheet.string());
