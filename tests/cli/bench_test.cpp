@@ -365,7 +365,7 @@ TEST_F(Program_slow, BadBenchmarksAreRefusedWithAWayOut) {
       {{"bench", scene(), "-o", out("new"), "--presets", "slow"}, "preset"},
       {{"bench", scene(), "--merge", out()}, "takes no scene"},
       {{"bench", "--merge", out("empty")}, "holds no record"},
-      {{"bench", "--merge", out("broken")}, "is not a record"},
+      {{"bench", "--merge", out("broken")}, "is no record of limber bench"},
       {{"bench", "--merge", out(), out("twice")}, "differ"},
   };
   for (const Case& c : cases) {
