@@ -242,8 +242,8 @@ void Renderer::Impl::draw_opaque(bool passes) {
       order.emplace_back((mesh.card.box().center() - camera.eye).norm(), &mesh);
   std::stable_sort(order.begin(), order.end(),
                    [](const auto& a, const auto& b) { return a.first < b.first; });
-  for (const auto& [distance, drawn] : order) {
-    const Mesh& mesh = *drawn;
+  for (const auto& [distance, opaque] : order) {
+    const Mesh& mesh = *opaque;
     stand_back_for_edges(mesh, settings.multisampling ? 1 : settings.supersampling);
     (hides_its_back(mesh) ? glEnable : glDisable)(GL_CULL_FACE);
     draw_mesh(mesh, passes ? "#define PASSES\n" : "", [](const Program&) {});
