@@ -34,7 +34,7 @@ double elastic_energy_j(const World& world, const ReferenceState& state, int ind
   const auto is_own = [&](int node) {
     return node >= body.first_node && node < body.first_node + body.node_count();
   };
-  const auto& elements = world.tables64.elements;
+  const auto& elements = world.elements;
   const auto at = [](const std::vector<double>& x, int n) { return Eigen::Map<const Vec3>(&x[3 * n]); };
   const auto volume6 = [&](const std::vector<double>& x, const int* node) {
     return 6 * signed_volume(at(x, node[0]), at(x, node[1]), at(x, node[2]), at(x, node[3]));
@@ -45,14 +45,14 @@ double elastic_energy_j(const World& world, const ReferenceState& state, int ind
   };
   const auto& x = state.positions;
   double energy = 0;
-  for (const auto& [node, law] : elements.springs.elements) {
+  for (const auto& [node, law] : elements.springs) {
     if (!is_own(node[0])) continue;
     const double stretch = (at(x, node[1]) - at(x, node[0])).norm() - law.rest_length;
     energy += 0.5 * law.stiffness * stretch * stretch;
   }
-  for (const auto& [node, law] : elements.volumes.elements)
+  for (const auto& [node, law] : elements.volumes)
     if (is_own(node[0])) energy += of_volume(volume6(x, node), law);
-  for (const auto& [node, law] : elements.neo_hookeans.elements) {
+  for (const auto& [node, law] : elements.neo_hookeans) {
     if (!is_own(node[0])) continue;
     // At rest its two parts hold each other in balance; only what is above that counts.
     const double at_rest = of_volume(volume6(world.tables64.rest_positions, node), law.volume);

@@ -25,6 +25,7 @@
 #include "fem/detail/ligaments.h"
 #include "fem/detail/make_body.h"
 #include "fem/detail/make_elements.h"
+#include "fem/detail/make_stars.h"
 #include "fem/detail/make_surface_tables.h"
 #include "fem/detail/make_tables.h"
 #include "fem/detail/make_topology.h"
@@ -183,7 +184,7 @@ World build_world(const WorldSpec& spec) {
   for (Body& body : world.bodies)
     if (body.shape) detail::even_masses(body);
   auto& tables = world.tables64;
-  detail::for_each_table([&](auto& table) { table.ranges.resize(world.bodies.size()); }, tables.elements);
+  tables.elements.runs_of_body.resize(world.bodies.size());
   world.topology.bodies.resize(world.bodies.size());
   world.rigid_tables.resize(world.bodies.size());
   world.nodes = 0;
@@ -199,9 +200,10 @@ World build_world(const WorldSpec& spec) {
       detail::append_topology(body, int(b), world.topology);
       if (body.kind == BodyKind::rigid) world.rigid_tables[b] = detail::make_rigid(body);
       if (!moving || body.kind != BodyKind::deformable) continue;
-      const detail::ElementTables<double> elements = detail::make_elements(body);
+      const detail::ElementLists elements = detail::make_elements(body);
       body.elastic_dt_limit_s = detail::largest_stable_step(body, elements);
-      detail::append(elements, int(b), body.first_node, tables.elements);
+      detail::append(elements, body.first_node, world.elements);
+      detail::append_stars(elements, int(b), body.first_node, tables.elements);
     }
     if (moving) world.moving_nodes = world.nodes;
   }

@@ -159,6 +159,7 @@ struct World {
   Points goal_shape_m;              // (N × 3) from its centre of mass: to what interpolation draws the robot
   int moving_nodes;                 // nodes of State
   int nodes;                        // with those of static bodies
+  detail::ElementLists elements;    // of the moving bodies, on nodes of the world
   detail::Tables<float> tables;     // what the float32 steppers read
   detail::Tables<double> tables64;  // the same for the double reference
   detail::Topology topology;

@@ -2,6 +2,8 @@
 
 #include <immintrin.h>
 
+#include <utility>
+
 #include "fem/detail/kernels.h"
 
 namespace limber::fem::detail {
@@ -25,6 +27,7 @@ Counted& operator-=(Counted& a, Counted b) { return a = a - b; }
 bool operator<(Counted a, Counted b) { return ++counted.comparisons, a.value < b.value; }
 bool operator>(Counted a, Counted b) { return b < a; }
 Counted root(Counted a) { return ++counted.roots, a; }
+Counted fused(Counted a, Counted b, Counted c) { return a * b + c; }
 
 #include "fem/detail/kernels.inc"
 
@@ -56,19 +59,20 @@ namespace limber::bench {
 
 OperationCounts count_operations() {
   using namespace fem::detail;
-  return {count_element<Spring<Counted>>(), count_element<Dashpot<Counted>>(),
-          count_element<VolumeElement<Counted>>(), count_element<NeoHookeanElement<Counted>>(), count_node()};
+  OperationCounts counts;
+  [&]<int... Kind>(std::integer_sequence<int, Kind...>) {
+    ((counts.of_kind[Kind] = count_element<ElementOfKind<Counted, Kind>>()), ...);
+  }
+  (std::make_integer_sequence<int, kinds>());
+  counts.node = count_node();
+  return counts;
 }
 
 double flops_a_tet_step(const fem::World& world, const OperationCounts& counts) {
-  const auto& e = world.tables.elements;
-  const double tets = double(e.volumes.elements.size() + e.neo_hookeans.elements.size());
-  return (double(e.springs.elements.size()) * counts.spring.flops() +
-          double(e.dashpots.elements.size()) * counts.dashpot.flops() +
-          double(e.volumes.elements.size()) * counts.volume.flops() +
-          double(e.neo_hookeans.elements.size()) * counts.neo_hookean.flops() +
-          double(world.moving_nodes) * counts.node.flops()) /
-         tets;
+  double flops = double(world.moving_nodes) * counts.node.flops();
+  for (const fem::detail::Run& run : world.tables.elements.runs)
+    flops += double(run.count) * counts.of_kind[run.kind].flops();
+  return flops / double(world.elements.volumes.size() + world.elements.neo_hookeans.size());
 }
 
 }  // namespace limber::bench

@@ -13,7 +13,7 @@ struct Operations {
 };
 
 struct OperationCounts {  // of one of each
-  Operations spring, dashpot, volume, neo_hookean, node;
+  Operations of_kind[fem::detail::kinds], node;
 };
 OperationCounts count_operations();
 

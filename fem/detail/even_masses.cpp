@@ -43,12 +43,12 @@ struct NodeStiffness {
 
 // The blocks Kₙₙ at rest: of springs and volumes Σ k c cᵀ, c the gradient of the length or of 6V; of
 // Neo-Hookean tets Σ V ((λ + μ) ∇N ∇Nᵀ + μ |∇N|² I), as small strains have them.
-NodeStiffness stiffness_of_nodes(const Body& body, const ElementTables<double>& elements) {
+NodeStiffness stiffness_of_nodes(const Body& body, const ElementLists& elements) {
   std::vector<Eigen::Matrix3d> blocks(std::size_t(body.node_count()), Eigen::Matrix3d::Zero());
   const auto at = [&](int n) -> Vec3 { return body.cage.positions.row(n).transpose(); };
   const double nu = body.material.poisson_ratio;
   const bool springs = body.material.model == MaterialModel::springs;
-  for (const auto& spring : elements.springs.elements) {
+  for (const auto& spring : elements.springs) {
     const Vec3 along = (at(spring.node[1]) - at(spring.node[0])).normalized();
     for (const int n : spring.node)
       blocks[std::size_t(n)] += spring.law.stiffness * along * along.transpose();
@@ -63,7 +63,7 @@ NodeStiffness stiffness_of_nodes(const Body& body, const ElementTables<double>& 
           i == 0 ? Vec3(-inverse.colwise().sum().transpose()) : Vec3(inverse.row(i - 1).transpose());
       Eigen::Matrix3d& block = blocks[std::size_t(body.cage.tets(t, i))];
       if (springs)
-        block += elements.volumes.elements[std::size_t(t)].law.stiffness * volume6 * volume6 * gradient *
+        block += elements.volumes[std::size_t(t)].law.stiffness * volume6 * volume6 * gradient *
                  gradient.transpose();
       else
         block += volume6 / 6 *
@@ -175,7 +175,7 @@ bool match_moments(const Body& body, const std::vector<int>& piece, const Values
 
 void even_masses(Body& body) {
   if (!body.moving || body.kind != BodyKind::deformable) return;
-  const ElementTables<double> elements = make_elements(body);
+  const ElementLists elements = make_elements(body);
   const NodeStiffness stiffness = stiffness_of_nodes(body, elements);
   const std::vector<std::vector<int>> pieces = pieces_of(body);
   double least = largest_frequency2(stiffness, body.node_mass_kg);

@@ -15,8 +15,9 @@ const Kernels<double>* avx512_double();
 bool machine_has(Isa isa) {
   if (isa == Isa::avx512)
     return __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") &&
-           __builtin_cpu_supports("avx512vl") && __builtin_cpu_supports("avx512bw");
-  return isa == Isa::sse2 || __builtin_cpu_supports("avx2");
+           __builtin_cpu_supports("avx512vl") && __builtin_cpu_supports("avx512bw") &&
+           __builtin_cpu_supports("fma");
+  return isa == Isa::sse2 || (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma"));
 }
 
 Isa best_isa() {

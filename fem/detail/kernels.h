@@ -35,6 +35,22 @@ struct NeoHookeanLaw {
   T metric[6];  // μV0 M: xx xy xz yy yz zz
   T scale;      // μV0
 };
+// A tet's law, and those of some of its edges from node 0, to its nodes 1 … Edges. Vectors, velocities and
+// sums of forces of these edges are the tet's own, so that they load and store nothing themselves.
+template <class T, template <class> class Solid, template <class> class Edge, int Edges>
+struct StarLaw {
+  Solid<T> solid;
+  Edge<T> edge[Edges];
+};
+template <class T, template <class> class Solid, template <class> class Edge>
+struct StarLaw<T, Solid, Edge, 0> {
+  Solid<T> solid;
+};
+template <template <class> class Solid, template <class> class Edge, int Edges>
+struct StarLawOf {
+  template <class T>
+  using Law = StarLaw<T, Solid, Edge, Edges>;
+};
 
 // On `nodes` nodes acts a law. Blocks hold the same in columns, 16 elements each, for the kernel that puts
 // elements of one rollout side by side; the last is filled up with what is harmless to compute.
@@ -52,6 +68,10 @@ template <class Real>
 using VolumeElement = Element<Real, 4, VolumeLaw>;
 template <class Real>
 using NeoHookeanElement = Element<Real, 4, NeoHookeanLaw>;
+template <class Real, int Edges>
+using SpringStar = Element<Real, 4, StarLawOf<VolumeLaw, SpringLaw, Edges>::template Law>;
+template <class Real, int Edges>
+using NeoHookeanStar = Element<Real, 4, StarLawOf<NeoHookeanLaw, DashpotLaw, Edges>::template Law>;
 
 inline constexpr int block_size = 16;
 template <class E>
@@ -69,12 +89,46 @@ struct List {
   const Block<E>* blocks;
   int count;
 };
+
+// The kinds of elements by number: edges that are in no star, and stars of 0 to 3 edges.
+inline constexpr int spring_kind = 0, dashpot_kind = 1, spring_star_kind = 2, neo_hookean_star_kind = 6,
+                     kinds = 10;
+template <class Real, int Kind>
+struct OfKind {
+  using Type = NeoHookeanStar<Real, Kind - neo_hookean_star_kind>;
+};
+template <class Real, int Kind>
+requires(Kind < neo_hookean_star_kind) struct OfKind<Real, Kind> {
+  using Type = SpringStar<Real, Kind - spring_star_kind>;
+};
+template <class Real>
+struct OfKind<Real, spring_kind> {
+  using Type = Spring<Real>;
+};
+template <class Real>
+struct OfKind<Real, dashpot_kind> {
+  using Type = Dashpot<Real>;
+};
+template <class Real, int Kind>
+using ElementOfKind = typename OfKind<Real, Kind>::Type;
+
+// Elements of one kind, one after the other, from these on of all of their kind.
+struct Run {
+  int kind, element, block, count;
+};
+// What acts, run by run: the order of all sums of forces.
 template <class Real>
 struct Elements {
-  List<Spring<Real>> springs;
-  List<Dashpot<Real>> dashpots;
-  List<VolumeElement<Real>> volumes;
-  List<NeoHookeanElement<Real>> neo_hookeans;
+  const Run* runs;
+  int count;
+  const void* elements[kinds];  // of all bodies, the first of their kind
+  const void* blocks[kinds];
+  template <int Kind>
+  List<ElementOfKind<Real, Kind>> list_of(const Run& run) const {
+    using E = ElementOfKind<Real, Kind>;
+    return {static_cast<const E*>(elements[Kind]) + run.element,
+            static_cast<const Block<E>*>(blocks[Kind]) + run.block, run.count};
+  }
 };
 
 // Where numbers of a node are, from the first of their array. One lane: records x y z 0 u v w 0 and forces

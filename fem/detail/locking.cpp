@@ -315,17 +315,17 @@ class Quadratic {
 
 // K of the elements that the steppers have, at rest: k n nᵀ for a spring along n, k g gᵀ for a volume with
 // g = ∂(6V). Neo-Hookean tets are at small strain linear tets of Lamé's moduli.
-Sparse stiffness_at_rest(const ElementTables<double>& elements, const TetMesh& mesh,
-                         const std::vector<Lame>& of_tet, const Freedoms& freedoms) {
+Sparse stiffness_at_rest(const ElementLists& elements, const TetMesh& mesh, const std::vector<Lame>& of_tet,
+                         const Freedoms& freedoms) {
   const Points& x = mesh.positions;
   Triplets entries;
-  for (const auto& [node, law] : elements.springs.elements) {
+  for (const auto& [node, law] : elements.springs) {
     const Vec3 n = (x.row(node[1]) - x.row(node[0])).normalized();
     for (int a = 0; a < 2; ++a)
       for (int b = 0; b < 2; ++b)
         freedoms.add(entries, node[a], node[b], (a == b ? 1 : -1) * law.stiffness * n * n.transpose());
   }
-  const bool springs = elements.neo_hookeans.elements.empty();
+  const bool springs = elements.neo_hookeans.empty();
   for (int t = 0; t < mesh.tets.rows(); ++t) {
     const TetShape shape(x, mesh.tets, t);
     for (int a = 0; a < 4; ++a)
@@ -472,7 +472,7 @@ class Balance {
 // held; to the K of a free body it adds a billionth of the diagonal, which gives it an inverse. Loads count
 // by the cube of how far they move the body, so the softest decide.
 double locking_share(const TetMesh& rest, const std::vector<bool>& fixed, const std::vector<Lame>& of_tet,
-                     const std::vector<double>& node_mass, const ElementTables<double>& elements) {
+                     const std::vector<double>& node_mass, const ElementLists& elements) {
   const int tets = int(rest.tets.rows()), nodes = int(rest.positions.rows());
   if (tets > max_tets) return 1;
   const Freedoms coarse(fixed);

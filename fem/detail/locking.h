@@ -19,6 +19,6 @@ struct Lame {
 // extrapolated). Meshes of more than 20,000 tets are taken to be fine enough: 1. A multiple of 1/512. Method:
 // docs/dynamics.md.
 double locking_share(const TetMesh& rest, const std::vector<bool>& fixed, const std::vector<Lame>& of_tet,
-                     const std::vector<double>& node_mass, const ElementTables<double>& elements);
+                     const std::vector<double>& node_mass, const ElementLists& elements);
 
 }  // namespace limber::fem::detail

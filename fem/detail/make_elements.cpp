@@ -90,7 +90,7 @@ OverEdges damping_times(const Body& body) {
 // modulus μ and, as central forces must, λ = μ. So each tet gives each of its six edges 2.5 μV, and its
 // volume term has what is missing, k_V = (λ − μ)V. The even shares are then fitted to the mesh. Laws are
 // stored as kernels.h has them: k/D² for lengths, k/(6V₀)² for six times the volume.
-void make_springs(const Body& body, ElementTables<double>& tables) {
+void make_springs(const Body& body, ElementLists& lists) {
   const auto& x = body.cage.positions;
   const std::vector<double> volumes = tet_volumes(body.cage);
   for (int t = 0; t < body.cage.tets.rows(); ++t) {
@@ -99,7 +99,7 @@ void make_springs(const Body& body, ElementTables<double>& tables) {
     const auto q = body.cage.tets.row(t);
     const double v = volumes[t], k = (lambda - mu) * v, scale = 1 / (36 * v * v);
     const double inverted = std::max(0.0, inversion_stiffness * mu * v - k);
-    tables.volumes.elements.push_back(
+    lists.volumes.push_back(
         {{q[0], q[1], q[2], q[3]}, {6 * v, k * scale, inverted * scale, tau * k * scale}});
   }
   // Shares are fitted as if the body were all of one material: where parts meet, an affine strain has to
@@ -115,8 +115,7 @@ void make_springs(const Body& body, ElementTables<double>& tables) {
   for (const auto& [edge, share] : isotropic_springs(body.cage, mu_volume)) {
     const double rest = (x.row(edge.first) - x.row(edge.second)).norm();
     const double k = share * (stiffness_round.at(edge) / volume_round.at(edge)), tau = taus.at(edge);
-    tables.springs.elements.push_back(
-        {{edge.first, edge.second}, {rest, k / (rest * rest), tau * k / (rest * rest)}});
+    lists.springs.push_back({{edge.first, edge.second}, {rest, k / (rest * rest), tau * k / (rest * rest)}});
   }
 }
 
@@ -125,7 +124,7 @@ void make_springs(const Body& body, ElementTables<double>& tables) {
 // for V₀. For the other, I = tr FᵀF = tr(EᵀE M) with E the edges from node 0 as columns and M = (E₀ᵀE₀)⁻¹,
 // so no F is needed; stored is μ'V₀ M. Damping is that of springs of the same material, as dashpots along
 // the edges.
-void make_neo_hookean(const Body& body, ElementTables<double>& tables) {
+void make_neo_hookean(const Body& body, ElementLists& lists) {
   const auto& x = body.cage.positions;
   const std::vector<double> volumes = tet_volumes(body.cage);
   for (int t = 0; t < body.cage.tets.rows(); ++t) {
@@ -138,24 +137,23 @@ void make_neo_hookean(const Body& body, ElementTables<double>& tables) {
     for (int i = 0; i < 3; ++i) edges.col(i) = x.row(q[i + 1]) - x.row(q[0]);
     const Eigen::Matrix3d m = mu * v * (edges.transpose() * edges).inverse();
     const double damping = tau * std::max(0.0, lame_lambda - lame_mu) * v * scale;
-    tables.neo_hookeans.elements.push_back(
-        {{q[0], q[1], q[2], q[3]},
-         {{6 * v * (1 + 0.75 * mu / lambda), lambda * v * scale, 0, damping},
-          {m(0, 0), m(0, 1), m(0, 2), m(1, 1), m(1, 2), m(2, 2)},
-          mu * v}});
+    lists.neo_hookeans.push_back({{q[0], q[1], q[2], q[3]},
+                                  {{6 * v * (1 + 0.75 * mu / lambda), lambda * v * scale, 0, damping},
+                                   {m(0, 0), m(0, 1), m(0, 2), m(1, 1), m(1, 2), m(2, 2)},
+                                   mu * v}});
   }
   const OverEdges taus = damping_times(body);
   for (const auto& [edge, k] :
        over_edges(body, Together::sum, [&](int t) { return 2.5 * lame_of(body, t).mu * volumes[t]; })) {
     const double rest = (x.row(edge.first) - x.row(edge.second)).norm(), tau = taus.at(edge);
-    tables.dashpots.elements.push_back({{edge.first, edge.second}, {tau * k / (rest * rest)}});
+    lists.dashpots.push_back({{edge.first, edge.second}, {tau * k / (rest * rest)}});
   }
 }
 
 }  // namespace
 
-ElementTables<double> make_elements(const Body& body) {
-  ElementTables<double> elements;
+ElementLists make_elements(const Body& body) {
+  ElementLists elements;
   body.material.model == MaterialModel::springs ? make_springs(body, elements)
                                                 : make_neo_hookean(body, elements);
   return elements;
@@ -188,7 +186,7 @@ namespace limber::fem::detail {
 
 // 2 (√(1 + ζ²) − ζ)/ω with ω and ζ of the fastest mode at rest (timestep.h). Fixed nodes do not move: their
 // inverse mass is 0.
-double largest_stable_step(const Body& body, const ElementTables<double>& elements) {
+double largest_stable_step(const Body& body, const ElementLists& elements) {
   const std::vector<double> positions(body.cage.positions.data(),
                                       body.cage.positions.data() + body.cage.positions.size());
   std::vector<double> inverse_mass;

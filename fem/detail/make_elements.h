@@ -12,10 +12,10 @@
 namespace limber::fem::detail {
 
 // On the body's own node numbers, without blocks. Needs stiffness_share.
-ElementTables<double> make_elements(const Body&);
+ElementLists make_elements(const Body&);
 // Sets stiffness_share of all bodies where it is 0, in parallel: 1 unless mesh_independent.
 void find_stiffness_shares(std::vector<Body>&);
 // Of the damped elastic body, seconds.
-double largest_stable_step(const Body&, const ElementTables<double>&);
+double largest_stable_step(const Body&, const ElementLists&);
 
 }  // namespace limber::fem::detail

@@ -3,7 +3,7 @@
 //
 // What always holds: nodes and elements are numbered body after body, moving bodies first, so the elements
 // of a body are one range and State is the front of all nodes. A block has sixteen elements in columns, for
-// the kernel that puts elements of one rollout side by side in a vector; each body begins a block of its
+// the kernel that puts elements of one rollout side by side in a vector; each run begins a block of its
 // own. A law's members are all numbers of one type, so a law is read as an array (kernels.h).
 #include "fem/detail/make_tables.h"
 
@@ -17,22 +17,20 @@
 namespace limber::fem::detail {
 namespace {
 
-// Fills the blocks of a table. Each body's last block is filled up with its last element, which is harmless
-// to compute; the kernel adds no forces of those.
+// Fills the blocks of a run. The last is filled up with the run's last element, which is harmless to compute;
+// the kernel adds no forces of those.
 template <class E>
-void pack(ElementTable<E>& table) {
+void pack(ElementTable<E>& table, Run& run) {
   constexpr std::size_t size = block_size;
-  for (auto& range : table.ranges) {
-    range.block = int(table.blocks.size());
-    const std::size_t count = std::size_t(range.count), blocks = (count + size - 1) / size;
-    table.blocks.resize(table.blocks.size() + blocks);
-    for (std::size_t e = 0; e < blocks * size; ++e) {
-      const E& element = table.elements[std::size_t(range.element) + std::min(e, count - 1)];
-      auto& block = table.blocks[std::size_t(range.block) + e / size];
-      for (int i = 0; i < E::nodes; ++i) block.node[i][e % size] = element.node[i];
-      const float* numbers = reinterpret_cast<const float*>(&element.law);
-      for (int i = 0; i < Block<E>::numbers; ++i) block.law[i][e % size] = numbers[i];
-    }
+  run.block = int(table.blocks.size());
+  const std::size_t count = std::size_t(run.count), blocks = (count + size - 1) / size;
+  table.blocks.resize(table.blocks.size() + blocks);
+  for (std::size_t e = 0; e < blocks * size; ++e) {
+    const E& element = table.elements[std::size_t(run.element) + std::min(e, count - 1)];
+    auto& block = table.blocks[std::size_t(run.block) + e / size];
+    for (int i = 0; i < E::nodes; ++i) block.node[i][e % size] = element.node[i];
+    const float* numbers = reinterpret_cast<const float*>(&element.law);
+    for (int i = 0; i < Block<E>::numbers; ++i) block.law[i][e % size] = numbers[i];
   }
 }
 
@@ -46,17 +44,15 @@ void convert(const From& from, To& to) {
 
 }  // namespace
 
-// Node numbers become those of the world: element.node += first_node.
-void append(const ElementTables<double>& of_body, int body, int first_node, ElementTables<double>& all) {
-  for_each_table(
-      [&](const auto& from, auto& to) {
-        to.ranges[std::size_t(body)] = {int(to.elements.size()), 0, int(from.elements.size())};
-        for (auto element : from.elements) {
-          for (int& n : element.node) n += first_node;
-          to.elements.push_back(element);
-        }
-      },
-      of_body, all);
+void append(const ElementLists& of_body, int first_node, ElementLists& all) {
+  const auto add = [&](const auto& from, auto& to) {
+    for (auto element : from) {
+      for (int& n : element.node) n += first_node;
+      to.push_back(element);
+    }
+  };
+  add(of_body.springs, all.springs), add(of_body.dashpots, all.dashpots);
+  add(of_body.volumes, all.volumes), add(of_body.neo_hookeans, all.neo_hookeans);
 }
 
 void append_nodes(const Body& body, Tables<double>& tables) {
@@ -92,17 +88,19 @@ RigidTable make_rigid(const Body& body) {
 // Node numbers and ranges are copied as they are, numbers rounded.
 Tables<float> single_precision(const Tables<double>& t) {
   Tables<float> out;
-  for_each_table(
-      [](const auto& from, auto& to) {
-        for (const auto& element : from.elements) {
-          auto& copy = to.elements.emplace_back();
-          std::copy(std::begin(element.node), std::end(element.node), copy.node);
-          convert(element.law, copy.law);
-        }
-        for (const auto& [element, block, count] : from.ranges) to.ranges.push_back({element, block, count});
-        pack(to);
-      },
-      t.elements, out.elements);
+  out.elements.runs = t.elements.runs, out.elements.runs_of_body = t.elements.runs_of_body;
+  const auto round = [&]<int Kind>(std::integral_constant<int, Kind>) {
+    auto& to = std::get<Kind>(out.elements.of_kind);
+    for (const auto& element : std::get<Kind>(t.elements.of_kind).elements) {
+      auto& copy = to.elements.emplace_back();
+      std::copy(std::begin(element.node), std::end(element.node), copy.node);
+      convert(element.law, copy.law);
+    }
+    for (Run& run : out.elements.runs)
+      if (run.kind == Kind) pack(to, run);
+  };
+  [&]<int... Kind>(std::integer_sequence<int, Kind...>) { (round(std::integral_constant<int, Kind>()), ...); }
+  (std::make_integer_sequence<int, kinds>());
   const auto copy = [](const std::vector<double>& v) { return std::vector<float>(v.begin(), v.end()); };
   out.node_mass = copy(t.node_mass), out.inverse_mass = copy(t.inverse_mass);
   out.rest_positions = copy(t.rest_positions), out.goal_from_center = copy(t.goal_from_center);

@@ -9,8 +9,8 @@
 
 namespace limber::fem::detail {
 
-// Appends the elements of a body to those of the world. Ranges are already there, one a body.
-void append(const ElementTables<double>& of_body, int body, int first_node, ElementTables<double>& all);
+// Appends the elements of a body to those of the world, whose node numbers are higher by first_node.
+void append(const ElementLists& of_body, int first_node, ElementLists& all);
 // Appends masses and rest places of a body's nodes.
 void append_nodes(const Body&, Tables<double>&);
 RigidTable make_rigid(const Body&);

@@ -1,6 +1,8 @@
 // What the steppers read of a World: flat arrays in the order in which they are walked.
 #pragma once
 
+#include <tuple>
+#include <utility>
 #include <vector>
 
 #include "fem/detail/kernels.h"
@@ -8,49 +10,50 @@
 
 namespace limber::fem::detail {
 
+// What materials give to edges and tets.
+struct ElementLists {
+  std::vector<Spring<double>> springs;         // every edge of a body of springs once, i < j, ascending
+  std::vector<Dashpot<double>> dashpots;       // every edge of a Neo-Hookean body
+  std::vector<VolumeElement<double>> volumes;  // tets
+  std::vector<NeoHookeanElement<double>> neo_hookeans;
+};
+
+// The same as the kernels walk it (make_stars.h).
 template <class E>
 struct ElementTable {
   std::vector<E> elements;
-  std::vector<Block<E>> blocks;  // the same in columns; a body begins with a block of its own
-  struct Range {
-    int element, block, count;
-  };
-  std::vector<Range> ranges;  // of a body
+  std::vector<Block<E>> blocks;  // the same in columns; a run begins with a block of its own
+};
+template <class Real, class Kinds = std::make_integer_sequence<int, kinds>>
+struct ElementTables;
+template <class Real, int... Kind>
+struct ElementTables<Real, std::integer_sequence<int, Kind...>> {
+  std::tuple<ElementTable<ElementOfKind<Real, Kind>>...> of_kind;
+  std::vector<Run> runs;                          // in the order of the forces' sums
+  std::vector<std::pair<int, int>> runs_of_body;  // [first, last)
 };
 
-template <class E>
-List<E> list_of(const ElementTable<E>& table) {
-  return {table.elements.data(), table.blocks.data(), int(table.elements.size())};
+// Those of the runs [first, last).
+template <class Real>
+Elements<Real> elements_of(const ElementTables<Real>& tables, int first, int last) {
+  Elements<Real> all{tables.runs.data() + first, last - first, {}, {}};
+  std::apply(
+      [&](const auto&... table) {
+        int kind = 0;
+        ((all.elements[kind] = table.elements.data(), all.blocks[kind++] = table.blocks.data()), ...);
+      },
+      tables.of_kind);
+  return all;
 }
-
+template <class Real>
+Elements<Real> elements_of(const ElementTables<Real>& tables) {
+  return elements_of(tables, 0, int(tables.runs.size()));
+}
 // Those of one body.
-template <class E>
-List<E> list_of(const ElementTable<E>& table, int body) {
-  const auto [element, block, count] = table.ranges[std::size_t(body)];
-  return {table.elements.data() + element, table.blocks.data() + block, count};
-}
-
-// Of the moving bodies.
 template <class Real>
-struct ElementTables {
-  ElementTable<Spring<Real>> springs;         // every edge of a body of springs once, i < j, ascending
-  ElementTable<Dashpot<Real>> dashpots;       // every edge of a Neo-Hookean body
-  ElementTable<VolumeElement<Real>> volumes;  // tets
-  ElementTable<NeoHookeanElement<Real>> neo_hookeans;
-};
-template <class Real>
-Elements<Real> elements_of(const ElementTables<Real>& t) {
-  return {list_of(t.springs), list_of(t.dashpots), list_of(t.volumes), list_of(t.neo_hookeans)};
-}
-template <class Real>
-Elements<Real> elements_of(const ElementTables<Real>& t, int body) {
-  return {list_of(t.springs, body), list_of(t.dashpots, body), list_of(t.volumes, body),
-          list_of(t.neo_hookeans, body)};
-}
-// Calls each(table) for the four of them, or each(a, b) for those of two.
-template <class Each, class... Tables>
-void for_each_table(const Each& each, Tables&&... t) {
-  each(t.springs...), each(t.dashpots...), each(t.volumes...), each(t.neo_hookeans...);
+Elements<Real> elements_of(const ElementTables<Real>& tables, int body) {
+  const auto [first, last] = tables.runs_of_body[std::size_t(body)];
+  return elements_of(tables, first, last);
 }
 
 template <class Real>

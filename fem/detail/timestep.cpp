@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "core/random.h"
+#include "fem/detail/make_stars.h"
 
 namespace limber::fem::detail {
 namespace {
@@ -16,16 +17,16 @@ constexpr double nudge = 1e-5;
 constexpr int iterations = 300;
 constexpr double margin = 1.02;  // the iteration comes from below
 
-template <class E>
-double shortest_edge(const ElementTable<E>& table, const Values& x) {
+double shortest_edge(const ElementLists& lists, const Values& x) {
   double shortest2 = std::numeric_limits<double>::infinity();
-  for (const E& e : table.elements)
-    for (int i = 0; i < E::nodes; ++i)
-      for (int j = 0; j < i; ++j) {
-        double length2 = 0;
-        for (int c = 0; c < 3; ++c) length2 += std::pow(x[3 * e.node[i] + c] - x[3 * e.node[j] + c], 2);
-        shortest2 = std::min(shortest2, length2);
-      }
+  const auto look_at = [&](const auto& edges) {
+    for (const auto& edge : edges) {
+      double length2 = 0;
+      for (int c = 0; c < 3; ++c) length2 += std::pow(x[3 * edge.node[1] + c] - x[3 * edge.node[0] + c], 2);
+      shortest2 = std::min(shortest2, length2);
+    }
+  };
+  look_at(lists.springs), look_at(lists.dashpots);
   return std::sqrt(shortest2);
 }
 
@@ -47,11 +48,9 @@ std::vector<double> forces_of(const ElementTables<double>& elements, const Value
   return forces;
 }
 
-FastestMode fastest_mode(const ElementTables<double>& elements, const Values& rest,
-                         const Values& inverse_mass) {
-  double shortest = std::numeric_limits<double>::infinity();
-  for_each_table([&](const auto& table) { shortest = std::min(shortest, shortest_edge(table, rest)); },
-                 elements);
+FastestMode fastest_mode(const ElementLists& lists, const Values& rest, const Values& inverse_mass) {
+  const ElementTables<double> elements = stars_of(lists);
+  const double shortest = shortest_edge(lists, rest);
   // Symmetric form M^-½ K M^-½, so that the Rayleigh quotient converges with the square of the vector's
   // error.
   const std::size_t numbers = rest.size();

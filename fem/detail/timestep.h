@@ -14,7 +14,7 @@ struct FastestMode {
 // By power iteration from a written seed, and 2 % more than that gives. K and the damping are taken as
 // differences of the forces. rest_positions (3 a node) and inverse_mass are indexed as the elements index
 // them; nodes with inverse mass 0 do not move.
-FastestMode fastest_mode(const ElementTables<double>&, const std::vector<double>& rest_positions,
+FastestMode fastest_mode(const ElementLists&, const std::vector<double>& rest_positions,
                          const std::vector<double>& inverse_mass);
 
 // The forces (3 a node) at these positions and velocities.

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "fem/detail/make_elements.h"
+#include "fem/detail/make_stars.h"
 #include "fem/detail/timestep.h"
 
 namespace limber::fem::testing {
@@ -12,7 +13,7 @@ namespace limber::fem::testing {
 // ω² of M⁻¹K, ascending, by the masses that the body has; K by differences of the forces over 1e-5 of the
 // body's size. Needs stiffness_share.
 inline Eigen::VectorXd frequencies2(const Body& body) {
-  const detail::ElementTables<double> elements = detail::make_elements(body);
+  const detail::ElementTables<double> elements = detail::stars_of(detail::make_elements(body));
   const double nudge = 1e-5 * bounding_box(body.cage.positions).size().maxCoeff();
   std::vector<double> rest;
   for (int n = 0; n < body.node_count(); ++n)

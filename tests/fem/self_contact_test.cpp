@@ -1,7 +1,9 @@
 // A body that touches itself (docs/contact.md).
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <vector>
 
 #include "core/random.h"
 #include "fem/batch.h"
@@ -68,11 +70,15 @@ TEST(SelfContact, TheEndsOfABentBarMeetAndDoNotPass) {
   EXPECT_LT(min_gap(false, 2), -0.2);  // through one another
   for (const double speed : {1.0, 2.0, 4.0}) {
     SCOPED_TRACE(speed);
-    const double gap = min_gap(true, speed);
-    EXPECT_LT(gap, 0.01);  // they met
-    // Up to 2 m/s they press no deeper than this; whatever the speed, no arm gets half through the other.
+    std::vector<double>
+        gaps;  // at speeds nearby: how deep a single one goes is chance, 0.7 to 3.2 cm at 1 m/s
+    for (const double near : {0.96, 0.98, 1.0, 1.02, 1.04}) gaps.push_back(min_gap(true, near * speed));
+    std::sort(gaps.begin(), gaps.end());
+    EXPECT_LT(gaps.back(), 0.01);   // they met
+    EXPECT_GT(gaps.front(), -0.1);  // whatever the speed, no arm gets half through the other
+    // Up to 2 m/s the middle one is no deeper than this.
     testing::prove_at_least(15, fmt::format("ends of a bent bar's arms at {} m/s: least gap, m", speed),
-                            "0.2 m thick", gap, speed > 2 ? -0.1 : -0.02 - 0.01 * speed);
+                            "0.2 m thick", gaps[2], speed > 2 ? -0.1 : -0.02 - 0.01 * speed);
   }
 }
 
