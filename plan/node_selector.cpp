@@ -32,8 +32,14 @@ constexpr int raises_a_renewal = 4;
 
 }  // namespace
 
-NodeSelector::NodeSelector(const System& system, const Settings& settings, const Guidance* guidance, int root)
-    : system_(system), settings_(settings), root_(root) {
+NodeSelector::NodeSelector(const System& system, const Settings& settings, const Guidance* guidance, int root,
+                           int smallest_tree)
+    : system_(system),
+      settings_(settings),
+      root_(root),
+      by_distance_(smallest_tree),
+      by_time_(smallest_tree),
+      by_time_of_carriers_(smallest_tree) {
   if (guidance) guidance_ = *guidance;
   const Carriers* carriers = system.carriers();
   if (!carriers) return;
@@ -71,6 +77,7 @@ void NodeSelector::add(const Tree& tree, int of_tree) {
   centers_from_goal_.push_back(center - shift.cast<float>());
   times_s_.push_back(double(state.step) * system_.dt_s());
   children_.push_back(0), refused_.push_back(false);
+  plant(node);
   if (!guidance_) return;
   const int parent = tree.parents[std::size_t(of_tree)] - root_;  // < 0: of the root
   if (parent >= 0) {
@@ -90,6 +97,7 @@ void NodeSelector::refuse(int of_tree) {
   refused_[std::size_t(node)] = true;
   constexpr float nowhere = std::numeric_limits<float>::infinity();  // farther than any other
   for (Centers* centers : {&centers_, &centers_from_goal_}) centers->x[std::size_t(node)] = nowhere;
+  if (at_goal_ && at_goal_->node == node) at_goal_.reset();
   if (guidance_) unrank(node);
 }
 
@@ -178,21 +186,51 @@ double NodeSelector::cost_of(const Sample& d, int node) const {
   return seconds + time_to_go(way, at.velocity - frame, strongest());
 }
 
-// All nodes in order, each first by a bound that is quickly told; with two carriers there is none.
-int NodeSelector::nearest_in_time(const Sample& d) const {
-  int best = 0;
-  double least = cost_of(d, 0);
-  const bool carried = system_.carriers();
-  for (int node = 1; node < centers_.size(); ++node) {
-    const NodeMotion& at = motions_[std::size_t(node)];
-    const Vec3 way = d.point + (d.towards_goal ? at.goal_shift : Vec3::Zero()) - at.center;
-    const Vec3 velocity = at.velocity - (d.towards_goal ? at.goal_velocity : Vec3::Zero());
-    // Without drag it is sooner still, and quickly told.
-    const Drive unslowed{strongest().acceleration};
-    if (!carried && min_time_to_go(way.norm(), velocity.norm(), unslowed) >= least) continue;
-    if (const double c = cost_of(d, node); c < least) best = node, least = c;
-  }
-  return best;
+namespace {
+
+// Every draw towards the goal asks the same.
+Sample towards(const Goal& goal) {
+  Sample d;
+  d.point = goal.center_of_mass_m, d.towards_goal = true;
+  return d;
+}
+
+}  // namespace
+
+void NodeSelector::plant(int node) {
+  const NodeMotion& at = motions_[std::size_t(node)];
+  const double time_s = times_s_[std::size_t(node)];
+  if (settings_.search_options.metric == Metric::distance)
+    by_distance_.add({node, centers_[node]});
+  else if (system_.carriers())
+    by_time_of_carriers_.add({node, time_s, at.carried});
+  else
+    by_time_.add({node, time_s, {NodePlace{at.center, at.velocity}}});
+  const double to_goal = cost_of(towards(settings_.goal), node);
+  if (node == 0) at_goal_ = {node, to_goal};
+  if (at_goal_) at_goal_->offer(to_goal, node);
+}
+
+int NodeSelector::nearest_to_goal() const {
+  if (at_goal_) return at_goal_->node;
+  at_goal_.emplace();
+  for (int node = 0; node < centers_.size(); ++node)
+    at_goal_->offer(cost_of(towards(settings_.goal), node), node);
+  return at_goal_->node;
+}
+
+int NodeSelector::nearest_node(const Sample& d) const {
+  if (d.towards_goal) return nearest_to_goal();
+  const double time_weight = settings_.search_options.time_weight;
+  const auto cost = [&](int node) { return cost_of(d, node); };
+  Nearest found{0, cost(0)};
+  if (settings_.search_options.metric == Metric::distance)
+    by_distance_.search(DistanceQuery{d.point.cast<float>(), cost}, found);
+  else if (system_.carriers())
+    by_time_of_carriers_.search(TimeQuery{carrier_targets(d, 0), strongest(), time_weight, cost}, found);
+  else
+    by_time_.search(TimeQuery{std::array{d.point}, strongest(), time_weight, cost}, found);
+  return found.node;
 }
 
 Selection NodeSelector::choose(const Sample& d) const {
@@ -204,9 +242,7 @@ Selection NodeSelector::choose(const Sample& d) const {
     const int node = ranking_[rank].second;
     return {root_ + node, 0, control(d, node)};
   }
-  return aim(d, root_ + (settings_.search_options.metric == Metric::distance
-                             ? nearest(d.towards_goal ? centers_from_goal_ : centers_, d.point.cast<float>())
-                             : nearest_in_time(d)));
+  return aim(d, root_ + nearest_node(d));
 }
 
 Selection NodeSelector::aim(const Sample& d, int of_tree) const {
