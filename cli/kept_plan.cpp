@@ -157,14 +157,17 @@ std::string text_of_search(const Json& s, const std::string& extra, const fs::pa
   return fmt::format(
       "{}\n"
       "{}{}"
-      "  search       {} iterations, {} nodes, {} diverged, {} rejected, {} ways refused{}\n"
+      "  search       {} iterations, {} nodes{}, {} diverged, {} rejected, {} ways refused{}\n"
       "  memory       {:.1f} kB a node, {:.1f} where nothing is shared with the parent\n"
       "{}{}{}"
       "  hashes       tree {}, trajectory {}\n"
       "  file         {}\n",
       s.at("explanation").get<std::string>(), s.contains("parted") ? text_of_parting(s) : "",
       s.contains("legs") ? text_of_legs(s.at("legs")) : "", t.at("iterations").get<std::int64_t>(),
-      s.at("nodes").get<int>(), t.at("diverged").get<std::int64_t>(), t.at("rejected").get<std::int64_t>(),
+      s.at("nodes").get<int>(),
+      s.contains("nodes_kept") ? fmt::format(" (kept: the {} of the path)", s.at("nodes_kept").get<int>())
+                               : "",
+      t.at("diverged").get<std::int64_t>(), t.at("rejected").get<std::int64_t>(),
       t.at("refused").get<std::int64_t>(), seconds, 1e-3 * s.at("node_bytes").get<double>(),
       1e-3 * s.at("node_bytes_unshared").get<double>(), dynamics, text_of_motion(s), extra,
       s.at("tree_hash").get<std::string>(), s.at("trajectory_hash").get<std::string>(), file.string());

@@ -46,6 +46,13 @@ void add_plan(CLI::App& command, PlanOptions& options) {
       ->check(CLI::IsMember({"paper", "fast"}));
   add_limits(command, options);
   command
+      .add_option(
+          "--keep-tree", options.keep_tree,
+          "what plan.npz keeps: all nodes of the tree, or those of the path alone, from which no search "
+          "can be resumed; an unfinished search keeps all")
+      ->check(CLI::IsMember({"all", "path"}))
+      ->capture_default_str();
+  command
       .add_option("--stats", options.stats,
                   "how the search goes, a line of JSON for every tenth iteration; whole at any time")
       ->type_name("FILE.jsonl");

@@ -8,6 +8,7 @@
 #include <cstring>
 #include <mutex>
 #include <set>
+#include <utility>
 
 #include "core/error.h"
 #include "core/temporary_files.h"
@@ -29,6 +30,7 @@ class Descriptor {
   Descriptor(const Descriptor&) = delete;
   Descriptor& operator=(const Descriptor&) = delete;
   operator int() const { return fd_; }
+  int release() { return std::exchange(fd_, -1); }
 
  private:
   int fd_;
@@ -64,14 +66,19 @@ void remove_abandoned_beside(const fs::path& path) {
 
 }  // namespace
 
-std::string read_file(const fs::path& path, std::uintmax_t max_bytes) {
-  const auto refuse_size = [&](const std::string& size) {
-    throw InputError(
-        fmt::format("{}: holds {} bytes, and at most {} are read of such a file; is it the right one?",
-                    path.string(), size, max_bytes));
-  };
+namespace {
+
+[[noreturn]] void refuse_size(const fs::path& path, const std::string& size, std::uintmax_t max_bytes) {
+  throw InputError(
+      fmt::format("{}: holds {} bytes, and at most {} are read of such a file; is it the right one?",
+                  path.string(), size, max_bytes));
+}
+
+}  // namespace
+
+FileReader::FileReader(const fs::path& path, std::uintmax_t max_bytes) : path_(path) {
   // Opening a pipe without O_NONBLOCK would wait for somebody to write to it.
-  const Descriptor fd(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY));
+  Descriptor fd(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY));
   if (fd < 0) throw InputError(fmt::format("{}: cannot be read: {}", path.string(), std::strerror(errno)));
   struct stat status;
   if (::fstat(fd, &status) != 0)
@@ -80,18 +87,39 @@ std::string read_file(const fs::path& path, std::uintmax_t max_bytes) {
   if (!S_ISREG(status.st_mode))
     throw InputError(fmt::format(
         "{}: is a pipe or a device, not a file; save what it gives to a file and name that", path.string()));
-  if (std::uintmax_t(status.st_size) > max_bytes) refuse_size(std::to_string(status.st_size));
+  if (std::uintmax_t(status.st_size) > max_bytes)
+    refuse_size(path, std::to_string(status.st_size), max_bytes);
+  descriptor_ = fd.release(), size_ = std::uintmax_t(status.st_size);
+}
+
+FileReader::~FileReader() {
+  if (descriptor_ >= 0) ::close(descriptor_);
+}
+
+int FileReader::release() { return std::exchange(descriptor_, -1); }
+
+std::size_t FileReader::read(std::span<char> to) {
+  while (true) {
+    const ssize_t got = ::read(descriptor_, to.data(), to.size());
+    if (got < 0 && errno == EINTR) continue;
+    if (got < 0)
+      throw InputError(fmt::format("{}: reading failed: {}", path_.string(), std::strerror(errno)));
+    return std::size_t(got);
+  }
+}
+
+std::string read_file(const fs::path& path, std::uintmax_t max_bytes) {
+  FileReader file(path, max_bytes);
   std::string content;
-  content.reserve(std::size_t(status.st_size) + 1);
+  content.reserve(std::size_t(file.size()) + 1);
   std::size_t size = 0;
   while (true) {
     content.resize(size + std::max<std::size_t>(1 << 16, content.capacity() - size));
-    const ssize_t got = ::read(fd, content.data() + size, content.size() - size);
-    if (got < 0 && errno == EINTR) continue;
-    if (got < 0) throw InputError(fmt::format("{}: reading failed: {}", path.string(), std::strerror(errno)));
-    size += std::size_t(got);
+    const std::size_t got = file.read(std::span(content).subspan(size));
+    size += got;
     if (got == 0) break;
-    if (size > max_bytes) refuse_size("more and more");  // it grows, or does not tell its size
+    // It grows, or does not tell its size.
+    if (size > max_bytes) refuse_size(path, "more and more", max_bytes);
   }
   content.resize(size);
   return content;
@@ -120,6 +148,19 @@ void FileWriter::append(std::string_view content) {
     content.remove_prefix(std::size_t(written));
     size_ += std::uintmax_t(written);
   }
+}
+
+void FileWriter::write_at(std::uintmax_t place, std::string_view content) {
+  LIMBER_CHECK(place <= size_, place, size_);
+  while (place < size_ && !content.empty()) {
+    const std::size_t over = std::min<std::uintmax_t>(content.size(), size_ - place);
+    const ssize_t written = ::pwrite(descriptor_, content.data(), over, off_t(place));
+    if (written < 0 && errno == EINTR) continue;
+    if (written < 0) throw_disk_error(path_, "writing it");
+    content.remove_prefix(std::size_t(written));
+    place += std::uintmax_t(written);
+  }
+  append(content);
 }
 
 void FileWriter::commit() {

@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <span>
 #include <string>
 #include <string_view>
 
@@ -17,6 +18,24 @@ inline constexpr std::uintmax_t max_bytes_read = std::uintmax_t(8) << 30;
 // Throws InputError when there is no such file, when it cannot be read, is larger than `max_bytes`, or is
 // a pipe or a device: they could keep the reader waiting or never end.
 std::string read_file(const fs::path&, std::uintmax_t max_bytes = max_bytes_read);
+
+// Such a file, read piece by piece: it may be larger than memory. Throws as read_file().
+inline constexpr std::uintmax_t max_bytes_by_pieces = std::uintmax_t(1) << 40;
+class FileReader {
+ public:
+  explicit FileReader(const fs::path&, std::uintmax_t max_bytes = max_bytes_by_pieces);
+  ~FileReader();
+  FileReader(const FileReader&) = delete;
+  FileReader& operator=(const FileReader&) = delete;
+  std::uintmax_t size() const { return size_; }
+  std::size_t read(std::span<char> to);  // how much came; 0: the end
+  int release();                         // the descriptor, for a library that reads by itself and closes it
+
+ private:
+  fs::path path_;
+  int descriptor_;
+  std::uintmax_t size_;
+};
 
 // Throws DiskError (nothing is left behind) when the disk is full, the folder is missing or not writable.
 void write_file(const fs::path&, std::string_view content);
@@ -45,6 +64,7 @@ class FileWriter {
   FileWriter(const FileWriter&) = delete;
   FileWriter& operator=(const FileWriter&) = delete;
   void append(std::string_view);
+  void write_at(std::uintmax_t place, std::string_view);  // over what is there, and on
   void commit();
   std::uintmax_t size() const { return size_; }  // bytes so far
 

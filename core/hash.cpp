@@ -24,6 +24,13 @@ Hasher& Hasher::bytes(const void* data, std::size_t size) {
 std::uint64_t Hasher::digest() const { return XXH3_64bits_digest(impl_->state); }
 
 std::uint64_t hash_of(std::string_view bytes) { return XXH3_64bits(bytes.data(), bytes.size()); }
+std::uint64_t hash_of_file(const fs::path& path) {
+  FileReader file(path);
+  Hasher hasher;
+  std::string piece(1 << 20, '\0');
+  while (const std::size_t n = file.read(piece)) hasher.bytes(piece.data(), n);
+  return hasher.digest();
+}
 std::uint64_t hash_of(const SurfaceMesh& mesh) {
   return Hasher().matrix(mesh.positions).matrix(mesh.triangles).digest();
 }

@@ -8,6 +8,7 @@
 #include <string_view>
 
 #include "core/contact_shape.h"
+#include "core/file.h"
 #include "core/mesh.h"
 
 namespace limber {
@@ -37,6 +38,7 @@ class Hasher {
 };
 
 std::uint64_t hash_of(std::string_view bytes);
+std::uint64_t hash_of_file(const fs::path&);  // of its bytes, read piece by piece; throws as read_file()
 std::uint64_t hash_of(const SurfaceMesh&);
 std::uint64_t hash_of(const TetMesh&);
 std::uint64_t hash_of(const ContactShape&);

@@ -3,7 +3,9 @@
 #pragma once
 
 #include <cstddef>
+#include <functional>
 #include <map>
+#include <memory>
 #include <set>
 #include <span>
 #include <string>
@@ -42,9 +44,10 @@ struct NpyArray {
     return of(std::span<const T>(m.data(), std::size_t(m.size())), shape);
   }
 
- private:
   template <class T>
   static const char* dtype_of();
+
+ private:
   void require_dtype(const char* wanted, std::string_view name) const;
   void require_consistent() const;
 };
@@ -81,7 +84,74 @@ std::string npy_file(const NpyArray&);  // the bytes of its entry
 std::uint64_t hash_of(const Npz&, std::string_view left_out);
 
 void write_npz(const fs::path&, const Npz&);
-// Throws InputError when it is not a zip, is cut short, fails a checksum, or holds an array of another kind.
+// Throws InputError when it is not a zip, is cut short, fails a checksum, holds an entry twice, or an array
+// of another kind.
 Npz read_npz(const fs::path&);
+
+// Archives too large to be held beside what they are of: rows come when they are asked for, some at a time.
+
+struct NpyRows {
+  std::string dtype;
+  std::vector<std::int64_t> shape;
+  // Puts the rows [from, to) there; asked in order, more than once for all.
+  std::function<void(std::int64_t from, std::int64_t to, std::byte* there)> fill;
+
+  std::int64_t rows() const { return shape.empty() ? 1 : shape[0]; }
+  std::size_t row_bytes() const;
+  // `put` writes row i, of as many T as the rest of the shape says.
+  template <class T>
+  static NpyRows of(std::vector<std::int64_t> shape, std::function<void(std::int64_t i, T* row)> put) {
+    NpyRows rows{NpyArray::dtype_of<T>(), std::move(shape), {}};
+    const std::size_t width = rows.row_bytes() / sizeof(T);
+    rows.fill = [put = std::move(put), width](std::int64_t from, std::int64_t to, std::byte* there) {
+      for (T* row = reinterpret_cast<T*>(there); from < to; ++from, row += width) put(from, row);
+    };
+    return rows;
+  }
+};
+
+struct NpzRows {
+  std::map<std::string, NpyRows> arrays;
+  std::map<std::string, std::string> texts;
+};
+
+NpzRows rows_of(const Npz&);  // which must outlive them
+Npz whole(const NpzRows&);
+std::uint64_t hash_of(const NpzRows&, std::string_view left_out);
+void write_npz(const fs::path&, const NpzRows&);  // the same bytes as of the whole
+
+// An archive on the disk. All throw as read_npz().
+class NpzReader {
+ public:
+  // Some rows, never none, in order.
+  using Take = std::function<void(std::int64_t from, std::span<const std::byte> rows)>;
+
+  explicit NpzReader(const fs::path&);
+  ~NpzReader();
+  const std::set<std::string>& arrays() const;  // their names
+  const std::set<std::string>& texts() const;
+  NpyArray head(const std::string& array) const;  // without its elements
+  void read(const std::string& array, const Take&) const;
+  NpyArray array(const std::string& name) const;
+  std::string text(const std::string& name) const;
+
+ private:
+  struct Archive;
+  std::unique_ptr<Archive> archive_;
+};
+
+// Of entries as hash_of has them: arrays by their names, then texts by theirs.
+class NpzHasher {
+ public:
+  NpzHasher();
+  ~NpzHasher();
+  void begin(const std::string& name, const NpyArray& head);
+  void rows(std::span<const std::byte>);  // of that array
+  void text(const std::string& name, const std::string& content);
+  std::uint64_t digest() const;
+
+ private:
+  std::unique_ptr<class Hasher> hasher_;
+};
 
 }  // namespace limber

@@ -29,6 +29,9 @@ struct PlanOptions {
   std::optional<int> shortcut_rounds = {};  // nothing: the scene's
   std::string cost = "duration";            // what shortcutting and improving make less of
   bool improve = false;                     // go on after the first solution
+  // What plan.npz keeps: "all" nodes of the tree, or those of the "path" alone, once the search is finished.
+  // No search goes on from that.
+  std::string keep_tree = "all";
 };
 
 struct SimulateOptions {

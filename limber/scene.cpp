@@ -378,13 +378,13 @@ const Problem& Plan::problem() const { return impl_->problem; }
 bool Plan::solved() const { return impl_->plan.solved(); }
 std::string Plan::explanation() const { return plan::explain(impl_->plan); }
 std::int64_t Plan::iterations() const { return impl_->plan.statistics.iterations; }
-int Plan::nodes_in_tree() const { return impl_->plan.tree.size(); }
+int Plan::nodes_in_tree() const { return plan::nodes_of(impl_->plan); }
 double Plan::duration_s() const {
   return double(impl_->plan.trajectory.end.step - impl_->plan.tree.states.steps()[0]) * impl_->problem.dt_s();
 }
 double Plan::frames_per_second() const { return impl_->plan.settings.frames_per_second; }
 int Plan::frame_count() const { return int(impl_->plan.trajectory.frames.size()); }
-std::string Plan::tree_hash() const { return hex(plan::hash_of(impl_->plan.tree)); }
+std::string Plan::tree_hash() const { return hex(plan::tree_hash_of(impl_->plan)); }
 std::string Plan::trajectory_hash() const { return hex(plan::hash_of(impl_->plan.trajectory)); }
 
 States Plan::frames() const {

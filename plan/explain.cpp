@@ -38,7 +38,7 @@ std::string explain(const Plan& plan) {
   const Statistics& statistics = plan.statistics;
   const std::string goal = name_of_goal(plan.settings, plan.leg());
   const std::string where = fmt::format("node {} of {}, {:.3g} m from {} (radius {:.3g} m)", plan.best_node,
-                                        plan.tree.size(), plan.best_distance_m, goal, s.goal.radius_m);
+                                        nodes_of(plan), plan.best_distance_m, goal, s.goal.radius_m);
   if (plan.solved())
     return fmt::format(
         "reached {}{} after {} iterations: {}", goal,

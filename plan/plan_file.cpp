@@ -2,7 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
+#include <deque>
+#include <functional>
 #include <limits>
+#include <span>
+#include <type_traits>
 
 #include "core/error.h"
 #include "core/hash.h"
@@ -13,68 +18,73 @@ namespace limber::plan {
 
 namespace {
 
-// By edition: 1 had the tree as a list of states like any other, 2 no hash.txt, 3 what the search cost.
-constexpr const char* format_names[] = {"limber plan 1", "limber plan 2", "limber plan 3", "limber plan 4"};
+// By edition: 1 had the tree as a list of states like any other, 2 no hash.txt, 3 what the search cost; 5 has
+// the path of a tree alone.
+constexpr const char* format_names[] = {"limber plan 1", "limber plan 2", "limber plan 3", "limber plan 4",
+                                        "limber plan 5"};
 constexpr const char* seal_name = "hash.txt";                // of all other entries
 constexpr std::int64_t max_counted = std::int64_t(1) << 53;  // steps of all rollouts, …
 
+// One row for each of n, of `width` numbers or, where that is 0, of one that has no dimension of its own.
+template <class T, class Put>
+void put_rows(NpzRows& file, const std::string& name, std::int64_t n, std::int64_t width, Put put) {
+  std::vector<std::int64_t> shape{n};
+  if (width > 0) shape.push_back(width);
+  file.arrays[name] = NpyRows::of<T>(std::move(shape), std::move(put));
+}
+
 // A list of states is three arrays: NAME_step (n), NAME_positions and NAME_velocities (n × 3N).
-template <class StateList>
-void put_states(Npz& file, const std::string& name, const StateList& states) {
-  std::vector<std::int64_t> steps;
-  std::vector<float> positions, velocities;
-  for (std::size_t i = 0; i < std::size_t(states.size()); ++i) {
-    const State& s = states[i];
-    steps.push_back(s.step);
-    positions.insert(positions.end(), s.positions.begin(), s.positions.end());
-    velocities.insert(velocities.end(), s.velocities.begin(), s.velocities.end());
-  }
-  const std::int64_t n = std::int64_t(states.size());
-  const std::int64_t width = n == 0 ? 0 : std::int64_t(positions.size()) / n;
-  file.arrays[name + "_step"] = NpyArray::of<std::int64_t>(steps, {n});
-  file.arrays[name + "_positions"] = NpyArray::of<float>(positions, {n, width});
-  file.arrays[name + "_velocities"] = NpyArray::of<float>(velocities, {n, width});
+void put_states(NpzRows& file, const std::string& name, std::span<const State> states) {
+  const auto n = std::int64_t(states.size()), width = n == 0 ? 0 : std::int64_t(states[0].positions.size());
+  put_rows<std::int64_t>(file, name + "_step", n, 0,
+                         [=](std::int64_t i, auto* row) { *row = states[std::size_t(i)].step; });
+  for (const auto& [what, half] :
+       {std::pair("_positions", &State::positions), {"_velocities", &State::velocities}})
+    file.arrays[name + what] = NpyRows::of<float>({n, width}, [=, of = half](std::int64_t i, float* row) {
+      std::copy_n((states[std::size_t(i)].*of).begin(), width, row);
+    });
 }
 
 // What the states of a tree share is written once: tree_step (n), tree_piece (n × 2 × K), the pieces of each
 // state's positions and velocities, and tree_pieces (P × 96) themselves.
-void put_shared_states(Npz& file, const States& states) {
-  const std::vector<float> pieces = states.pieces();
-  file.arrays["tree_step"] = NpyArray::of<std::int64_t>(states.steps(), {states.size()});
-  file.arrays["tree_piece"] =
-      NpyArray::of<std::int32_t>(states.piece_of(), {states.size(), 2, std::int64_t(states.pieces_a_half())});
-  const std::int64_t length = States::piece_length;
-  file.arrays["tree_pieces"] = NpyArray::of<float>(pieces, {std::int64_t(pieces.size()) / length, length});
+void put_shared_states(NpzRows& file, const States& states) {
+  const auto half = std::int64_t(states.pieces_a_half());
+  const std::int32_t* const piece_of = states.piece_of().data();
+  put_rows<std::int64_t>(file, "tree_step", states.size(), 0,
+                         [&](std::int64_t i, auto* row) { *row = states.steps()[std::size_t(i)]; });
+  file.arrays["tree_piece"] = NpyRows::of<std::int32_t>(
+      {states.size(), 2, half},
+      [=](std::int64_t i, std::int32_t* row) { std::copy_n(piece_of + 2 * half * i, 2 * half, row); });
+  put_rows<float>(
+      file, "tree_pieces", std::int64_t(states.pieces().size()), States::piece_length,
+      [&](std::int64_t i, float* row) { std::ranges::copy(states.pieces()[std::size_t(i)], row); });
 }
 
-void put_controls(Npz& file, const std::string& name, const std::vector<Control>& controls) {
-  std::vector<std::int32_t> manipulation, node, steps, second_node;
-  std::vector<float> force, radius, target, max_force, second_force, pressure;
-  for (const Control& c : controls) {
-    manipulation.push_back(std::int32_t(c.manipulation));
-    node.push_back(c.node);
-    steps.push_back(c.steps);
-    force.insert(force.end(), c.force_n.begin(), c.force_n.end());
-    radius.push_back(c.radius_m);
-    target.insert(target.end(), c.target_m.begin(), c.target_m.end());
-    max_force.push_back(c.max_force_n);
-    second_node.push_back(c.second_node);
-    pressure.push_back(c.pressure_pa);
-    second_force.insert(second_force.end(), c.second_force_n.begin(), c.second_force_n.end());
-  }
-  const std::int64_t n = std::int64_t(controls.size());
-  file.arrays[name + "_manipulation"] = NpyArray::of<std::int32_t>(manipulation, {n});
-  file.arrays[name + "_force_n"] = NpyArray::of<float>(force, {n, 3});
-  file.arrays[name + "_node"] = NpyArray::of<std::int32_t>(node, {n});
-  file.arrays[name + "_radius_m"] = NpyArray::of<float>(radius, {n});
-  file.arrays[name + "_target_m"] = NpyArray::of<float>(target, {n, 3});
-  file.arrays[name + "_max_force_n"] = NpyArray::of<float>(max_force, {n});
-  file.arrays[name + "_steps"] = NpyArray::of<std::int32_t>(steps, {n});
-  if (std::any_of(pressure.begin(), pressure.end(), [](float p) { return p != 0; }))
-    file.arrays[name + "_pressure_pa"] = NpyArray::of<float>(pressure, {n});
-  if (std::all_of(second_node.begin(), second_node.end(), [](int node) { return node < 0; })) return;
-  file.arrays[name + "_second_node"] = NpyArray::of<std::int32_t>(second_node, {n});
-  file.arrays[name + "_second_force_n"] = NpyArray::of<float>(second_force, {n, 3});
+void put_controls(NpzRows& file, const std::string& name, const std::vector<Control>& controls) {
+  const auto column = [&]<class T>(const char* what, T Control::*of) {
+    put_rows<T>(file, name + what, std::int64_t(controls.size()), 0,
+                [&controls, of](std::int64_t i, T* row) { *row = controls[std::size_t(i)].*of; });
+  };
+  const auto vectors = [&](const char* what, Vec3f Control::*of) {
+    put_rows<float>(file, name + what, std::int64_t(controls.size()), 3,
+                    [&controls, of](std::int64_t i, float* row) {
+                      std::copy_n((controls[std::size_t(i)].*of).data(), 3, row);
+                    });
+  };
+  put_rows<std::int32_t>(
+      file, name + "_manipulation", std::int64_t(controls.size()), 0,
+      [&](std::int64_t i, auto* row) { *row = std::int32_t(controls[std::size_t(i)].manipulation); });
+  vectors("_force_n", &Control::force_n);
+  column("_node", &Control::node);
+  column("_radius_m", &Control::radius_m);
+  vectors("_target_m", &Control::target_m);
+  column("_max_force_n", &Control::max_force_n);
+  column("_steps", &Control::steps);
+  const auto any = [&](const auto& has) { return std::any_of(controls.begin(), controls.end(), has); };
+  if (any([](const Control& c) { return c.pressure_pa != 0; })) column("_pressure_pa", &Control::pressure_pa);
+  if (!any([](const Control& c) { return c.second_node >= 0; })) return;
+  column("_second_node", &Control::second_node);
+  vectors("_second_force_n", &Control::second_force_n);
 }
 
 const char* name_of(Ending ending) {
@@ -94,10 +104,33 @@ const char* name_of(Ending ending) {
 constexpr std::pair<Simulation::Ending, const char*> simulation_endings[] = {
     {Simulation::whole, "whole"}, {Simulation::stopped, "stopped"}, {Simulation::diverged, "diverged"}};
 
-// Reads one plan.npz; every complaint names the file.
+// Reads one plan.npz; every complaint names the file. What is large, the pieces of states, goes where it
+// stays as it is read; other arrays are held beside the plan until it is whole.
 class Reader {
  public:
-  explicit Reader(const fs::path& path) : path_(path), file_(read_npz(path)) {}
+  explicit Reader(const fs::path& path) : path_(path) {
+    const NpzReader reader(path);
+    NpzHasher hasher;
+    file_.source = path;
+    for (const std::string& name : reader.arrays()) {
+      NpyArray head = reader.head(name);
+      hasher.begin(name, head);
+      const Sink sink = sink_of(name, head);
+      reader.read(name, [&](std::int64_t, std::span<const std::byte> rows) {
+        hasher.rows(rows);
+        if (sink)
+          sink(rows);
+        else
+          head.bytes.insert(head.bytes.end(), rows.begin(), rows.end());
+      });
+      file_.arrays[name] = std::move(head);
+    }
+    for (const std::string& name : reader.texts()) {
+      file_.texts[name] = reader.text(name);
+      if (name != seal_name) hasher.text(name, file_.texts[name]);
+    }
+    hash_ = hasher.digest();
+  }
   void say_to_run(const char* command) { command_ = command; }
 
   [[noreturn]] void refuse(const std::string& why) const {
@@ -190,24 +223,29 @@ class Reader {
     return controls;
   }
 
-  States shared_states() const {
+  // Takes the pieces over.
+  States shared_states() {
     const std::int64_t width = width_of("end_positions"), length = States::piece_length;
     const std::int64_t a_half = (width + length - 1) / length;
     const auto steps = array<std::int64_t>("tree_step", -1, 1);
-    const NpyArray& index = file_.array("tree_piece");
-    require(index.shape == std::vector<std::int64_t>{std::int64_t(steps.size()), 2, a_half},
-            "tree_piece has another shape than the rest of the file");
-    const auto piece_of = index.as<std::int32_t>(path_.string() + ": tree_piece");
-    const auto pieces = numbers("tree_pieces", -1, length);
-    const std::int64_t count = std::int64_t(pieces.size()) / length, used = width - (a_half - 1) * length;
-    for (std::size_t i = 0; i < piece_of.size(); ++i) {
-      const std::int64_t piece = piece_of[i];
+    require(
+        file_.array("tree_piece").shape == std::vector<std::int64_t>{std::int64_t(steps.size()), 2, a_half},
+        "tree_piece has another shape than the rest of the file");
+    // What went elsewhere is of the right type and shape; of what did not the complaint is to be made.
+    if (piece_of_.empty()) file_.array("tree_piece").as<std::int32_t>(path_.string() + ": tree_piece");
+    if (pieces_.empty()) numbers("tree_pieces", -1, length);
+    for (std::size_t i = 0; i < pieces_.size(); ++i)
+      for (const float x : pieces_[i])
+        if (!std::isfinite(x)) refuse(fmt::format("tree_pieces[{}] holds {}, which is no number", i, x));
+    const std::int64_t count = std::int64_t(pieces_.size()), used = width - (a_half - 1) * length;
+    for (std::size_t i = 0; i < piece_of_.size(); ++i) {
+      const std::int64_t piece = piece_of_[i];
       require(piece >= 0 && piece < count, fmt::format("tree_piece names piece {} of {}", piece, count));
       const bool last = std::int64_t(i) % a_half == a_half - 1;
       for (std::int64_t k = last ? used : length; k < length; ++k)
-        require(pieces[std::size_t(piece * length + k)] == 0, "tree_pieces is not filled up with zeros");
+        require(pieces_[std::size_t(piece)][std::size_t(k)] == 0, "tree_pieces is not filled up with zeros");
     }
-    return States::of_pieces(std::size_t(width), steps, piece_of, pieces);
+    return States::of_pieces(std::size_t(width), steps, std::move(piece_of_), std::move(pieces_));
   }
 
   States unshared_states(std::span<const std::int32_t> parents) const {
@@ -218,7 +256,7 @@ class Reader {
     return shared;
   }
 
-  Tree tree(bool shared) const {
+  Tree tree(bool shared) {
     Tree t;
     const std::int64_t n = std::int64_t(array<std::int64_t>("tree_step", -1, 1).size());
     require(n > 0, "the tree is empty");
@@ -281,6 +319,26 @@ class Reader {
     return legs;
   }
 
+  LeftOut left_out(const Json& whole_tree, const Plan& plan) const {
+    require(!plan.simulation, "a simulation has no tree to be left out");
+    const int nodes = plan.tree.size();
+    const auto numbers = array<std::int32_t>("tree_number", nodes, 1);
+    for (int n = 0; n < nodes; ++n) {
+      const auto i = std::size_t(n);
+      require(plan.tree.parents[i] == n - 1, fmt::format("node {} does not come after node {}", n, n - 1));
+      require(n == 0 ? numbers[i] == 0 : numbers[i] > numbers[i - 1],
+              fmt::format("tree_number[{}] is {}", n, numbers[i]));
+    }
+    require(plan.best_node == nodes - 1, "best_node is not the last of its path");
+    LeftOut left_out{whole(whole_tree, "nodes"),
+                     hash_from_hex(whole_tree.at("tree_hash").get<std::string>()),
+                     hash_from_hex(whole_tree.at("search_hash").get<std::string>()),
+                     {numbers.begin(), numbers.end()}};
+    require(left_out.nodes > numbers.back(),
+            fmt::format("whole_tree.nodes is {}, and there is a node {}", left_out.nodes, numbers.back()));
+    return left_out;
+  }
+
   // The frames are of the path: from the tree's start to the path's end, one a frame time. What they must be
   // to the step is known to who knows the length of a step (require_frame_times).
   void require_one_path(const Plan& plan) const {
@@ -306,7 +364,7 @@ class Reader {
   // Entries that nothing else contradicts are at least those that were written.
   void require_seal() const {
     const auto found = file_.texts.find(seal_name);
-    require(found != file_.texts.end() && found->second == hex(hash_of(file_, seal_name)) + "\n",
+    require(found != file_.texts.end() && found->second == hex(hash_) + "\n",
             "an entry was changed since it was written");
   }
 
@@ -320,8 +378,29 @@ class Reader {
   Json meta() const { return parse_json(file_.text("meta.json"), path_.string() + ": meta.json"); }
 
  private:
+  using Sink = std::function<void(std::span<const std::byte>)>;
+
+  // Where the rows of this array go; nothing: they stay in its entry.
+  Sink sink_of(const std::string& name, const NpyArray& head) {
+    const auto taken_as = [](auto& all) -> Sink {
+      return [&all](std::span<const std::byte> rows) {
+        using Row = typename std::remove_reference_t<decltype(all)>::value_type;
+        for (; !rows.empty(); rows = rows.subspan(sizeof(Row)))
+          std::memcpy(&all.emplace_back(), rows.data(), sizeof(Row));
+      };
+    };
+    if (name == "tree_pieces" && head.dtype == "<f4" && head.shape.size() == 2 &&
+        head.shape[1] == States::piece_length)
+      return taken_as(pieces_);
+    if (name == "tree_piece" && head.dtype == "<i4") return taken_as(piece_of_);
+    return {};
+  }
+
   fs::path path_;
   Npz file_;
+  std::deque<States::Piece> pieces_;
+  std::vector<std::int32_t> piece_of_;
+  std::uint64_t hash_ = 0;        // of all entries but the seal
   const char* command_ = "plan";  // that makes such files
 };
 
@@ -443,32 +522,38 @@ void read_search(const Reader& reader, const Json& meta, int edition, const std:
 
 }  // namespace
 
-Npz npz_of(const Plan& plan, const Json& given, int edition) {
-  LIMBER_CHECK(edition >= first_sealed && edition <= newest_edition, edition);
-  Npz file;
+NpzRows rows_of(const Plan& plan, const Json& given, std::optional<int> wanted) {
+  const int edition = wanted.value_or(plan.left_out ? path_alone : newest_edition);
+  LIMBER_CHECK(edition >= first_sealed && edition <= (plan.left_out ? path_alone : newest_edition), edition);
+  NpzRows file;
+  if (plan.left_out)
+    put_rows<std::int32_t>(file, "tree_number", plan.tree.size(), 0,
+                           [&](std::int64_t i, auto* row) { *row = plan.left_out->numbers[std::size_t(i)]; });
   put_shared_states(file, plan.tree.states);
   put_controls(file, "tree", plan.tree.controls);
   const std::int64_t nodes = plan.tree.size();
-  std::vector<float> centers;
-  for (int i = 0; i < nodes; ++i) {
-    const Vec3f center = plan.tree.centers[i];
-    centers.insert(centers.end(), center.begin(), center.end());
-  }
-  file.arrays["tree_center_m"] = NpyArray::of<float>(centers, {nodes, 3});
-  file.arrays["tree_parent"] = NpyArray::of<std::int32_t>(plan.tree.parents, {nodes});
-  file.arrays["tree_iteration"] = NpyArray::of<std::int64_t>(plan.tree.iterations, {nodes});
+  put_rows<float>(file, "tree_center_m", nodes, 3,
+                  [&](std::int64_t i, float* row) { std::copy_n(plan.tree.centers[int(i)].data(), 3, row); });
+  put_rows<std::int32_t>(file, "tree_parent", nodes, 0,
+                         [&](std::int64_t i, auto* row) { *row = plan.tree.parents[std::size_t(i)]; });
+  put_rows<std::int64_t>(file, "tree_iteration", nodes, 0,
+                         [&](std::int64_t i, auto* row) { *row = plan.tree.iterations[std::size_t(i)]; });
   const std::vector<std::int32_t> path_nodes = path_to(plan.tree, plan.best_node);
-  file.arrays["path_node_of_tree"] =
-      NpyArray::of<std::int32_t>(path_nodes, {std::int64_t(path_nodes.size())});
+  put_rows<std::int32_t>(file, "path_node_of_tree", std::int64_t(path_nodes.size()), 0,
+                         [=](std::int64_t i, auto* row) { *row = path_nodes[std::size_t(i)]; });
   put_controls(file, "path", plan.trajectory.controls);
   put_states(file, "frame", plan.trajectory.frames);
-  put_states(file, "end", std::vector<State>{plan.trajectory.end});
+  put_states(file, "end", {&plan.trajectory.end, 1});
 
   Json meta;
   meta["format"] = format_names[edition - 1];
   meta.update(plan.simulation ? json_of(*plan.simulation) : json_of_search(plan, edition));
   meta["settle_steps"] = plan.trajectory.settle_steps;
   meta["frames_per_second"] = plan.trajectory.frames_per_second;
+  if (const auto& left_out = plan.left_out)
+    meta["whole_tree"] = {{"nodes", left_out->nodes},
+                          {"tree_hash", hex(left_out->tree_hash)},
+                          {"search_hash", hex(left_out->search_hash)}};
   meta["system_hash"] = hex(plan.system_hash);
   meta["tree_hash"] = hex(hash_of(plan.tree));
   meta["trajectory_hash"] = hex(hash_of(plan.trajectory));
@@ -478,8 +563,12 @@ Npz npz_of(const Plan& plan, const Json& given, int edition) {
   return file;
 }
 
+Npz npz_of(const Plan& plan, const Json& given, std::optional<int> edition) {
+  return whole(rows_of(plan, given, edition));
+}
+
 void write_plan(const fs::path& path, const Plan& plan, const Json& given) {
-  write_npz(path, npz_of(plan, given));
+  write_npz(path, rows_of(plan, given));
 }
 
 PlanFile read_plan(const fs::path& path) {
@@ -497,6 +586,8 @@ PlanFile read_plan(const fs::path& path) {
       read_simulation(reader, meta.at("simulation"), meta.at("frames_per_second").get<double>(), plan);
     else
       read_search(reader, meta, file.edition, path.string(), plan);
+
+    if (file.edition == path_alone) plan.left_out = reader.left_out(meta.at("whole_tree"), plan);
 
     Trajectory& t = plan.trajectory;
     t.controls = reader.controls("path", -1);

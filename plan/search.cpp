@@ -5,6 +5,7 @@
 // begins in a node of the last one, so a path through several goals is one way in the tree.
 #include "plan/search.h"
 
+#include <algorithm>
 #include <utility>
 
 #include "core/error.h"
@@ -54,6 +55,10 @@ int reached(const System& system, const Settings& settings, Plan& plan) {
 
 // A tree goes on only in the world and with the settings that it grew by; limits may differ.
 void require_same_search(const System& system, const Settings& settings, const Plan& earlier) {
+  if (earlier.left_out)
+    throw InputError(
+        "the earlier plan holds its path alone (--keep-tree path), and a search goes on from the whole tree; "
+        "plan anew, without resuming it");
   if (earlier.system_hash != system.hash())
     throw InputError(
         fmt::format("the earlier plan is of another world (hash {}, now {}); plan anew, without resuming it",
@@ -65,6 +70,30 @@ void require_same_search(const System& system, const Settings& settings, const P
 }
 
 }  // namespace
+
+void keep_path(Plan& plan) {
+  if (plan.left_out) return;
+  const Tree& tree = plan.tree;
+  std::vector<std::int32_t> path = path_to(tree, plan.best_node);
+  for (Leg& leg : plan.legs) {
+    const auto root = std::find(path.begin(), path.end(), leg.root);
+    LIMBER_CHECK(root != path.end(), leg.root);
+    leg.root = int(root - path.begin());
+  }
+  Tree kept;
+  for (const int node : path)
+    kept.add(tree.states[std::size_t(node)], kept.size() - 1, tree.controls[std::size_t(node)],
+             tree.iterations[std::size_t(node)], tree.centers[node]);
+  plan.left_out = {tree.size(), hash_of(tree), hash_of_search(tree), std::move(path)};
+  plan.tree = std::move(kept);
+  plan.best_node = plan.tree.size() - 1;
+  if (plan.solved()) plan.goal_node = plan.best_node;
+}
+
+int nodes_of(const Plan& plan) { return plan.left_out ? plan.left_out->nodes : plan.tree.size(); }
+std::uint64_t tree_hash_of(const Plan& plan) {
+  return plan.left_out ? plan.left_out->tree_hash : hash_of(plan.tree);
+}
 
 // One search a leg. The trajectory of a plan with one leg was run when its way was judged; else it is run
 // once more, to the best node.

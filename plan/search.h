@@ -44,6 +44,13 @@ struct Simulation {
   bool steered = false;  // controls were chosen on the way: its tree is a chain, a node after each
 };
 
+// What the whole tree was, of which the way to best_node alone is kept: a chain, each node after its parent.
+struct LeftOut {
+  int nodes = 0;                                 // of the whole tree
+  std::uint64_t tree_hash = 0, search_hash = 0;  // hash_of and hash_of_search
+  std::vector<std::int32_t> numbers;             // of the kept nodes in it, ascending from 0
+};
+
 struct Plan {
   Settings settings;
   std::uint64_t system_hash = 0;
@@ -55,11 +62,18 @@ struct Plan {
   Ending ending = Ending::iterations;
   Statistics statistics;
   std::optional<Simulation> simulation;
-  bool measured = true;   // false: a signal came before what is told of its motion was worked out
-  Trajectory trajectory;  // to best_node, and with a settle when that is goal_node
+  bool measured = true;             // false: a signal came before what is told of its motion was worked out
+  Trajectory trajectory;            // to best_node, and with a settle when that is goal_node
+  std::optional<LeftOut> left_out;  // nothing: the tree is whole
   bool solved() const { return goal_node >= 0; }
   int leg() const { return int(legs.size()) - 1; }  // the last that began; its goal is the one sought
 };
+
+// Leaves out all nodes but those on the way to best_node. No search goes on from such a plan.
+void keep_path(Plan&);
+// Of the whole tree, whatever is kept of it.
+int nodes_of(const Plan&);
+std::uint64_t tree_hash_of(const Plan&);
 
 // Where a search stands after an iteration; times include those of an earlier plan that it goes on from.
 struct SearchProgress {

@@ -49,27 +49,16 @@ std::size_t States::bytes_unshared() const {
   return steps_.size() * (2 * numbers_ * sizeof(float) + sizeof(std::int64_t));
 }
 
-std::vector<float> States::pieces() const {
-  std::vector<float> all;
-  all.reserve(pieces_.size() * piece_length);
-  for (const Piece& piece : pieces_) all.insert(all.end(), piece.begin(), piece.end());
-  return all;
-}
-
 States States::of_pieces(std::size_t numbers, std::span<const std::int64_t> steps,
-                         std::span<const std::int32_t> piece_of, std::span<const float> pieces) {
+                         std::vector<std::int32_t> piece_of, std::deque<Piece> pieces) {
   States states;
   states.numbers_ = numbers;
-  const std::size_t count = pieces.size() / piece_length;
-  LIMBER_CHECK(
-      pieces.size() == count * piece_length && piece_of.size() == 2 * steps.size() * states.pieces_a_half(),
-      numbers, steps.size(), piece_of.size(), pieces.size());
-  for (const std::int32_t i : piece_of) LIMBER_CHECK(i >= 0 && std::size_t(i) < count, i, count);
+  LIMBER_CHECK(piece_of.size() == 2 * steps.size() * states.pieces_a_half(), numbers, steps.size(),
+               piece_of.size());
+  for (const std::int32_t i : piece_of)
+    LIMBER_CHECK(i >= 0 && std::size_t(i) < pieces.size(), i, pieces.size());
   states.steps_.assign(steps.begin(), steps.end());
-  states.piece_of_.assign(piece_of.begin(), piece_of.end());
-  for (std::size_t i = 0; i < count; ++i)
-    std::copy_n(pieces.begin() + std::ptrdiff_t(i * piece_length), piece_length,
-                states.pieces_.emplace_back().begin());
+  states.piece_of_ = std::move(piece_of), states.pieces_ = std::move(pieces);
   return states;
 }
 

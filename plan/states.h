@@ -24,19 +24,17 @@ class States {
   // As they are held, for a file: pieces of 32 nodes' positions or velocities, the last of a state's filled
   // up with zeros.
   static constexpr std::size_t piece_length = 96;
+  using Piece = std::array<float, piece_length>;
   std::size_t pieces_a_half() const { return (numbers_ + piece_length - 1) / piece_length; }
   std::span<const std::int64_t> steps() const { return steps_; }
-  std::span<const std::int32_t> piece_of() const {
-    return piece_of_;
-  }                                   // [state][positions, velocities][piece]
-  std::vector<float> pieces() const;  // one after the other: a copy
+  // [state][positions, velocities][piece]
+  std::span<const std::int32_t> piece_of() const { return piece_of_; }
+  const std::deque<Piece>& pieces() const { return pieces_; }
   // From these again; every index is that of a piece.
   static States of_pieces(std::size_t numbers, std::span<const std::int64_t> steps,
-                          std::span<const std::int32_t> piece_of, std::span<const float> pieces);
+                          std::vector<std::int32_t> piece_of, std::deque<Piece> pieces);
 
  private:
-  using Piece = std::array<float, piece_length>;
-
   std::size_t numbers_ = 0;
   std::vector<std::int64_t> steps_;
   std::vector<std::int32_t> piece_of_;  // index in pieces_

@@ -74,4 +74,16 @@ std::uint64_t hash_of(const Tree& tree) {
   return hasher.digest();
 }
 
+std::uint64_t hash_of_search(const Tree& tree) {
+  Hasher hasher;
+  for (int n = 0; n < tree.size(); ++n) {
+    const auto i = std::size_t(n);
+    if (tree.iterations[i] < 0) continue;
+    hasher.value(n).value(limber::hash_of(tree.states[i])).value(tree.parents[i]).value(tree.iterations[i]);
+    detail::hash_control(hasher, tree.controls[i]);
+    hasher.values(std::span<const float>(tree.centers[n].data(), 3));
+  }
+  return hasher.digest();
+}
+
 }  // namespace limber::plan

@@ -36,5 +36,8 @@ int nearest(const Centers&, const Vec3f& point);
 std::vector<int> path_to(const Tree&, int node);
 
 std::uint64_t hash_of(const Tree&);
+// Of the nodes that iterations made alone: the start, settles on the way and what came after a search are
+// left out.
+std::uint64_t hash_of_search(const Tree&);
 
 }  // namespace limber::plan

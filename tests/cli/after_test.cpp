@@ -42,6 +42,61 @@ TEST_F(Program_slow, ImprovingKeepsTheBestPathWithinItsIterations) {
   EXPECT_EQ(limber_program({"verify", out("more")}).code, exit_done);
 }
 
+// The path's nodes alone, and what the whole tree was; each command works with that, or says what is missing.
+TEST_F(Program_slow, APathIsKeptAlone) {
+  const Json all = limber_program({"plan", scene(), "-o", out("all"), "--json"}).json();
+  const auto plan_path = [&](std::vector<std::string> more) {
+    more.insert(more.begin(), {"plan", scene(), "-o", out(), "--keep-tree", "path"});
+    return limber_program(more);
+  };
+  const Result kept = plan_path({"--json"});
+  ASSERT_EQ(kept.code, exit_done) << kept.err;
+  for (const char* same : {"nodes", "tree_hash", "trajectory_hash", "statistics.iterations"})
+    if (all.contains(same)) EXPECT_EQ(kept.json().at(same), all.at(same)) << same;
+  EXPECT_LT(kept.json().at("nodes_kept").get<int>(), all.at("nodes").get<int>());
+  EXPECT_LT(fs::file_size(fs::path(out()) / "plan.npz"), fs::file_size(fs::path(out("all")) / "plan.npz"));
+  const Result verified = limber_program({"verify", out()});
+  EXPECT_EQ(verified.code, exit_done) << verified.out << verified.err;
+  EXPECT_THAT(verified.out, HasSubstr("nodes of the tree that are not kept"));
+  for (const std::vector<std::string>& words :
+       {std::vector<std::string>{"info", out()},
+        {"report", out()},
+        {"export", out(), "--format", "gltf"},
+        {"robust", out(), "-n", "2"},
+        {"plan", scene(), "-o", out("from"), "--from", out(), "--frame", "1"}})
+    EXPECT_EQ(limber_program(words).code, exit_done) << words[0];
+  const Result resumed = plan_path({"--resume"});
+  EXPECT_EQ(resumed.code, exit_bad_input);
+  EXPECT_THAT(resumed.err, HasSubstr("holds the path alone"));
+  const Result tree = limber_program({"render", out(), "--set", "film.tree=true", "--as", "tree"});
+  EXPECT_EQ(tree.code, exit_bad_input);
+  EXPECT_THAT(tree.err, HasSubstr("film.tree"));
+  EXPECT_THAT(plan_path({}).err, HasSubstr("up to date"));
+  EXPECT_EQ(limber_program({"plan", scene(), "-o", out(), "--keep-tree", "foo"}).code, exit_bad_input);
+}
+
+// What no iteration made is replayed; branches that better paths left behind are told.
+TEST_F(Program_slow, APathThatWasMadeBetterIsKeptAlone) {
+  for (const std::vector<std::string>& more :
+       {std::vector<std::string>{"--shortcut", "2"}, {"--improve", "--iterations", "300", "--seed", "3"}}) {
+    std::vector<std::string> words{"plan", scene(), "-o", out(), "--keep-tree", "path"};
+    words.insert(words.end(), more.begin(), more.end());
+    ASSERT_EQ(limber_program(words).code, exit_done);
+    const Result verified = limber_program({"verify", out()});
+    EXPECT_EQ(verified.code, exit_done) << verified.out << verified.err;
+  }
+}
+
+TEST_F(Program_slow, AnUnfinishedSearchKeepsItsTreeToGoOn) {
+  const std::vector<std::string> words{"plan", scene(), "-o", out(), "--keep-tree", "path"};
+  auto cut = words, resumed = words;
+  cut.insert(cut.end(), {"--time-limit", "0"}), resumed.push_back("--resume");
+  EXPECT_THAT(limber_program(cut).err, HasSubstr("the whole tree is kept"));
+  ASSERT_EQ(limber_program(resumed).code, exit_done);
+  ASSERT_EQ(limber_program({"plan", scene(), "-o", out("one"), "--keep-tree", "path"}).code, exit_done);
+  EXPECT_EQ(read_file(fs::path(out()) / "plan.npz"), read_file(fs::path(out("one")) / "plan.npz"));
+}
+
 TEST_F(Program_slow, APortfolioIsThePlanOfItsQuickestSeed) {
   const Result several = limber_program({"run", scene(), "-o", out(), "--portfolio", "3", "--json"});
   ASSERT_EQ(several.code, exit_done) << several.err;

@@ -142,6 +142,77 @@ TEST_F(PlanFileTest, ASavedTreeGoesOnToTheSameBytes) {
   }
 }
 
+// What is kept is the path, node by node, and by number and hash what the whole tree was.
+TEST_F(PlanFileTest, APathAloneComesBackAndIsNotResumed) {
+  const Toy toy(5, true, true, 1.6f);
+  const Settings s = toy_settings();
+  const Plan whole = plan(toy, s);
+  Plan p = whole;
+  keep_path(p);
+  const std::vector<int> path = path_to(whole.tree, whole.best_node);
+  ASSERT_LT(std::size_t(p.tree.size()), std::size_t(whole.tree.size()));
+  ASSERT_EQ(p.left_out->numbers, path);
+  write_plan(file(), p, {});
+  const PlanFile back = read_plan(file());
+  EXPECT_EQ(back.edition, path_alone);
+  expect_same(back.plan, p);
+  EXPECT_EQ(nodes_of(back.plan), whole.tree.size());
+  EXPECT_EQ(tree_hash_of(back.plan), hash_of(whole.tree));
+  EXPECT_EQ(back.plan.left_out->search_hash, hash_of_search(whole.tree));
+  for (std::size_t i = 0; i < path.size(); ++i) {
+    const auto n = std::size_t(path[i]);
+    EXPECT_EQ(State(back.plan.tree.states[i]), State(whole.tree.states[n]));
+    EXPECT_EQ(back.plan.tree.controls[i], whole.tree.controls[n]);
+    EXPECT_EQ(back.plan.tree.iterations[i], whole.tree.iterations[n]);
+  }
+  const Npz npz = npz_of(back.plan, back.given, back.edition);
+  EXPECT_EQ(npz.arrays, read_npz(file()).arrays);
+  EXPECT_EQ(npz.texts, read_npz(file()).texts);
+  try {
+    plan(toy, s, back.plan);
+    FAIL() << "a search went on from a path";
+  } catch (const InputError& error) {
+    EXPECT_NE(std::string(error.what()).find("holds its path alone"), std::string::npos) << error.what();
+  }
+}
+
+TEST_F(PlanFileTest, APathAloneThatContradictsItselfIsRefused) {
+  Plan good = plan(Toy(5, true, true, 1.6f), toy_settings());
+  keep_path(good);
+  const std::vector<std::pair<std::string, std::function<void(Plan&)>>> edits{
+      {"tree_number[0]", [](Plan& p) { p.left_out->numbers[0] = 1; }},
+      {"tree_number[1]", [](Plan& p) { p.left_out->numbers[1] = 0; }},
+      {"whole_tree.nodes", [](Plan& p) { p.left_out->nodes = 2; }},
+      {"best_node is not the last", [](Plan& p) { p.goal_node = -1, p.best_node = 0; }}};
+  for (const auto& [complaint, edit] : edits) {
+    Plan bad = good;
+    edit(bad);
+    write_plan(file(), bad, {});
+    try {
+      read_plan(file());
+      ADD_FAILURE() << complaint;
+    } catch (const InputError& error) {
+      EXPECT_NE(std::string(error.what()).find(complaint), std::string::npos) << error.what();
+    }
+  }
+}
+
+// Rows that come piece by piece make the same file as arrays that are whole.
+TEST_F(PlanFileTest, WrittenByPiecesItHasTheBytesOfTheWhole) {
+  Plan p = plan(Toy(40, true, true, 1.6f), toy_settings());
+  while (p.tree.size() < 3000) {  // more than a piece
+    const int n = p.tree.size();
+    State state = p.tree.states[std::size_t(n - 1)];
+    for (float& x : state.positions) x += 0.01f;
+    state.step += 1;
+    p.tree.add(state, n - 1, {.steps = 1}, -1, Vec3f(1, 2, float(n)));
+  }
+  write_plan(file(), p, {{"note", "mine"}});
+  write_npz(file("whole.npz"), npz_of(p, {{"note", "mine"}}));
+  EXPECT_EQ(read_file(file()), read_file(file("whole.npz")));
+  expect_same(read_plan(file()).plan, p);
+}
+
 TEST_F(PlanFileTest, EveryTruncatedPrefixIsAnInputError) {
   Settings s = toy_settings();
   s.max_iterations = 3;

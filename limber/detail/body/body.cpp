@@ -32,8 +32,6 @@ std::vector<std::string> files_of(const PrepareSettings& s, bool with_appearance
   return files;
 }
 
-std::string hash_of_file(const fs::path& path) { return hex(hash_of(std::string_view(read_file(path)))); }
-
 // What each stage of a body cost.
 struct Costs {
   Json cpu_s;    // of the stage itself
@@ -56,7 +54,7 @@ std::optional<BodyReport> up_to_date_report(const fs::path& folder, const Json& 
   BodyReport report = read_body_report(folder);
   if (report.version != version || report.input.all != input) return std::nullopt;
   const auto is_here = [&](const std::string& name) {
-    return report.has_file(name, hash_of_file(folder / name));
+    return report.has_file(name, hex(hash_of_file(folder / name)));
   };
   std::size_t found = 0;
   for (const std::string& name : files_of(report.input.settings, report.appearance.has_value())) {
@@ -103,7 +101,7 @@ BodyReport write_body(const WholeBody& body, const BodySource& source, const Pre
     files.insert(files.end(), shown.begin(), shown.end());
   }
   Json report = report_of(body, source, settings);
-  for (const std::string& name : files) report["files"][name] = hash_of_file(folder / name);
+  for (const std::string& name : files) report["files"][name] = hex(hash_of_file(folder / name));
   take_costs_out(report);
   write_json(folder / "report.json", report);
   return body_report_of(std::move(report), (folder / "report.json").string());

@@ -169,6 +169,11 @@ Box Shot::box_of_motion() const {
 // Edges of the tree between centres of mass, every so many of them where there are more than can be told
 // apart.
 void Shot::find_tree() {
+  if (plan_.left_out)
+    throw InputError(
+        "film.tree: plan.npz holds the path alone (--keep-tree path), and the film would show the whole "
+        "tree; "
+        "add --set film.tree=false, or plan anew with --keep-tree all");
   const plan::Tree& tree = plan_.tree;
   const int every = (tree.size() + max_edges_of_tree - 1) / max_edges_of_tree;
   std::vector<Vec3> ends;

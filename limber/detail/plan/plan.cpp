@@ -43,10 +43,11 @@ Json legs_of(const plan::Plan& plan) {
   Json legs = Json::array();
   for (std::size_t leg = 0; leg < plan.legs.size(); ++leg) {
     const bool last = leg + 1 == plan.legs.size();
+    const auto root = std::size_t(plan.legs[leg].root);
     const std::int64_t end = last ? plan.statistics.iterations : plan.legs[leg + 1].first_iteration;
     legs.push_back({{"goal", plan::name_of_goal(plan.settings, int(leg))},
                     {"reached", !last || plan.solved()},
-                    {"root", plan.legs[leg].root},
+                    {"root", plan.left_out ? plan.left_out->numbers[root] : plan.legs[leg].root},
                     {"iterations", end - plan.legs[leg].first_iteration}});
   }
   return legs;
@@ -98,7 +99,7 @@ Json facts_of_motion(const plan::Plan& plan, const fem::World& world, const Moti
             {"substeps", world.substeps},
             {"motion_s", double(path.end.step - plan.tree.states.steps()[0]) * world.dt_s},
             {"frames", path.frames.size()},
-            {"tree_hash", hex(plan::hash_of(plan.tree))},
+            {"tree_hash", hex(plan::tree_hash_of(plan))},
             {"trajectory_hash", hex(plan::hash_of(path))}};
   if (const auto shares = stiffness_shares_of(world); !shares.empty()) json["stiffness_shares"] = shares;
   if (is_unmeasured(plan)) return json;
@@ -130,11 +131,12 @@ Json facts_of(const plan::Plan& plan, const fem::World& world, const FemSystem& 
   Json json = facts_of_motion(plan, world, figures);
   json.update({{"solved", plan.solved()},
                {"seed", plan.settings.seed},
-               {"nodes", plan.tree.size()},
+               {"nodes", plan::nodes_of(plan)},
                {"node_bytes", plan.tree.states.bytes() / std::size_t(plan.tree.size())},
                {"node_bytes_unshared", plan.tree.states.bytes_unshared() / std::size_t(plan.tree.size())},
                {"distance_m", plan.best_distance_m},
                {"statistics", plan::json_of(plan.statistics)}});
+  if (plan.left_out) json["nodes_kept"] = plan.tree.size();
   if (!plan.settings.via.empty()) json["legs"] = legs_of(plan);
   if (plan.solved() || is_unmeasured(plan)) return json;
   const Diagnosis diagnosis = diagnose(world, system, plan);
@@ -273,11 +275,20 @@ KeptPlan plan(const PlanOptions& options, const scenes::Scene& scene) {
     throw InputError(fmt::format("--portfolio is of several searches, {} of one; leave one of the two out",
                                  options.resume ? "--resume" : "--stats"));
 
+  if (options.keep_tree == "path" && scene.film.tree)
+    throw InputError(
+        "--keep-tree path: film.tree shows the whole tree; add --set film.tree=false, or keep all of it");
+
   std::optional<plan::Plan> earlier;
   Json earlier_summary;
   int nodes_kept = 0;  // in the file
   if (options.resume) {
     PlanFolder folder = read_searched_folder(options.out);
+    if (folder.plan.left_out)
+      throw InputError(fmt::format(
+          "{}: holds the path alone (--keep-tree path), and a search goes on from the whole tree; plan anew "
+          "without --resume",
+          file.string()));
     if (folder.plan.system_hash == system.hash()) require_of_world(folder.plan, world, options.out);
     earlier = std::move(folder.plan);
     earlier_summary = std::move(folder.summary);
@@ -297,7 +308,8 @@ KeptPlan plan(const PlanOptions& options, const scenes::Scene& scene) {
     log::info("{}: is as it was; go on with --resume", file.string());
     throw_if_stopped();
   }
-  KeptPlan kept = keep_plan(options.out, scene, bodies, world, system, plan, found.extra);
+  KeptPlan kept =
+      keep_plan(options.out, scene, bodies, world, system, plan, found.extra, options.keep_tree == "path");
   kept.also_done = std::move(found.also_done);
   if (stop_signal() != 0) {
     log::info("{}: the plan so far is kept; go on with --resume", file.string());
@@ -324,7 +336,7 @@ void remove_what_shows_another_plan(const fs::path& folder, const Json& summary)
 
 KeptPlan keep_plan(const fs::path& folder, const scenes::Scene& scene,
                    const std::vector<PreparedBody>& bodies, const fem::World& world, const FemSystem& system,
-                   plan::Plan& plan, const Json& extra) {
+                   plan::Plan& plan, const Json& extra, bool path_alone) {
   MotionFigures figures;
   try {
     const NothingToKeep nothing_to_keep;
@@ -334,6 +346,10 @@ KeptPlan keep_plan(const fs::path& folder, const scenes::Scene& scene,
   } catch (const Interrupted&) {
     plan.measured = false;
   }
+  if (path_alone && plan.measured && finished(plan) && !extra.contains("refine"))
+    plan::keep_path(plan);
+  else if (path_alone)
+    log::info("{}: the whole tree is kept, for a search may go on from it", (folder / "plan.npz").string());
   return keep_measured_plan(folder, scene, bodies, world, system, plan, figures, extra);
 }
 
@@ -377,6 +393,11 @@ bool plan_is_up_to_date(const PlanOptions& options, const scenes::Scene& scene) 
             : !searches.empty())
       return false;
     if (!searches.empty()) settings.seed = folder.plan.settings.seed;
+    const bool path_wanted = options.keep_tree == "path";
+    if (folder.plan.left_out.has_value() != path_wanted)
+      throw InputError(fmt::format("{} holds {}, and --keep-tree {} is asked for",
+                                   (options.out / "plan.npz").string(),
+                                   path_wanted ? "the whole tree" : "the path alone", options.keep_tree));
     return folder.plan.system_hash == FemSystem(world, goal_rules_of(scene)).hash() &&
            plan::first_difference(folder.plan.settings, settings).empty() && finished(folder.plan) &&
            (folder.plan.solved() || folder.plan.settings.max_iterations >= settings.max_iterations) &&

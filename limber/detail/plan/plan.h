@@ -28,9 +28,11 @@ Found make_better(const scenes::Scene&, const FemSystem&, const PlanOptions&, pl
                   const std::optional<plan::PortfolioReport>&, const Json& earlier_summary = {});
 
 // Measures the plan's motion, writes plan.npz, volume.svg and the manifest; after a stop signal writes it
-// unmeasured. `extra` goes into the summary.
+// unmeasured. `extra` goes into the summary. With `path_alone` the plan's tree is cut to its path, unless a
+// search can still go on from it (it is not finished, or a signal came), or it was carried to finer cages.
 KeptPlan keep_plan(const fs::path& folder, const scenes::Scene&, const std::vector<PreparedBody>&,
-                   const fem::World&, const FemSystem&, plan::Plan&, const Json& extra);
+                   const fem::World&, const FemSystem&, plan::Plan&, const Json& extra,
+                   bool path_alone = false);
 
 // The same of a motion that is measured already.
 KeptPlan keep_measured_plan(const fs::path& folder, const scenes::Scene&, const std::vector<PreparedBody>&,

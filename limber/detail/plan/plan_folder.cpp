@@ -59,7 +59,7 @@ Json given_of(const std::string& by_version, const scenes::Scene& scene,
 
 // Which motion the costs are of: a file that was left from another tells nothing of this one.
 std::vector<std::string> motion_of(const plan::Plan& plan) {
-  return {hex(plan::hash_of(plan.tree)), hex(plan::hash_of(plan.trajectory))};
+  return {hex(plan::tree_hash_of(plan)), hex(plan::hash_of(plan.trajectory))};
 }
 
 struct Timings {
@@ -150,16 +150,32 @@ Json kept_summary(const PlanFolder& planned) {
                                                        : plan::without_timings(planned.summary);
 }
 
+namespace {
+
+bool holds(const NpzReader& now, const std::string& name, const NpyRows& rows) {
+  const NpyArray head = now.head(name);
+  if (head.dtype != rows.dtype || head.shape != rows.shape) return false;
+  bool same = true;
+  std::vector<std::byte> again;
+  now.read(name, [&](std::int64_t from, std::span<const std::byte> there) {
+    again.resize(there.size());
+    rows.fill(from, from + std::int64_t(there.size() / rows.row_bytes()), again.data());
+    same = same && std::equal(there.begin(), there.end(), again.begin());
+  });
+  return same;
+}
+
+}  // namespace
+
 std::string odd_entry(const fs::path& folder, const PlanFolder& planned,
                       const std::vector<PreparedBody>& bodies) {
-  const Npz now = read_npz(folder / "plan.npz"),
-            again = plan::npz_of(planned.plan,
-                                 given_of(planned.version, planned.scene, bodies, kept_summary(planned)),
-                                 planned.edition);
-  for (const auto& [name, array] : now.arrays)
-    if (!again.arrays.contains(name) || again.arrays.at(name) != array) return name + ".npy";
-  for (const auto& [name, text] : now.texts)
-    if (!again.texts.contains(name) || again.texts.at(name) != text) return name;
+  const NpzReader now(folder / "plan.npz");
+  const NpzRows again = plan::rows_of(
+      planned.plan, given_of(planned.version, planned.scene, bodies, kept_summary(planned)), planned.edition);
+  for (const std::string& name : now.arrays())
+    if (!again.arrays.contains(name) || !holds(now, name, again.arrays.at(name))) return name + ".npy";
+  for (const std::string& name : now.texts())
+    if (!again.texts.contains(name) || again.texts.at(name) != now.text(name)) return name;
   return "";  // what lacks was not read
 }
 
@@ -188,7 +204,7 @@ PlanFolder read_plan_folder(const fs::path& folder) {
   result.cage_hashes.insert(given.cage_hashes.begin(), given.cage_hashes.end());
   result.version = given.version;
   add_timings(folder, result);
-  result.file_hash = hash_of(std::string_view(read_file(file)));
+  result.file_hash = hash_of_file(file);
   return result;
 }
 

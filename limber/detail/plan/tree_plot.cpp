@@ -113,7 +113,7 @@ std::string tree_svg(const scenes::Scene& scene, const fem::World& world, const 
       width, height);
   svg += fmt::format(
       "<text x=\"{}\" y=\"24\" font-size=\"16\" font-weight=\"bold\">{}: {} nodes, {}</text>\n", margin_px,
-      scene.name, plan.tree.size(), plan.solved() ? "path to the goal" : "path to the nearest");
+      scene.name, plan::nodes_of(plan), plan.solved() ? "path to the goal" : "path to the nearest");
   for (const auto& [view, name] : {std::pair(&above, "from above"), std::pair(&side, "from the side (−y)")}) {
     svg += fmt::format("<text x=\"{}\" y=\"{:.1f}\">{}</text>\n", margin_px, view->top - 8, name);
     draw(*view, scene, world, plan, svg);

@@ -82,7 +82,7 @@ void summary(const Findings& f, Page& page) {
          fmt::format("{} frames, step {:.3g} ms", f.frames().size(), 1e3 * f.world.dt_s));
   if (!f.plan().simulation)
     figure("Search", s.cpu_s > 0 ? fmt::format("{:.2f} CPU s", s.cpu_s) : "done",
-           fmt::format("{} iterations, {} nodes", s.iterations, f.plan().tree.size()));
+           fmt::format("{} iterations, {} nodes", s.iterations, plan::nodes_of(f.plan())));
   figure("Volume change", fmt::format("{:.2f} %", 100 * volume), "at most, of any body");
   figure("Penetration",
          fmt::format("{:.2f} %", 100 * f.figures.deepest_penetration_m / f.figures.robot_size_m),
@@ -258,6 +258,15 @@ void promises(const Findings& f, Page& page) {
 }
 
 void tree(const Findings& f, Page& page) {
+  if (f.plan().left_out) {
+    page.add(
+        "<h2>How the tree grew</h2>\n<p class=\"note\">Of the {} nodes plan.npz keeps the {} of the path "
+        "alone (<code>--keep-tree path</code>): how they grew is not told.</p>\n<figure class=\"card "
+        "tree\">{}</figure>\n<p class=\"note\">{}</p>\n",
+        plan::nodes_of(f.plan()), f.plan().tree.size(), inlined(tree_svg(f.scene(), f.world, f.plan())),
+        escaped(f.planned.summary.value("explanation", std::string())));
+    return;
+  }
   const plan::Tree& t = f.plan().tree;
   render::Curve nodes{"nodes", {0.16, 0.50, 0.73}, {}, {}},
       nearest{"nearest so far", {0.80, 0.20, 0.15}, {}, {}};

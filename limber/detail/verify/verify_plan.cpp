@@ -95,7 +95,8 @@ void check_forces(const plan::Plan& plan, const plan::Settings& settings, const 
   table.row("no force is above the maximum",
             largest <= settings.max_force_n * rounding_factor &&
                 settling <= settings.max_force_n * settings.settle.max_force_share * rounding_factor,
-            fmt::format("{:.1f} of {:.1f} N", largest, settings.max_force_n));
+            fmt::format("{:.1f} of {:.1f} N{}", largest, settings.max_force_n,
+                        plan.left_out ? ", on the path, which alone is kept" : ""));
   double pressure = 0;
   for (const auto* controls : {&plan.tree.controls, &path.controls})
     for (const Control& control : *controls) pressure = std::max(pressure, double(control.pressure_pa));
