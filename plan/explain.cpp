@@ -37,7 +37,8 @@ std::string explain(const Plan& plan) {
   const Settings s = settings_of_leg(plan.settings, plan.leg());
   const Statistics& statistics = plan.statistics;
   const std::string goal = name_of_goal(plan.settings, plan.leg());
-  const std::string where = fmt::format("node {} of {}, {:.3g} m from {} (radius {:.3g} m)", plan.best_node,
+  const int best_node = plan.left_out ? plan.left_out->numbers.back() : plan.best_node;
+  const std::string where = fmt::format("node {} of {}, {:.3g} m from {} (radius {:.3g} m)", best_node,
                                         nodes_of(plan), plan.best_distance_m, goal, s.goal.radius_m);
   if (plan.solved())
     return fmt::format(

@@ -1,8 +1,13 @@
 // What is done with a plan once it is found.
+#include <gmock/gmock.h>
+
+#include "plan/plan_file.h"
 #include "tests/cli/program.h"
 
 namespace limber::detail {
 namespace {
+
+using ::testing::HasSubstr;
 
 TEST_F(Program_slow, AShortenedPathIsAPlanLikeAnyOther) {
   const Json plain = limber_program({"plan", scene(), "-o", out(), "--json"}).json();
@@ -51,8 +56,8 @@ TEST_F(Program_slow, APathIsKeptAlone) {
   };
   const Result kept = plan_path({"--json"});
   ASSERT_EQ(kept.code, exit_done) << kept.err;
-  for (const char* same : {"nodes", "tree_hash", "trajectory_hash", "statistics.iterations"})
-    if (all.contains(same)) EXPECT_EQ(kept.json().at(same), all.at(same)) << same;
+  for (const char* same : {"explanation", "nodes", "tree_hash", "trajectory_hash", "motion_s"})
+    EXPECT_EQ(kept.json().at(same), all.at(same)) << same;
   EXPECT_LT(kept.json().at("nodes_kept").get<int>(), all.at("nodes").get<int>());
   EXPECT_LT(fs::file_size(fs::path(out()) / "plan.npz"), fs::file_size(fs::path(out("all")) / "plan.npz"));
   const Result verified = limber_program({"verify", out()});
@@ -73,6 +78,30 @@ TEST_F(Program_slow, APathIsKeptAlone) {
   EXPECT_THAT(tree.err, HasSubstr("film.tree"));
   EXPECT_THAT(plan_path({}).err, HasSubstr("up to date"));
   EXPECT_EQ(limber_program({"plan", scene(), "-o", out(), "--keep-tree", "foo"}).code, exit_bad_input);
+}
+
+// What is told of the tree that is not kept is asked of the search that is done again.
+TEST_F(Program_slow, WhatAPathSaysOfItsTreeIsVerified) {
+  ASSERT_EQ(limber_program({"plan", scene(), "-o", out(), "--keep-tree", "path"}).code, exit_done);
+  const fs::path file = fs::path(out()) / "plan.npz";
+  const plan::PlanFile good = plan::read_plan(file);
+  for (const auto& edit : std::vector<std::function<void(plan::LeftOut&)>>{
+           [](plan::LeftOut& of) { ++of.nodes; }, [](plan::LeftOut& of) { ++of.tree_hash; },
+           [](plan::LeftOut& of) { ++of.search_hash; }, [](plan::LeftOut& of) { --of.numbers.back(); }}) {
+    plan::Plan bad = good.plan;
+    edit(*bad.left_out);
+    plan::write_plan(file, bad, good.given);
+    const Result verified = limber_program({"verify", out(), "--json"});
+    EXPECT_EQ(verified.code, exit_defect);
+    const Json told = verified.json();
+    const bool broken = std::ranges::any_of(told.at("promises"), [](const Json& row) {
+      return row.at("promise") == "searched again from the scene: the same tree" && row.at("kept") == false;
+    });
+    EXPECT_TRUE(broken) << verified.out;
+  }
+  const std::string whole = read_file(file);
+  write_file(file, whole.substr(0, whole.size() / 2));
+  EXPECT_EQ(limber_program({"verify", out()}).code, exit_bad_input);
 }
 
 // What no iteration made is replayed; branches that better paths left behind are told.

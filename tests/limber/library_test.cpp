@@ -116,6 +116,7 @@ TEST_F(Library, OptionsOfWorkFoldersOutOfRangeAreRefused) {
       {"out is empty", [&] { plan_scene({.scene = {"barriers1"}}); }},
       {"stage's number", [&] { name_of(Stage(77)); }},
       {"portfolio", [&] { plan_scene({.scene = {"barriers1"}, .out = path("out"), .portfolio = 0}); }},
+      {"keep_tree", [&] { plan_scene({.scene = {"barriers1"}, .out = path("out"), .keep_tree = "foo"}); }},
       {"tets_factor", [&] { refine_plan({.folder = path("a"), .out = path("b"), .tets_factor = 0}); }},
       {"bits", [&] { render_film(path("a"), {.bits = 7}); }},
       {"\"normal\"", [&] { render_film(path("a"), {.passes = {"heat"}}); }},
