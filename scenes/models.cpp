@@ -138,13 +138,16 @@ std::optional<TetMesh> made_cage(const BodySpec& body) {
   return make_box_cage(*size_m, body.cage.cells);
 }
 
-Eigen::Affine3d world_from_model(const BodySpec& body, const Points& model_positions, bool made) {
+Eigen::Affine3d own_from_model(const BodySpec& body, const Points& model_positions, bool made) {
   const Eigen::Matrix3d linear = pose_turn(body.pose) * metres_from_model(body, model_positions, made);
-  const Vec3 anchor = anchor_of(body.pose.anchor, turned_bounds(linear, model_positions));
   Eigen::Affine3d map = Eigen::Affine3d::Identity();
   map.linear() = linear;
-  map.translation() = body.pose.position_m - anchor;
+  map.translation() = -anchor_of(body.pose.anchor, turned_bounds(linear, model_positions));
   return map;
+}
+
+Eigen::Affine3d world_from_model(const BodySpec& body, const Points& model_positions, bool made) {
+  return Eigen::Translation3d(body.pose.position_m) * own_from_model(body, model_positions, made);
 }
 
 std::optional<Box> start_box(const BodySpec& body) {

@@ -32,6 +32,9 @@ Box surely_occupied(const BodySpec&);
 // model as it was made or read from its file. `made` says that it was made (in metres, z up), also as the
 // fall-back of a file.
 Eigen::Affine3d world_from_model(const BodySpec&, const Points& model_positions, bool made);
+// The same but for position_m: turned as in the world, the anchor at 0. So bodies that are the same but for
+// where they are are the same here.
+Eigen::Affine3d own_from_model(const BodySpec&, const Points& model_positions, bool made);
 
 // The two longer axes of a plate, in the order x, y, z (0, 1, 2); the hole goes along the third.
 std::array<int, 2> plate_plane(const Vec3& size_m);

@@ -112,7 +112,6 @@ const std::vector<MeshRow> mesh_rows{
     {"file", "bodies[].cage.shells", "bodies.file.cage.shells=3"},
     {"box", "bodies[].cage.cells", "bodies.box.cage.cells=[2, 2, 3]"},
     {"blocks", "bodies[].cage.cell_m", "bodies.blocks.cage.cell_m=0.25"},
-    {"ball", "bodies[].pose.position_m", "bodies.ball.pose.position_m=[0, 0, 1]"},
     {"ball", "bodies[].pose.anchor", "bodies.ball.pose.anchor=bottom"},
     {"ball", "bodies[].pose.axis", "bodies.ball.pose.axis=[1, 0, 0]", "bodies.ball.pose.angle_deg=10"},
     {"ball", "bodies[].pose.angle_deg", "bodies.ball.pose.angle_deg=10"}};
@@ -197,6 +196,7 @@ const std::vector<Row> rows{
     {"world.contact_offset_m", "world.contact_offset_m=0.01", world},
     {"world.part_overlaps", "world.part_overlaps=false", world},
     {"world.max_dt_s", "world.max_dt_s=0.0001", world},
+    {"bodies[].pose.position_m", "bodies.cart.pose.position_m=[3.4, 1, 0.32]", world | film},
     {"bodies[].kind", "bodies.cart.kind=rigid", world | film},
     {"bodies[].contact", "bodies.cart.contact=cage", world},
     {"bodies[].deformation", "bodies.cart.deformation=phong", world | film},
@@ -531,8 +531,12 @@ TEST_F(Keys_slow, ChangeWhatTheyShapeAndNothingElse) {
     const scenes::Scene scene = scene_of(stage, sets);
     Identities all;
     for (const scenes::BodySpec& body : scene.bodies) all.bodies.push_back(identity_of(scene, body, {}));
-    std::vector<PreparedBody> bodies = prepared;
-    for (std::size_t b = 0; b < bodies.size(); ++b) bodies[b].deformation = scene.bodies[b].deformation;
+    std::vector<PreparedBody> bodies;
+    for (std::size_t b = 0; b < prepared.size(); ++b) {
+      bodies.push_back(read_body(body_folder(out(), scene.bodies[b])));
+      bodies[b].deformation = scene.bodies[b].deformation, bodies[b].appearance = prepared[b].appearance;
+      place(bodies[b], scene.bodies[b].pose.position_m);
+    }
     const fem::World w = build_world(scene, bodies);
     all.world = FemSystem(w, goal_rules_of(scene)).hash();
     all.search = plan::json_of(settings_of(scene, {}));

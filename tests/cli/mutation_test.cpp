@@ -79,9 +79,21 @@ pose = { position_m = [2, 1.55, 0.74] }
 // A work folder in memory, to be changed and written so that it fits together again.
 struct Mutant {
   explicit Mutant(const fs::path& at) : folder(at), planned(read_plan_folder(at)) {
-    bodies = read_bodies_of(planned, at);
-    for (const scenes::BodySpec& body : planned.scene.bodies)
+    read_bodies_of(planned, at);  // they fit
+    for (const scenes::BodySpec& body : planned.scene.bodies) {
+      bodies.push_back(read_body(body_folder(at, body)));
       shells.push_back(read_obj_shells(body_folder(at, body) / "shells.obj"));
+    }
+  }
+
+  // Where the scene puts them.
+  std::vector<PreparedBody> placed() const {
+    std::vector<PreparedBody> there = bodies;
+    for (std::size_t b = 0; b < there.size(); ++b) {
+      there[b].deformation = planned.scene.bodies[b].deformation;
+      place(there[b], planned.scene.bodies[b].pose.position_m);
+    }
+    return there;
   }
 
   // Body b's files and its report, certificate and hashes included, as limber writes them.
@@ -106,23 +118,24 @@ struct Mutant {
   }
   // plan.npz with the world's hash, its summary, manifest.json and the pictures.
   void write_plan() {
-    const fem::World world = build_world(planned.scene, bodies);
-    const FemSystem system(world, bodies, goal_rules_of(planned.scene));
+    const std::vector<PreparedBody> there = placed();
+    const fem::World world = build_world(planned.scene, there);
+    const FemSystem system(world, there, goal_rules_of(planned.scene));
     planned.plan.system_hash = system.hash();
-    const MotionFigures figures = measure_motion(world, bodies, planned.plan.trajectory);
+    const MotionFigures figures = measure_motion(world, there, planned.plan.trajectory);
     planned.summary.update(facts_of(planned.plan, world, system, figures));
     for (const auto& [name, bytes] : pictures_of(planned.scene, world, planned.plan, figures))
       write_file(folder / name, bytes);
     write_summary();
   }
   void write_summary() {
-    write_plan_folder(folder, planned.plan, planned.scene, bodies, planned.summary);
+    write_plan_folder(folder, planned.plan, planned.scene, placed(), planned.summary);
     update_manifest(folder, "plan", plan::without_timings(planned.summary));
   }
 
   fs::path folder;
   PlanFolder planned;
-  std::vector<PreparedBody> bodies;
+  std::vector<PreparedBody> bodies;  // as their files have them
   std::vector<std::vector<ConvexShell>> shells;
 };
 
@@ -402,7 +415,7 @@ List of_the_scene() {
   add("world.gravity_m_s2=[0, 0, -1]", replay);
   add("world.contact_offset_m=0.02", tree);
   add("world.max_dt_s=0.0005", steps);
-  add("bodies.ball.pose.position_m=[0.7, 1, 1.3]", "ball: made as the scene says");
+  add("bodies.ball.pose.position_m=[0.7, 1, 1.3]", replay);
   add("bodies.ball.cage.tets=60", "ball: made as the scene says");
   add("bodies.ball.cage.mode=fast", "ball: made as the scene says");
   add("bodies.block.cage.shells=3", "block: made as the scene says");

@@ -191,7 +191,7 @@ TEST_F(KeptStiffness, IsWhatIsFoundAndOnlyWhereItFits) {
 
   // One body's alone is the world's.
   fs::remove(file());
-  keep_stiffness_share(scenes::read_scene_file(file_of_scene, other), 0, out());
+  keep_stiffness_shares(scenes::read_scene_file(file_of_scene, other), {0}, out());
   const Json alone = Json::parse(read_file(file()));
   EXPECT_EQ(both.at(alone.begin().key()), alone.begin().value());
 }

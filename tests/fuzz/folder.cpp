@@ -75,8 +75,10 @@ struct Good {
     set_progress_enabled(false);
     std::ofstream(scene_file) << scene_text;
     const scenes::Scene scene = scenes::read_scene_file(scene_file);
-    for (const detail::PreparedBody& prepared : detail::prepare_bodies(scene, {}, work)) {
-      const std::string& name = scene.bodies[bodies.size()].name;
+    detail::prepare_bodies(scene, {}, work);
+    for (const scenes::BodySpec& spec : scene.bodies) {
+      const std::string& name = spec.name;
+      const detail::PreparedBody prepared = detail::read_body(work / "bodies" / name);
       bodies.push_back({name, read_file(work / "bodies" / name / "shells.obj"), prepared});
       // Of a field for show a thousandth will do.
       bodies.back().body.contact = meshing::make_contact_shape(

@@ -81,5 +81,85 @@ TEST(SceneWorld, BodiesThatArePreparedSideBySideHaveTheSameBytes) {
   EXPECT_EQ(hashes[0].size(), scene.bodies.size());
 }
 
+// Three boxes that are the same, one of them turned, and one that is larger.
+constexpr const char* boxes = R"(name = "boxes"
+[world]
+bounds_m = [[0, 0, 0], [8, 2, 2]]
+[[bodies]]
+name = "robot"
+role = "robot"
+model = { box = { size_m = [1, 1, 1], bevel_m = 0.1, triangle_m = 0.3 } }
+cage = { cells = [2, 2, 2] }
+pose = { position_m = [0.9, 1, 1] }
+[[bodies]]
+name = "same"
+role = "free"
+model = { box = { size_m = [1, 1, 1], bevel_m = 0.1, triangle_m = 0.3 } }
+cage = { cells = [2, 2, 2] }
+pose = { position_m = [2.7, 1.1, 0.7] }
+[[bodies]]
+name = "turned"
+role = "free"
+model = { box = { size_m = [1, 1, 1], bevel_m = 0.1, triangle_m = 0.3 } }
+cage = { cells = [2, 2, 2] }
+pose = { position_m = [4.5, 1, 1], angle_deg = 20 }
+[[bodies]]
+name = "larger"
+role = "free"
+model = { box = { size_m = [1.1, 1, 1], bevel_m = 0.1, triangle_m = 0.3 } }
+cage = { cells = [2, 2, 2] }
+pose = { position_m = [6.3, 1, 1] }
+[goal]
+center_of_mass_m = [7, 1, 1]
+radius_m = 0.1
+[planner]
+max_force_n = 10
+)";
+
+TEST(SceneWorld, BodiesThatAreTheSameButForTheirPlaceAreMadeOnce) {
+  TemporaryFolder folder;
+  const scenes::Scene scene = scenes::read_scene(boxes, "boxes");
+  const auto report_of = [](const PreparedBody& body) {
+    Json told = body.report.json;
+    for (const char* cost : {"model", "cpu_seconds", "peak_memory_mb", "peak_memory_mb_after"})
+      told.erase(cost);
+    return told;
+  };
+  std::vector<std::vector<Json>> reports;
+  for (const int threads : {1, 3}) {
+    SCOPED_TRACE(threads);
+    set_thread_count(threads);
+    const fs::path work = folder / std::to_string(threads);
+    const std::vector<PreparedBody> bodies = prepare_bodies(scene, {}, work);
+    auto& told = reports.emplace_back();
+    for (const PreparedBody& body : bodies) told.push_back(report_of(body));
+    EXPECT_EQ(told[0], told[1]);
+    EXPECT_NE(told[0].at("input"), told[2].at("input"));
+    EXPECT_NE(told[0].at("input"), told[3].at("input"));
+    if (threads == 1) {
+      EXPECT_FALSE(bodies[0].report.cpu_seconds.empty());
+      EXPECT_TRUE(bodies[1].report.cpu_seconds.empty()) << "made a second time";
+    }
+    // Each is where the scene puts it, to the last bit.
+    for (std::size_t b = 0; b < bodies.size(); ++b) {
+      const PreparedBody own = read_body(body_folder(work, scene.bodies[b]));
+      const Eigen::RowVector3d place = scene.bodies[b].pose.position_m.transpose();
+      EXPECT_EQ(bodies[b].cage.positions, Points(own.cage.positions.rowwise() + place));
+      EXPECT_EQ(bodies[b].surface.positions, Points(own.surface.positions.rowwise() + place));
+      EXPECT_EQ(bodies[b].contact.samples.positions_m,
+                Points(own.contact.samples.positions_m.rowwise() + place));
+      EXPECT_EQ(bodies[b].contact.field.lower_m, own.contact.field.lower_m + place.transpose());
+      EXPECT_LT(bounding_box(own.cage.positions).center().norm(), 1e-9) << "its anchor is at 0";
+    }
+    const std::map<std::string, double> shares = stiffness_shares_of(build_world(scene, bodies));
+    EXPECT_EQ(shares.at("robot"), shares.at("same"));
+    // Another run, of which some is there, leaves the same.
+    fs::remove_all(body_folder(work, scene.bodies[0]));
+    EXPECT_EQ(report_of(prepare_bodies(scene, {}, work)[0]), told[0]);
+  }
+  set_thread_count(0);
+  EXPECT_EQ(reports[0], reports[1]);
+}
+
 }  // namespace
 }  // namespace limber::detail

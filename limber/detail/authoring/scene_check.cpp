@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <deque>
+#include <set>
 
 #include "core/error.h"
 #include "core/json_text.h"
@@ -79,6 +80,7 @@ class Check {
 
   void load() {
     double cpu_s = 0;
+    std::set<Json> made;
     for (const scenes::BodySpec& body : scene_.bodies) {
       throw_if_stopped();
       Json json = facts_of(body);
@@ -92,7 +94,8 @@ class Check {
         for (const std::string& warning : loaded->model.warnings)
           found_.warnings.push_back(fmt::format("body {}: {}", body.name, warning));
         const PrepareCost& cost = loaded->made_cage ? in_cells : by_tets;
-        cpu_s += cost.once_s + cost.a_triangle_s * double(surface.triangles.rows());
+        if (made.insert(loaded->input).second)
+          cpu_s += cost.once_s + cost.a_triangle_s * double(surface.triangles.rows());
       } catch (const InputError& error) {
         found_.problems.push_back(error.what());
       }

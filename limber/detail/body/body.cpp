@@ -15,6 +15,7 @@
 #include "limber/detail/body/body_store.h"
 #include "limber/detail/body/export.h"
 #include "limber/detail/body/preview.h"
+#include "limber/detail/body/write_robot.h"
 
 namespace limber::detail {
 
@@ -232,6 +233,21 @@ PreparedBody read_body(const fs::path& folder) {
                     error.what(), folder.string()));
   }
   return body;
+}
+
+void place(PreparedBody& body, const Vec3& place_m) {
+  LIMBER_CHECK(body.own_cage_m.rows() == 0, body.own_cage_m.rows());
+  const auto move = [&](Points& points) { points.rowwise() += place_m.transpose(); };
+  body.filled = filled_share(body);
+  body.place_m = place_m;
+  body.own_cage_m = body.cage.positions;
+  move(body.surface.positions), move(body.cage.positions), move(body.contact.samples.positions_m);
+  body.contact.field.lower_m += place_m;
+}
+
+double filled_share(const PreparedBody& body) {
+  if (body.filled > 0) return body.filled;
+  return std::min(1., mass_of(body).of.volume_m3 / volume(body.cage));
 }
 
 void deform(const PreparedBody& body, const Points& cage_positions, Points& surface_positions) {

@@ -89,7 +89,7 @@ class BodyStore;
 // Writes the files and returns the report; leaves a folder that is up to date as it is. What is in the store
 // is taken from there, what is not is kept there; reports of such folders tell no costs, the one that is
 // returned does. Costs are the process': where it is not alone with this body, none are told.
-// What is whole and the same in the folder `like`, of a body of another work folder, is copied.
+// What is whole and the same in the folder `like`, of another body, is copied.
 struct PrepareAid {
   const BodyStore* store = nullptr;
   fs::path like = {};
@@ -107,9 +107,16 @@ struct PreparedBody {
   ContactShape contact;
   NodeGradients gradients;  // of the cage
   scenes::Deformation deformation = scenes::Deformation::linear;
-  Points goal_shape_m;  // of a robot whose scene has a goal.shape.cage: that cage's nodes; else empty
+  Points goal_shape_m;          // of a robot whose scene has a goal.shape.cage: that cage's nodes; else empty
+  Vec3 place_m = Vec3::Zero();  // so far all this is moved from where the files have it
+  Points own_cage_m;            // the cage's nodes as its file has them; empty: as `cage` does
+  double filled = 0;            // filled_share() as the files have it; 0: not moved
   BodyReport report;
 };
+// Moves a body that is where its files have it.
+void place(PreparedBody&, const Vec3& place_m);
+// How much of its cage a body's model fills, at most 1; 1 where the model is not closed.
+double filled_share(const PreparedBody&);
 // What a report tells of the files beside it, worked out from these alone: tables within "surface", "shells",
 // "cage", "certificate", "binding" and "contact".
 Json facts_of_body(const SurfaceMesh&, const std::vector<ConvexShell>&, const TetMesh& cage,
@@ -118,8 +125,8 @@ Json facts_of_appearance(const Appearance&);  // a table within "appearance"; nu
 // The names of the body's files, report.json apart.
 std::vector<std::string> files_of_body(const Appearance&);
 
-// Throws InputError naming the file and the command that renews it when one is missing, damaged, or of
-// another body.
+// In the body's own frame. Throws InputError naming the file and the command that renews it when one is
+// missing, damaged, or of another body.
 PreparedBody read_body(const fs::path& folder);
 
 // Where the fine surface is (V × 3), overwritten, when the cage's nodes are there: the one answer of films,

@@ -344,7 +344,7 @@ class Worker {
     for (std::size_t b = 0; b < scene_.bodies.size(); ++b)
       if (scene_.bodies[b].name == unit.body) {
         prepare_bodies_of(scene_, {b}, options.data, farm_.work(), options.store);
-        keep_stiffness_share(scene_, b, farm_.work());  // else each search would find it
+        keep_stiffness_shares(scene_, {b}, farm_.work());  // else each search would find it
       }
     return {};
   }

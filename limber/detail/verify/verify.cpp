@@ -19,23 +19,24 @@ namespace limber::detail {
 
 namespace {
 
-// Each body by itself, and whether it is the scene's.
-void check_bodies(const fs::path& folder, const scenes::Scene& scene, const std::vector<PreparedBody>& bodies,
-                  const VerifyDepth& depth, Promises& table) {
+// Each body by itself, in its own frame, and whether it is the scene's.
+void check_bodies(const fs::path& folder, const scenes::Scene& scene, const VerifyDepth& depth,
+                  Promises& table) {
   const bool is_trusted = depth.trusted.has_value();
   const std::vector<fs::path> data = is_trusted ? depth.trusted->data : std::vector<fs::path>{};
-  std::vector<Promises> of_body(bodies.size());
-  side_by_side(int(bodies.size()), [&](int i) {
+  std::vector<Promises> of_body(scene.bodies.size());
+  side_by_side(int(scene.bodies.size()), [&](int i) {
     const std::size_t b = std::size_t(i);
     const scenes::BodySpec& body = scene.bodies[b];
     const ProgressOf progress(body.name);
-    const Origin origin = origin_of(scene, body, data, bodies[b]);
+    const fs::path of_files = body_folder(folder, body);
+    const PreparedBody prepared = read_body(of_files);
+    const Origin origin = origin_of(scene, body, data, prepared);
     check_origin(body.name, origin, is_trusted, of_body[b]);
     const bool hangs_on_shells =
         std::any_of(body.parts.begin(), body.parts.end(),
                     [](const scenes::PartSpec& part) { return part.shell.has_value(); });
-    check_body(body.name, bodies[b], body_folder(folder, body), origin.made_cage,
-               depth.remake || hangs_on_shells, of_body[b]);
+    check_body(body.name, prepared, of_files, origin.made_cage, depth.remake || hangs_on_shells, of_body[b]);
   });
   for (Promises& of_one : of_body) table.add(std::move(of_one));
 }
@@ -77,7 +78,7 @@ Verified verify_plan(const fs::path& folder, const PlanFolder& planned,
     scene.folder = trusted->scene.folder;
   }
   const std::vector<fs::path> data = trusted ? trusted->data : std::vector<fs::path>{};
-  check_bodies(folder, scene, bodies, depth, table);
+  check_bodies(folder, scene, depth, table);
   for (const scenes::BodySpec& body : scene.scenery)
     check_origin(body.name, origin_of_scenery(scene, body, data, folder), trusted.has_value(), table);
   check_goal_cage(goal_cage_of(scene, data, bodies), trusted.has_value(), table);
@@ -121,7 +122,7 @@ Verified verify(const VerifyOptions& options, std::optional<TrustedScene> truste
       Promises table;
       scenes::Scene scene = planned.scene;
       if (trusted) scene.folder = trusted->scene.folder;
-      check_bodies(folder, scene, bodies, depth, table);
+      check_bodies(folder, scene, depth, table);
       if (table.all_kept()) throw;
       return {std::move(table), {}, {}};
     }

@@ -1,4 +1,4 @@
-// Models of bodies and scenery: found, or made, and placed where the scene puts them.
+// Models of bodies and scenery: found, or made, and turned as the scene says.
 //
 // A source knows its identity before anything is loaded, so whoever asks whether a body is up to date reads
 // no more than the bytes of the model file. Loading and making are functions in it, called only where the
@@ -29,10 +29,16 @@ Json identity_of(const scenes::BodySpec& body, const std::string& model_hash) {
   return {{"model", model},
           {"cells", {body.cage.cells.x(), body.cage.cells.y(), body.cage.cells.z()}},
           {"cell_m", body.cage.cell_m},
-          {"position_m", list(body.pose.position_m)},
           {"axis", list(body.pose.axis)},
           {"angle_deg", body.pose.angle_deg},
           {"anchor", body.pose.anchor}};
+}
+
+Json identity_of_scenery(const scenes::BodySpec& body, Json identity) {
+  const Vec3& at = body.pose.position_m;
+  identity["position_m"] = {at.x(), at.y(), at.z()};
+  identity["triangles"] = body.triangles;
+  return identity;
 }
 
 namespace {
@@ -91,7 +97,7 @@ BodySource source_of(const scenes::Scene& scene, const scenes::BodySpec& body,
     source.load = [&body, file = *path] {
       meshing::ImportedModel model =
           meshing::import_model(file, {.count_self_intersections = body.role != scenes::Role::scenery});
-      scenes::transform(scenes::world_from_model(body, model.surface.positions, false),
+      scenes::transform(scenes::own_from_model(body, model.surface.positions, false),
                         model.surface.positions);
       return model;
     };
@@ -105,12 +111,12 @@ BodySource source_of(const scenes::Scene& scene, const scenes::BodySpec& body,
     meshing::ImportedModel model = meshing::clean(made, {}, "made model");
     LIMBER_CHECK(appearance.empty() || model.surface.triangles == made.triangles, body.name);
     model.appearance = appearance;
-    scenes::transform(scenes::world_from_model(body, made.positions, true), model.surface.positions);
+    scenes::transform(scenes::own_from_model(body, made.positions, true), model.surface.positions);
     return model;
   };
   source.made_cage = [&body, made] {
     std::optional<TetMesh> cage = scenes::made_cage(body);
-    if (cage) scenes::transform(scenes::world_from_model(body, made.positions, true), cage->positions);
+    if (cage) scenes::transform(scenes::own_from_model(body, made.positions, true), cage->positions);
     return cage;
   };
   return source;
@@ -128,17 +134,19 @@ BodySource source_of_scenery(const scenes::Scene& scene, const scenes::BodySpec&
   try {
     source = source_of(scene, body, data);
     if (!source.warning.empty()) log::warn("{}", source.warning);
+    source.identity = identity_of_scenery(body, std::move(source.identity));
   } catch (const InputError& error) {
     log::warn("{}. It is left out of the pictures.", error.what());
     source.model = "nothing";
+    source.identity["triangles"] = body.triangles;
     source.load = [] { return meshing::ImportedModel{}; };
   }
-  source.identity["triangles"] = body.triangles;
   return source;
 }
 
 SurfaceMesh make_scenery(const scenes::BodySpec& body, const BodySource& source) {
   SurfaceMesh surface = source.load().surface;
+  surface.positions.rowwise() += body.pose.position_m.transpose();
   if (body.triangles > 0) surface = meshing::simplify(surface, body.triangles);
   return surface;
 }

@@ -1,6 +1,7 @@
-// What a scene's bodies and scenery are made from: the model, where the scene puts it, and all that a change
-// of which makes the meshes anew. Private to what prepares bodies (scene_world.cpp) and what compares them
-// with their scene (origin.cpp).
+// What a scene's bodies and scenery are made from: the model, how the scene turns it, and all that a change
+// of which makes the meshes anew. Bodies are made in their own frame, with the anchor at 0, so that those
+// which are the same but for position_m are made once. Private to what prepares bodies (scene_world.cpp) and
+// what compares them with their scene (origin.cpp).
 #pragma once
 
 #include <optional>
@@ -15,13 +16,15 @@ namespace limber::detail {
 // The lines of the scene that shape a body's meshes, as the user's text has them once more: a change of any
 // makes them anew.
 Json identity_of(const scenes::BodySpec&, const std::string& model_hash);
+// The same of scenery, whose mesh is in world coordinates.
+Json identity_of_scenery(const scenes::BodySpec&, Json identity);
 // The hash in such an identity; nothing where it is none.
 std::optional<std::string> model_hash_in(const Json& identity);
 // In place of a file's hash, of a model that limber makes.
 std::string hash_of_made(const SurfaceMesh& made, const Appearance&);
 
-// `body` must outlive what is returned. Throws InputError when its file is not found and no made model may
-// take its place.
+// In the body's own frame. `body` must outlive what is returned. Throws InputError when its file is not found
+// and no made model may take its place.
 BodySource source_of(const scenes::Scene&, const scenes::BodySpec& body, std::vector<fs::path> folders);
 PrepareSettings settings_of(const scenes::BodySpec&);
 

@@ -4,13 +4,14 @@
 // What is wrong only now, when the cages are known (a box that holds no node, a shell that is not there,
 // bodies that overlap), is told with the place in the scene's text, as the reader's complaints are.
 #include <algorithm>
+#include <map>
 #include <numbers>
 #include <set>
 
 #include "core/error.h"
 #include "core/progress.h"
+#include "core/threads.h"
 #include "fem/stiffness_share.h"
-#include "limber/detail/body/write_robot.h"
 #include "limber/detail/world/body_source.h"
 #include "limber/detail/world/kept_share.h"
 #include "limber/detail/world/scene_world.h"
@@ -73,13 +74,6 @@ void set_ligaments(const scenes::Scene& scene, fem::WorldSpec& spec) {
                               .damping_ratio = ligament.damping_ratio,
                               .rest_length = ligament.rest_length,
                               .pushes = ligament.pushes});
-}
-
-// The cage weighs what the model does, as far as that has an inside: densities are of the model, and the cage
-// is larger, so its own density is lower by the ratio of the volumes. Where the model is not closed the ratio
-// is 1.
-double share_of_the_cage(const PreparedBody& prepared) {
-  return std::min(1., mass_of(prepared).of.volume_m3 / volume(prepared.cage));
 }
 
 // What the parts of a body say, tet by tet: of a convex shell, or of a box at the start, by the middle of the
@@ -259,7 +253,9 @@ fem::BodySpec spec_of_body(const scenes::Scene& scene, const scenes::BodySpec& b
   fem::BodySpec fem_body;
   fem_body.name = body.name;
   fem_body.cage = prepared.cage;
-  const double share = share_of_the_cage(prepared);
+  // The cage weighs what the model does, as far as that has an inside: densities are of the model, and the
+  // cage is larger, so its own density is lower by the ratio of the volumes.
+  const double share = filled_share(prepared);
   fem_body.material = {.model = body.material.model == "springs" ? fem::MaterialModel::springs
                                                                  : fem::MaterialModel::neo_hookean,
                        .youngs_modulus_pa = body.material.youngs_modulus_pa,
@@ -301,9 +297,33 @@ fem::WorldSpec spec_of_world(const scenes::Scene& scene, const std::vector<Prepa
   return spec;
 }
 
+// As its files have it: what is found there is the same of bodies that are the same but for their place.
+fem::BodySpec in_own_frame(fem::BodySpec spec, const PreparedBody& prepared) {
+  if (prepared.own_cage_m.rows() > 0) spec.cage.positions = prepared.own_cage_m;
+  return spec;
+}
+
+// Of bodies whose share is not known yet; once for all that are the same.
+void find_stiffness_shares(const std::vector<PreparedBody>& prepared, fem::WorldSpec& spec) {
+  std::map<std::string, std::vector<std::size_t>> same;
+  for (std::size_t b = 0; b < prepared.size(); ++b)
+    if (spec.bodies[b].stiffness_share == 0 && has_stiffness_share(spec.bodies[b]))
+      same[stiffness_key_of(in_own_frame(spec.bodies[b], prepared[b]))].push_back(b);
+  std::vector<std::vector<std::size_t>> groups;
+  for (auto& [key, bodies] : same) groups.push_back(std::move(bodies));
+  parallel_for(int(groups.size()), [&](int g) {
+    throw_if_stopped();
+    const std::vector<std::size_t>& bodies = groups[std::size_t(g)];
+    const double share = fem::stiffness_share_of(in_own_frame(spec.bodies[bodies[0]], prepared[bodies[0]]));
+    for (const std::size_t b : bodies) spec.bodies[b].stiffness_share = share;
+  });
+}
+
 // Complaints of fem name a body, not its place in the text.
-fem::World build_world_of(const scenes::Scene& scene, const fem::WorldSpec& spec) {
+fem::World build_world_of(const scenes::Scene& scene, const std::vector<PreparedBody>& prepared,
+                          fem::WorldSpec& spec) {
   try {
+    find_stiffness_shares(prepared, spec);
     return fem::build_world(spec);
   } catch (const InputError& error) {
     for (const scenes::LigamentSpec& ligament : scene.ligaments)
@@ -327,7 +347,7 @@ fem::World build_world(const scenes::Scene& scene, const std::vector<PreparedBod
     if (const auto known = stiffness_shares.find(body.name); known != stiffness_shares.end())
       body.stiffness_share = known->second;
   spec.start_positions = start_positions;
-  return build_world_of(scene, spec);
+  return build_world_of(scene, prepared, spec);
 }
 
 fem::World build_world_in(const fs::path& work_folder, const scenes::Scene& scene,
@@ -335,22 +355,32 @@ fem::World build_world_in(const fs::path& work_folder, const scenes::Scene& scen
   fem::WorldSpec spec = spec_of_world(scene, prepared);
   std::vector<KeptShare> kept;
   for (std::size_t b = 0; b < spec.bodies.size(); ++b) {
-    kept.emplace_back(body_folder(work_folder, scene.bodies[b]), spec.bodies[b]);
+    kept.emplace_back(body_folder(work_folder, scene.bodies[b]), in_own_frame(spec.bodies[b], prepared[b]));
     spec.bodies[b].stiffness_share = kept[b].share();
   }
-  fem::World world = build_world_of(scene, spec);
+  fem::World world = build_world_of(scene, prepared, spec);
   for (std::size_t b = 0; b < kept.size(); ++b) kept[b].keep(world.bodies[b].stiffness_share);
   return world;
 }
 
-void keep_stiffness_share(const scenes::Scene& scene, std::size_t body, const fs::path& work_folder) {
-  const scenes::BodySpec& of_scene = scene.bodies[body];
-  const fs::path folder = body_folder(work_folder, of_scene);
-  for (const scenes::MotionSpec& motion : scene.motions)
-    if (std::size_t(motion.body) == body) return;
-  const fem::BodySpec spec = spec_of_body(scene, of_scene, read_body(folder));
-  KeptShare kept(folder, spec);
-  if (kept.is_of_use() && kept.share() == 0) kept.keep(fem::stiffness_share_of(spec));
+void keep_stiffness_shares(const scenes::Scene& scene, const std::vector<std::size_t>& bodies,
+                           const fs::path& work_folder) {
+  std::map<std::string, double> found;
+  for (const std::size_t b : bodies) {
+    const scenes::BodySpec& body = scene.bodies[b];
+    const fs::path folder = body_folder(work_folder, body);
+    if (std::any_of(scene.motions.begin(), scene.motions.end(),
+                    [&](const scenes::MotionSpec& motion) { return std::size_t(motion.body) == b; }))
+      continue;
+    PreparedBody prepared = read_body(folder);
+    place(prepared, body.pose.position_m);
+    const fem::BodySpec spec = in_own_frame(spec_of_body(scene, body, prepared), prepared);
+    KeptShare kept(folder, spec);
+    if (!has_stiffness_share(spec) || kept.share() > 0) continue;
+    const auto [share, is_new] = found.emplace(stiffness_key_of(spec), 0);
+    if (is_new) share->second = fem::stiffness_share_of(spec);
+    kept.keep(share->second);
+  }
 }
 
 }  // namespace limber::detail

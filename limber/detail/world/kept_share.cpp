@@ -7,9 +7,11 @@
 
 namespace limber::detail {
 
-namespace {
+bool has_stiffness_share(const fem::BodySpec& body) {
+  return body.kind == fem::BodyKind::deformable && body.material.mesh_independent;
+}
 
-std::string key_of(const fem::BodySpec& body) {
+std::string stiffness_key_of(const fem::BodySpec& body) {
   const fem::Material& m = body.material;
   const Json all{{"cage", hex(hash_of(body.cage))},
                  {"fixed_nodes", body.fixed_nodes},
@@ -23,6 +25,8 @@ std::string key_of(const fem::BodySpec& body) {
   return content_hash(text_of(all));
 }
 
+namespace {
+
 KeptShare::Entry entry_of(const std::string& key, double share) {
   return {share, content_hash(key + text_of(Json(share)))};
 }
@@ -31,8 +35,8 @@ KeptShare::Entry entry_of(const std::string& key, double share) {
 
 KeptShare::KeptShare(const fs::path& body_folder, const fem::BodySpec& body)
     : file_(body_folder / "stiffness.json"),
-      key_(key_of(body)),
-      is_of_use_(body.kind == fem::BodyKind::deformable && body.material.mesh_independent) {
+      key_(stiffness_key_of(body)),
+      is_of_use_(has_stiffness_share(body)) {
   if (!is_of_use_ || !fs::exists(file_)) return;
   try {
     for (const auto& [key, told] : read_fields<InOrder<Json>>(read_json(file_), "", ""))

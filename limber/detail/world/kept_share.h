@@ -10,13 +10,17 @@
 
 namespace limber::detail {
 
+// Whether there is a share to find.
+bool has_stiffness_share(const fem::BodySpec&);
+// A hash of all that it depends on, the program too.
+std::string stiffness_key_of(const fem::BodySpec&);
+
 // stiffness.json of a body's folder: the shares that were found, each under a hash of all that it depends on,
 // the program too, and with one of itself. What is damaged is not there.
 class KeptShare {
  public:
-  KeptShare(const fs::path& body_folder, const fem::BodySpec&);
-  bool is_of_use() const { return is_of_use_; }  // else there is nothing to find
-  double share() const { return share_; }        // 0: not known
+  KeptShare(const fs::path& body_folder, const fem::BodySpec& in_its_own_frame);
+  double share() const { return share_; }  // 0: not known
   // Of fem::Body; does nothing where it is known, or of no use. Throws DiskError.
   void keep(double found);
 

@@ -1,5 +1,5 @@
 // Whether bodies, scenery and the goal's shape that lie in a work folder are those of the scene, and a body
-// by itself that of its model: what limber verify asks. Models are read, or made, and placed again, and the
+// by itself that of its model: what limber verify asks. Models are read, or made, and turned again, and the
 // meshes compared.
 //
 // Where the model's file is not here, or holds something else than the body was made from, nothing is said of
@@ -80,8 +80,7 @@ Origin origin_of_scenery(const scenes::Scene& scene, const scenes::BodySpec& bod
   }
   const std::optional<std::string> source = model_hash_in(said->input);
   if (!source) return origin;
-  Json identity = identity_of(body, *source);
-  identity["triangles"] = body.triangles;
+  const Json identity = identity_of_scenery(body, identity_of(body, *source));
   origin.placed_so = said->input == identity && said->hash == hash_of_scenery(mesh, said->input);
   if (file && !scenes::find_model(file->file, with(data, scene.folder))) return origin;
   const BodySource found = source_of_scenery(scene, body, data);

@@ -29,10 +29,10 @@ PreparedScene prepare_scene(const ScenePrepareOptions& options) {
       asked.push_back(b);
   const std::vector<BodyReport> reports =
       prepare_bodies_of(scene, asked, options.scene.data, options.out, options.scene.store);
+  keep_stiffness_shares(scene, asked, options.out);
   PreparedScene prepared{.bodies = {}, .bodies_of_scene = known.size()};
   for (std::size_t i = 0; i < asked.size(); ++i) {
     const scenes::BodySpec& body = scene.bodies[asked[i]];
-    keep_stiffness_share(scene, asked[i], options.out);
     prepared.bodies.push_back({body.name, body_folder(options.out, body), reports[i].surface.triangles,
                                reports[i].cage.value().tets});
   }

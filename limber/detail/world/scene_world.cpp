@@ -1,12 +1,14 @@
 // From a scene to prepared bodies in a work folder, and back from the folder.
 //
 // A body is prepared anew only where something that shapes its meshes has changed: its report holds the
-// identity of its source (body_source.h) and its settings, and prepare_body compares. Scenery is kept the
-// same way, with a small file beside its mesh. Everything is in world coordinates, where the scene puts it,
-// so a body that is moved in the scene is made anew, too. What becomes of the bodies in the world is in
+// identity of its source (body_source.h) and its settings, and prepare_body compares. Bodies are made in
+// their own frame and moved to their place when they are read, so one that is moved in the scene is not made
+// anew, and those that are the same but for their place are made once. Scenery is kept the same way, with a
+// small file beside its mesh, but in world coordinates. What becomes of the bodies in the world is in
 // build_world.cpp.
 #include "limber/detail/world/scene_world.h"
 
+#include <map>
 #include <numeric>
 
 #include "core/error.h"
@@ -106,13 +108,28 @@ std::vector<BodyReport> prepare_bodies_of(const scenes::Scene& scene, const std:
   }
   const bool is_alone = thread_count() == 1 || bodies.size() == 1;
   std::vector<BodyReport> reports(bodies.size());
-  side_by_side(int(bodies.size()), [&](int i) {
+  const auto prepare = [&](std::size_t i, const fs::path& same) {
     throw_if_stopped();
-    const scenes::BodySpec& body = scene.bodies[bodies[std::size_t(i)]];
+    const scenes::BodySpec& body = scene.bodies[bodies[i]];
     const ProgressOf progress(body.name);
-    const PrepareAid aid{store ? &*store : nullptr, like.empty() ? like : body_folder(like, body), is_alone};
-    reports[std::size_t(i)] =
-        prepare_body(sources[std::size_t(i)], settings_of(body), body_folder(work_folder, body), aid);
+    reports[i] = prepare_body(sources[i], settings_of(body), body_folder(work_folder, body),
+                              {store ? &*store : nullptr, same, is_alone});
+  };
+  // The first of those that are the same is made, and the others are copied from it.
+  std::vector<std::size_t> firsts, others, first_of(bodies.size());
+  std::map<Json, std::size_t> known;
+  for (std::size_t i = 0; i < bodies.size(); ++i) {
+    first_of[i] =
+        known.emplace(input_of(sources[i].identity, settings_of(scene.bodies[bodies[i]])), i).first->second;
+    (first_of[i] == i ? firsts : others).push_back(i);
+  }
+  side_by_side(int(firsts.size()), [&](int k) {
+    const std::size_t i = firsts[std::size_t(k)];
+    prepare(i, like.empty() ? like : body_folder(like, scene.bodies[bodies[i]]));
+  });
+  side_by_side(int(others.size()), [&](int k) {
+    const std::size_t i = others[std::size_t(k)];
+    prepare(i, body_folder(work_folder, scene.bodies[bodies[first_of[i]]]));
   });
   return reports;
 }
@@ -133,7 +150,11 @@ LoadedModel load_model(const scenes::Scene& scene, const scenes::BodySpec& body,
   if (!source.warning.empty()) log::warn("{}", source.warning);
   meshing::ImportedModel model = source.load();
   look_into_images(model.appearance, model.warnings);
-  return {source.model, std::move(model), source.made_cage()};
+  std::optional<TetMesh> made_cage = source.made_cage();
+  const Vec3& at = body.pose.position_m;
+  model.surface.positions.rowwise() += at.transpose();
+  if (made_cage) made_cage->positions.rowwise() += at.transpose();
+  return {source.model, std::move(model), std::move(made_cage), input_of(source.identity, settings_of(body))};
 }
 
 SurfaceMesh load_scenery(const scenes::Scene& scene, const scenes::BodySpec& body,
@@ -166,6 +187,7 @@ std::vector<PreparedBody> read_bodies(const scenes::Scene& scene, const fs::path
   for (const scenes::BodySpec& body : scene.bodies) {
     bodies.push_back(read_body(body_folder(work_folder, body)));
     bodies.back().deformation = body.deformation;
+    place(bodies.back(), body.pose.position_m);
   }
   if (has_goal_cage(scene))
     bodies[std::size_t(scene.robot)].goal_shape_m = read_msh(goal_cage_file(scene, work_folder)).positions;

@@ -13,9 +13,10 @@ namespace limber::detail {
 
 fs::path body_folder(const fs::path& work_folder, const scenes::BodySpec&);
 
-// Prepares what is not up to date; meshes are in world coordinates, where the scene puts them. `data` are
-// folders in which model files are looked for first; bodies are shared with those of `store`, where one is
-// named. What is the same in the work folder `like`, where one is named, is copied from there.
+// Prepares what is not up to date; meshes are in world coordinates, where the scene puts them. Bodies that
+// are the same but for their place are made once. `data` are folders in which model files are looked for
+// first; bodies are shared with those of `store`, where one is named. What is the same in the work folder
+// `like`, where one is named, is copied from there.
 std::vector<PreparedBody> prepare_bodies(const scenes::Scene&, const std::vector<fs::path>& data,
                                          const fs::path& work_folder, const fs::path& store = {},
                                          const fs::path& like = {});
@@ -34,6 +35,7 @@ struct LoadedModel {
   std::string from;                  // a file's name, or words for a made model
   meshing::ImportedModel model;      // in world coordinates, where the scene puts it
   std::optional<TetMesh> made_cage;  // that of a body in cells
+  Json input;                        // identity_of() the body
 };
 LoadedModel load_model(const scenes::Scene&, const scenes::BodySpec&, const std::vector<fs::path>& data);
 SurfaceMesh load_scenery(const scenes::Scene&, const scenes::BodySpec&, const std::vector<fs::path>& data);
@@ -55,12 +57,12 @@ enum class Appearing { plain, not_here, same, another };
 // What a scene says of a body that was prepared before.
 struct Origin {
   bool placed_so = false;            // its report tells of the scene's pose, cage and settings
-  std::optional<bool> same_surface;  // read and placed again; nothing where the model file is not here
-  std::optional<TetMesh> made_cage;  // of a body in cells
+  std::optional<bool> same_surface;  // read and turned again; nothing where the model file is not here
+  std::optional<TetMesh> made_cage;  // of a body in cells, in its own frame
   Appearing appearance = Appearing::plain;
 };
 Origin origin_of(const scenes::Scene&, const scenes::BodySpec&, const std::vector<fs::path>& data,
-                 const PreparedBody&);
+                 const PreparedBody& in_its_own_frame);
 // The same of a body that limber prepare made by itself, of the model in `file`, read by the words that its
 // report tells (scale, axes, label); placed_so: the file holds what it was made from. Throws InputError when
 // the file cannot be read, or the body was made for a scene.
@@ -77,7 +79,7 @@ GoalCage goal_cage_of(const scenes::Scene&, const std::vector<fs::path>& data,
 // it. Throws InputError when a mesh is missing or damaged.
 std::vector<SurfaceMesh> read_scenery(const scenes::Scene&, const fs::path& work_folder);
 
-// Throws InputError when a body is missing or damaged.
+// Where the scene puts them. Throws InputError when a body is missing or damaged.
 std::vector<PreparedBody> read_bodies(const scenes::Scene&, const fs::path& work_folder);
 
 GoalRules goal_rules_of(const scenes::Scene&);
@@ -95,7 +97,8 @@ fem::World build_world(const scenes::Scene&, const std::vector<PreparedBody>&,
 // when all that they depend on is the same. Who judges a plan finds them himself.
 fem::World build_world_in(const fs::path& work_folder, const scenes::Scene&,
                           const std::vector<PreparedBody>&);
-// Of one body, 0 ≤ body < bodies, that is prepared there.
-void keep_stiffness_share(const scenes::Scene&, std::size_t body, const fs::path& work_folder);
+// Of some bodies, 0 ≤ body < bodies, that are prepared there.
+void keep_stiffness_shares(const scenes::Scene&, const std::vector<std::size_t>& bodies,
+                           const fs::path& work_folder);
 
 }  // namespace limber::detail
