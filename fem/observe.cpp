@@ -297,12 +297,16 @@ bool is_sound(const World& world, const State& state) {
 Penetration deepest_penetration(const World& world, const State& state) {
   Penetration deepest;
   std::vector<Points> positions;
-  for (int b = 0; b < int(world.bodies.size()); ++b) positions.push_back(body_positions(world, state, b));
+  std::vector<Box> boxes;
+  for (int b = 0; b < int(world.bodies.size()); ++b) {
+    positions.push_back(body_positions(world, state, b));
+    boxes.push_back(bounding_box(positions.back()));
+  }
   for (int a = 0; a < int(world.bodies.size()); ++a) {
     const Body& one = world.bodies[a];
     for (int b = a + 1; b < int(world.bodies.size()); ++b) {
       const Body& two = world.bodies[b];
-      if (!one.pushed() && !two.pushed()) continue;
+      if ((!one.pushed() && !two.pushed()) || !detail::can_overlap(boxes[a], boxes[b])) continue;
       const auto overlap = detail::deepest_overlap({positions[a], one.cage.tets, one.surface},
                                                    {positions[b], two.cage.tets, two.surface});
       if (overlap.depth_m > deepest.depth_m) deepest = {overlap.depth_m, a, b, overlap.place};
@@ -320,12 +324,18 @@ Penetration deepest_penetration(const World& world, const State& state) {
 
 int piercing_edges(const World& world, const State& state) {
   int count = 0;
+  std::vector<Points> positions;
+  std::vector<Box> boxes;
+  for (int b = 0; b < int(world.bodies.size()); ++b) {
+    positions.push_back(body_positions(world, state, b));
+    boxes.push_back(bounding_box(positions.back()));
+  }
   for (int a = 0; a < int(world.bodies.size()); ++a)
     for (int b = a + 1; b < int(world.bodies.size()); ++b) {
       const Body &one = world.bodies[a], &two = world.bodies[b];
-      if (one.pushed() || two.pushed())
-        count += detail::passing_edges({body_positions(world, state, a), one.cage.tets, one.surface},
-                                       {body_positions(world, state, b), two.cage.tets, two.surface});
+      if ((one.pushed() || two.pushed()) && detail::can_overlap(boxes[a], boxes[b]))
+        count += detail::passing_edges({positions[a], one.cage.tets, one.surface},
+                                       {positions[b], two.cage.tets, two.surface});
     }
   return count;
 }

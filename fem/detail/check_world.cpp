@@ -136,10 +136,13 @@ void check_places(const World& world) {
               "body or widen bounds_m",
               body.name, n, "xyz"[c], x, world.bounds_m.lower[c], world.bounds_m.upper[c]));
       }
+  if (world.touches_on_surfaces()) return;
+  std::vector<Box> boxes;
+  for (const Body& body : world.bodies) boxes.push_back(bounding_box(body.cage.positions));
   for (std::size_t a = 0; a < world.bodies.size(); ++a)
     for (std::size_t b = a + 1; b < world.bodies.size(); ++b) {
       const Body &one = world.bodies[a], &two = world.bodies[b];
-      if ((!one.pushed() && !two.pushed()) || world.touches_on_surfaces()) continue;
+      if ((!one.pushed() && !two.pushed()) || !can_overlap(boxes[a], boxes[b])) continue;
       const auto overlap = deepest_overlap({one.cage.positions, one.cage.tets, one.surface},
                                            {two.cage.positions, two.cage.tets, two.surface});
       if (overlap.depth_m > 1e-6 * size)

@@ -1,6 +1,6 @@
-// Contact between cages: which pairs of bodies are looked at, and in which order the touches of one pair
-// are found. A touch is a contact point of one body, a surface vertex or a place of a surface edge, that is
-// inside a tet of another body. The work is done in four files:
+// Contact between cages: which pairs of bodies are looked at (near_pairs.cpp finds those that may meet), and
+// in which order the touches of one pair are found. A touch is a contact point of one body, a surface vertex
+// or a place of a surface edge, that is inside a tet of another body. The work is done in four files:
 //
 // - contact_candidates.cpp: which points and tets are near enough to be asked at all. It keeps lists that
 //   last for many steps.
@@ -34,9 +34,7 @@ const Tables<double>& tables_of(const World& world) {
   return world.tables64;
 }
 
-// A pair is two bodies of which contact can push at least one, or a body with itself where it asks for
-// that. Two bodies that nothing can push never make a pair. Effective masses are kept only where rigid
-// bodies are.
+// Effective masses are kept only where rigid bodies are.
 template <class Real>
 Contacts<Real>::Contacts(const World& world, const Kernels<Real>& kernels, int lanes)
     : world_(world),
@@ -44,15 +42,10 @@ Contacts<Real>::Contacts(const World& world, const Kernels<Real>& kernels, int l
       tables_(tables_of<Real>(world)),
       kernels_(kernels),
       bodies_(int(world.bodies.size())),
-      step_(Real(world.contact_dt_s)) {
-  for (int a = 0; a < bodies_; ++a) {
-    if (world.bodies[a].moving && world.bodies[a].self_contact) pairs_.emplace_back(a, a);
-    for (int b = a + 1; b < bodies_; ++b)
-      if (world.bodies[a].pushed() || world.bodies[b].pushed()) pairs_.emplace_back(a, b);
-  }
+      step_(Real(world.contact_dt_s)),
+      near_pairs_(world, tables_.skin, std::vector<Real>(world.bodies.size(), 0), lanes) {
   for (const Body& body : world.bodies)
     if (body.kind == BodyKind::rigid) effective_masses_.resize(world.bodies.size());
-  lists_.resize(std::size_t(lanes) * pairs_.size());
   packed_.resize(std::size_t(world.nodes));
   sides_.resize(std::size_t(world.nodes));
   listed_.assign(std::size_t(world.nodes), 0);
@@ -63,7 +56,28 @@ Contacts<Real>::Contacts(const World& world, const Kernels<Real>& kernels, int l
 // are next asked for. Nothing else outlives a step.
 template <class Real>
 void Contacts<Real>::forget(int lane) {
-  for (std::size_t p = 0; p < pairs_.size(); ++p) lists_[lane * pairs_.size() + p].built = false;
+  for (const NearPair& pair : near_pairs_.found_before(lane))
+    if (pair.list >= 0) lists_[pair.list].built = false;
+  near_pairs_.forget(lane);
+}
+
+template <class Real>
+auto Contacts<Real>::list_of(NearPair& pair) -> List& {
+  if (pair.list < 0) {
+    pair.list = near_pairs_.free_list();
+    if (pair.list == int(lists_.size())) lists_.emplace_back();
+    lists_[pair.list].built = false;
+  }
+  return lists_[pair.list];
+}
+
+template <class Real>
+const std::vector<Contact<Real>>& Contacts<Real>::find(int lane, const LaneView<Real>& view, int a, int b) {
+  std::vector<NearPair>& pairs = near_pairs_.find(lane, view);
+  const auto pair = std::lower_bound(pairs.begin(), pairs.end(), NearPair{a, b});
+  if (pair != pairs.end() && pair->a == a && pair->b == b) return find(view, *pair);
+  contacts_.clear();
+  return contacts_;
 }
 
 // The touches of bodies a and b, in the order that contact.h states. Pairs whose boxes do not meet cost six
@@ -74,14 +88,14 @@ void Contacts<Real>::forget(int lane) {
 // from the points. Depth is measured for each direction apart, because a point takes its depth from
 // neighbours of its own body. A body with itself has one direction only, and no edges that pass through.
 template <class Real>
-const std::vector<Contact<Real>>& Contacts<Real>::find(int lane, const LaneView<Real>& view, int a, int b) {
+const std::vector<Contact<Real>>& Contacts<Real>::find(const LaneView<Real>& view, NearPair& pair) {
+  const auto [a, b, number] = pair;
   contacts_.clear();
   for (int c = 0; c < 3; ++c) {
     const int ka = (3 * a + c) * view.stride, kb = (3 * b + c) * view.stride;
     if (view.lower[ka] > view.upper[kb] || view.lower[kb] > view.upper[ka]) return contacts_;
   }
-  const auto pair = std::lower_bound(pairs_.begin(), pairs_.end(), std::pair(a, b));  // ascending
-  List& list = lists_[lane * pairs_.size() + std::size_t(pair - pairs_.begin())];
+  List& list = list_of(pair);
   const Real reach = (tables_.skin[a] + tables_.skin[b]) / 2;
   const Real travel = view.travel[a * view.stride] + view.travel[b * view.stride];
   refresh(view, a, b, reach, travel, list);
@@ -108,8 +122,10 @@ const std::vector<Contact<Real>>& Contacts<Real>::find(int lane, const LaneView<
 template Contacts<float>::Contacts(const World&, const Kernels<float>&, int);
 template void Contacts<float>::forget(int);
 template const std::vector<Contact<float>>& Contacts<float>::find(int, const LaneView<float>&, int, int);
+template const std::vector<Contact<float>>& Contacts<float>::find(const LaneView<float>&, NearPair&);
 template Contacts<double>::Contacts(const World&, const Kernels<double>&, int);
 template void Contacts<double>::forget(int);
 template const std::vector<Contact<double>>& Contacts<double>::find(int, const LaneView<double>&, int, int);
+template const std::vector<Contact<double>>& Contacts<double>::find(const LaneView<double>&, NearPair&);
 
 }  // namespace limber::fem::detail

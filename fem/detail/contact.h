@@ -1,13 +1,13 @@
 // Contact of one lane: who is inside whom, how deep, which force. Method and figures: docs/contact.md.
 #pragma once
 
-#include <utility>
 #include <vector>
 
 #include "core/types.h"
 #include "fem/detail/effective_mass.h"
 #include "fem/detail/friction.h"
 #include "fem/detail/lane_view.h"
+#include "fem/detail/near_pairs.h"
 #include "fem/detail/penalty.h"
 #include "fem/detail/tables.h"
 
@@ -56,6 +56,10 @@ class Contacts {
   // pass through, each ascending; then those of b in a; of a body with itself
   // vertices and edges with an end inside only. For tests and observables; valid until the next call.
   const std::vector<Contact<Real>>& find(int lane, const LaneView<Real>& view, int a, int b);
+  // Those whose boxes may meet, and bodies that touch themselves.
+  const std::vector<NearPair>& near_pairs(int lane, const LaneView<Real>& view) {
+    return near_pairs_.find(lane, view);
+  }
 
  private:
   // Points, or ridges (named by their middles' points), and the tets of the other body near them: ascending
@@ -100,6 +104,8 @@ class Contacts {
   struct Cell;
 
   void place_of(int point, const Real share[2], Real out[3]) const;  // from packed_
+  const std::vector<Contact<Real>>& find(const LaneView<Real>&, NearPair&);
+  List& list_of(NearPair&);
 
   // contact_candidates.cpp
   void refresh(const LaneView<Real>&, int a, int b, Real reach, Real travel, List&);
@@ -143,7 +149,7 @@ class Contacts {
   int bodies_;
   std::vector<ContactRecord<Real>>* records_ = nullptr;
   Real step_;  // the step from which stiffness follows
-  std::vector<std::pair<int, int>> pairs_;
+  NearPairs<Real> near_pairs_;
   // Where there are rigid bodies that move: a body, in the lane at hand; and all touches of that, with their
   // bodies.
   std::vector<EffectiveMass> effective_masses_;
@@ -152,7 +158,7 @@ class Contacts {
     Contact<Real> contact;
   };
   std::vector<Held> held_;
-  std::vector<List> lists_;  // [lane × pairs + pair]
+  std::vector<List> lists_;  // [NearPair::list] of pairs whose boxes have met, in all lanes
   std::vector<Contact<Real>> contacts_;
   std::vector<Place> packed_;         // by world node; valid for the nodes of the list at hand
   std::vector<int> contact_of_node_;  // index into contacts_ of a vertex, until depths are measured, else −1

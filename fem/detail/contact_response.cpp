@@ -28,9 +28,10 @@ namespace limber::fem::detail {
 template <class Real>
 void Contacts<Real>::add_forces(int lane, const LaneView<Real>& view, Friction<Real>* friction) {
   if (!effective_masses_.empty()) return add_forces_with_rigid(lane, view, friction);
-  for (const auto& [a, b] : pairs_) {
+  for (NearPair& pair : near_pairs_.find(lane, view)) {
+    const auto [a, b, list] = pair;
     if (view.sleeps(a) && view.sleeps(b)) continue;
-    for (const Contact<Real>& contact : find(lane, view, a, b)) respond(view, a, b, contact, friction);
+    for (const Contact<Real>& contact : find(view, pair)) respond(view, a, b, contact, friction);
   }
   add_wall_forces(view, friction);
 }
@@ -42,9 +43,10 @@ template <class Real>
 void Contacts<Real>::add_forces_with_rigid(int lane, const LaneView<Real>& view, Friction<Real>* friction) {
   held_.clear();
   for (EffectiveMass& effective_mass : effective_masses_) effective_mass.depths = 0;
-  for (const auto& [a, b] : pairs_) {
+  for (NearPair& pair : near_pairs_.find(lane, view)) {
+    const auto [a, b, list] = pair;
     if (view.sleeps(a) && view.sleeps(b)) continue;
-    for (const Contact<Real>& contact : find(lane, view, a, b)) {
+    for (const Contact<Real>& contact : find(view, pair)) {
       if (!(contact.depth > 0)) continue;
       held_.push_back({a, b, contact});
       effective_masses_[a].depths += double(contact.depth),

@@ -192,6 +192,10 @@ bool is_empty(const Box& box) { return (box.lower.array() > box.upper.array()).a
 
 }  // namespace
 
+bool can_overlap(const Box& a, const Box& b) {
+  return !is_empty({a.lower.cwiseMax(b.lower), a.upper.cwiseMin(b.upper)});
+}
+
 Overlap deepest_overlap(const Shape& a, const Shape& b) {
   Overlap deepest;
   const Box region = common_box(a, b);

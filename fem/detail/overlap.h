@@ -6,6 +6,9 @@
 
 namespace limber::fem::detail {
 
+// Whether two boxes meet: else what is in them does not overlap.
+bool can_overlap(const Box&, const Box&);
+
 struct Shape {
   Points positions;
   const Tets& tets;

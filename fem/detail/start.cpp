@@ -27,10 +27,15 @@ struct Gap {
   std::vector<SurfaceTables<double>::Share> shares[2];  // of it: of the sample's side, of the other
 };
 struct Gaps {
-  std::vector<Gap> of_pair;  // [body a × bodies + body b], on the diagonal of a body and itself
+  // Body a × bodies + body b of those that are nearer than that offset; a = b: a body and itself.
+  std::map<std::size_t, Gap> of_pair;
+  Gap of_others;
   // The gaps of single samples below that offset, by body, against, sample.
   std::map<std::array<int, 3>, double> of_sample;
-  const Gap& operator[](std::size_t pair) const { return of_pair[pair]; }
+  const Gap& operator[](std::size_t pair) const {
+    const auto near = of_pair.find(pair);
+    return near == of_pair.end() ? of_others : near->second;
+  }
 };
 
 std::vector<double> places_of(const World& world, const Positions& positions) {
@@ -42,7 +47,7 @@ std::vector<double> places_of(const World& world, const Positions& positions) {
 // Of a world whose surfaces64 have that offset everywhere.
 Gaps gaps(const World& world, double offset_m, const Positions& positions) {
   const std::size_t bodies = world.bodies.size();
-  Gaps gaps{std::vector<Gap>(bodies * bodies, {offset_m, {}, {}}), {}};
+  Gaps gaps{{}, {offset_m, {}, {}}, {}};
   const std::vector<double> x = places_of(world, positions), still(x.size(), 0.0), travel(bodies, 0.0);
   std::vector<double> forces(x.size(), 0.0), lower, upper;
   for (const Body& body : world.bodies) {

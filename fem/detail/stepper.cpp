@@ -107,11 +107,10 @@ Stepper<Real>::Stepper(const World& world, int lanes, Isa isa)
   speed2_.assign(bodies, 0), travel_.assign(bodies, 0), inner_travel_.assign(bodies, 0);
   unchanged_.assign(bodies, 0), asleep_.assign(bodies, 0), at_rest_.assign(bodies, 0);
   touches_.assign(bodies, 0), pressure_.assign(bodies, 0), changes_.assign(bodies, 0);
-  met_.assign(world.bodies.size() * bodies, false);
-  tied_.assign(world.bodies.size() * world.bodies.size(), false);
+  met_.resize(std::size_t(lanes));
   for (const Ligament& ligament : world.ligaments)
     if (const auto [one, other] = std::minmax(ligament.ends[0].body, ligament.ends[1].body); one >= 0)
-      tied_[std::size_t(one) * world.bodies.size() + std::size_t(other)] = true;
+      tied_.emplace_back(one, other);
   all_asleep_.assign(world.bodies.size(), false), pushed_asleep_ = all_asleep_;
   leader_.resize(world.bodies.size());
   for (int n = 0; n < world.nodes; ++n)

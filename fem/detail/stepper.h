@@ -4,6 +4,7 @@
 
 #include <new>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "core/state.h"
@@ -101,16 +102,18 @@ class Stepper {
   Numbers inner_travel_;
   std::vector<bool> wears_inside_;
   // Sleep (docs/dynamics.md), all [body][lane], 0 or 1: is as it was a step ago; takes no part in this step;
-  // was at rest in this step. And [pair of bodies][lane]: their boxes met a step ago.
+  // was at rest in this step.
   Numbers unchanged_, asleep_, at_rest_;
-  std::vector<std::uint32_t> changes_;            // [body][lane] steps in which it changed, since load
-  Numbers touches_;                               // its box meets another's or a wall
-  std::vector<bool> met_;                         // or a ligament ties them, always
-  std::vector<bool> tied_;                        // [pair of bodies]
-  std::vector<int> leader_;                       // [body] of those that rub, the first; in the lane at hand
-  std::vector<bool> all_asleep_, pushed_asleep_;  // [body] in all lanes; some force fell on it there
-  std::vector<Control> controls_;                 // [lane]
-  std::vector<bool> contact_;                     // [lane]
+  std::vector<std::uint32_t> changes_;             // [body][lane] steps in which it changed, since load
+  Numbers touches_;                                // its box meets another's or a wall
+  using Pairs = std::vector<std::pair<int, int>>;  // a < b
+  std::vector<Pairs> met_;                         // [lane] whose boxes met a step ago
+  Pairs meeting_;                                  // scratch
+  Pairs tied_;                                     // by ligaments, always
+  std::vector<int> leader_;                        // [body] of those that rub, the first; in the lane at hand
+  std::vector<bool> all_asleep_, pushed_asleep_;   // [body] in all lanes; some force fell on it there
+  std::vector<Control> controls_;                  // [lane]
+  std::vector<bool> contact_;                      // [lane]
   Rest<Real> rest_;
   Numbers speed2_before_, inner_speed2_;  // [lane]
   Cost cost_;

@@ -57,19 +57,24 @@ void Stepper<Real>::find_sleepers() {
           return false;
       return true;
     };
-    for (int a = 0; a < bodies && contact_[lane]; ++a)
-      for (int b = a + 1; b < bodies; ++b) {
-        const std::size_t pair = at(a * bodies + b);
-        const bool touch = meet(a, b), met = met_[pair], now = touch || tied_[std::size_t(a * bodies + b)];
-        met_[pair] = now;
-        if (touch) touches_[at(a)] = touches_[at(b)] = 1;
-        if (!met && !now) continue;
-        if (unchanged_[at(a)] == 0) asleep_[at(b)] = 0;
-        if (unchanged_[at(b)] == 0) asleep_[at(a)] = 0;
-        if (world_.bodies[a].pushed() && world_.bodies[b].pushed() &&
-            tables_.pair_friction[a * bodies + b] > 0)
-          join(a, b);
+    const auto wake_together = [&](int a, int b) {
+      if (unchanged_[at(a)] == 0) asleep_[at(b)] = 0;
+      if (unchanged_[at(b)] == 0) asleep_[at(a)] = 0;
+      if (world_.bodies[a].pushed() && world_.bodies[b].pushed() && tables_.pair_friction[a * bodies + b] > 0)
+        join(a, b);
+    };
+    if (contact_[lane]) {
+      meeting_.clear();
+      for (const NearPair& near : surface_contacts_ ? surface_contacts_->near_pairs(lane, view(lane))
+                                                    : contacts_->near_pairs(lane, view(lane))) {
+        if (near.a == near.b || !meet(near.a, near.b)) continue;
+        meeting_.emplace_back(near.a, near.b);
+        touches_[at(near.a)] = touches_[at(near.b)] = 1;
       }
+      for (const Pairs* pairs : {&met_[lane], &meeting_, &tied_})
+        for (const auto& [a, b] : *pairs) wake_together(a, b);
+      met_[lane].swap(meeting_);
+    }
     for (int b = 0; b < bodies; ++b)
       if (asleep_[at(b)] == 0) asleep_[at(leader(b))] = 0;
     for (int b = 0; b < bodies; ++b)
@@ -81,10 +86,10 @@ void Stepper<Real>::find_sleepers() {
         asleep_[at(b)] = 0;
       if (asleep_[at(b)] == 0) all_asleep_[b] = false;
     }
-    for (int a = 0; a < bodies && contact_[lane]; ++a)
-      for (int b = a + 1; b < bodies; ++b)
-        if (met_[at(a * bodies + b)] && asleep_[at(a)] != asleep_[at(b)])
-          pushed_asleep_[asleep_[at(a)] > 0 ? a : b] = true;
+    if (contact_[lane])
+      for (const Pairs* pairs : {&met_[lane], &tied_})
+        for (const auto& [a, b] : *pairs)
+          if (asleep_[at(a)] != asleep_[at(b)]) pushed_asleep_[asleep_[at(a)] > 0 ? a : b] = true;
   }
 }
 

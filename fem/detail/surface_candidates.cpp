@@ -66,19 +66,31 @@ Real SurfaceContacts<Real>::travel_of(const LaneView<Real>& view, int a, int b) 
   return travel;
 }
 
+// A list that no pair had before, or another pair, reaches as far as a new one.
+template <class Real>
+auto SurfaceContacts<Real>::list_of(NearPair& pair) -> List& {
+  if (pair.list < 0) {
+    pair.list = near_pairs_.free_list();
+    if (pair.list == int(lists_.size())) lists_.emplace_back();
+    List& list = lists_[pair.list];
+    list.built = list.kept = false, list.reach = 0;
+  }
+  return lists_[pair.list];
+}
+
 // The touches of one pair. Passes by bodies that both sleep and boxes that are farther apart than surfaces
 // can touch. Of two bodies that stay as they are touches are found once more and then kept: among thirty
 // organs side by side one moves, and its neighbours, which do not, touch their own.
 template <class Real>
-void SurfaceContacts<Real>::find_pair(int lane, const LaneView<Real>& view, std::size_t pair) {
-  const auto [a, b] = pairs_[pair];
+void SurfaceContacts<Real>::find_pair(const LaneView<Real>& view, NearPair& pair) {
+  const auto [a, b, number] = pair;
   if (view.sleeps(a) && view.sleeps(b)) return;
   const Real apart = offset(a, b);
   for (int c = 0; c < 3; ++c) {
     const int ka = (3 * a + c) * view.stride, kb = (3 * b + c) * view.stride;
     if (view.lower[ka] - apart > view.upper[kb] || view.lower[kb] - apart > view.upper[ka]) return;
   }
-  List& list = lists_[lane * pairs_.size() + pair];
+  List& list = list_of(pair);
   if (!view.changes) return find_moved_pair(view, a, b, list);
   const std::uint32_t changes[2] = {view.changes[a * view.stride], view.changes[b * view.stride]};
   const bool same = list.built && changes[0] == list.changes[0] && changes[1] == list.changes[1];
@@ -302,7 +314,7 @@ void SurfaceContacts<Real>::build(const LaneView<Real>& view, int from, int into
 }
 
 // What other files call.
-template void SurfaceContacts<float>::find_pair(int, const LaneView<float>&, std::size_t);
-template void SurfaceContacts<double>::find_pair(int, const LaneView<double>&, std::size_t);
+template void SurfaceContacts<float>::find_pair(const LaneView<float>&, NearPair&);
+template void SurfaceContacts<double>::find_pair(const LaneView<double>&, NearPair&);
 
 }  // namespace limber::fem::detail

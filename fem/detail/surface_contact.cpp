@@ -34,10 +34,18 @@ const SurfaceTables<double>& surface_tables_of(const World& world) {
   return world.surfaces64;
 }
 
+// With that on both sides two bodies are as near as their offset, which is none's above the largest, lets
+// them push.
+template <class Real>
+std::vector<Real> reaches_of(const SurfaceTables<Real>& tables) {
+  std::vector<Real> reach;
+  for (const auto& body : tables.bodies) reach.push_back(tables.largest_offset() / 2 + body.bulge);
+  return reach;
+}
+
 }  // namespace
 
-// Pairs are those of contact between cages: two bodies of which contact can push at least one, or a body
-// with itself where it asks for that. All arrays get their full length here: of nodes, of cores (four rows
+// All arrays get their full length here: of nodes, of cores (four rows
 // a tet) and of samples, one behind the other in places_, and likewise of their stamps. What Phong
 // Deformation needs is there only where a body asks for it.
 template <class Real>
@@ -53,16 +61,11 @@ SurfaceContacts<Real>::SurfaceContacts(const World& world, const Kernels<Real>& 
       first_sample_stamp_(world.nodes + int(world.topology.tets.size())),
       first_slopes_stamp_(first_sample_stamp_ + int(surface_.samples.size())),
       first_bends_stamp_(first_slopes_stamp_ + (surface_.slopes.empty() ? 0 : world.nodes)),
-      step_(Real(world.contact_dt_s)) {
-  for (int a = 0; a < bodies_; ++a) {
-    if (world.bodies[a].moving && world.bodies[a].self_contact) pairs_.emplace_back(a, a);
-    for (int b = a + 1; b < bodies_; ++b)
-      if (world.bodies[a].pushed() || world.bodies[b].pushed()) pairs_.emplace_back(a, b);
-  }
+      step_(Real(world.contact_dt_s)),
+      near_pairs_(world, tables_.skin, reaches_of(surface_), lanes) {
   for (const auto& body : world.bodies)
     if (body.kind == BodyKind::rigid) effective_masses_.resize(world.bodies.size());
   const std::size_t tets = topology_.tets.size(), samples = surface_.samples.size();
-  lists_.resize(std::size_t(lanes) * pairs_.size());
   places_.resize(std::size_t(first_sample_row_) + samples);
   if (!surface_.slopes.empty())
     slopes_.resize(std::size_t(world_nodes_)), spread_.resize(slopes_.size(), 0), bends_.resize(tets);
@@ -81,8 +84,9 @@ SurfaceContacts<Real>::SurfaceContacts(const World& world, const Kernels<Real>& 
 // node that walls can meet is awake.
 template <class Real>
 void SurfaceContacts<Real>::forget(int lane) {
-  for (std::size_t p = 0; p < pairs_.size(); ++p)
-    lists_[lane * pairs_.size() + p].built = lists_[lane * pairs_.size() + p].kept = false;
+  for (const NearPair& pair : near_pairs_.found_before(lane))
+    if (pair.list >= 0) lists_[pair.list].built = lists_[pair.list].kept = false;
+  near_pairs_.forget(lane);
   for (int body = 0; body < bodies_; ++body) {
     auto& walls = walls_asleep_until_[lane * bodies_ + body];
     std::fill(walls.begin(), walls.end(), std::numeric_limits<Real>::lowest());
@@ -107,7 +111,7 @@ template <class Real>
 const std::vector<SurfaceContact<Real>>& SurfaceContacts<Real>::find(int lane, const LaneView<Real>& view) {
   if (++stamp_ == 0) std::fill(stamps_.begin(), stamps_.end(), 0u), stamp_ = 1;
   contacts_.clear(), shares_.clear();
-  for (std::size_t p = 0; p < pairs_.size(); ++p) find_pair(lane, view, p);
+  for (NearPair& pair : near_pairs_.find(lane, view)) find_pair(view, pair);
   for (int body = 0; body < bodies_ && world_.walls; ++body)
     if (topology_.bodies[body].pushed && !view.sleeps(body)) find_walls(lane, view, body);
   return contacts_;

@@ -3,13 +3,13 @@
 #pragma once
 
 #include <algorithm>
-#include <utility>
 #include <vector>
 
 #include "fem/detail/contact.h"
 #include "fem/detail/effective_mass.h"
 #include "fem/detail/friction.h"
 #include "fem/detail/lane_view.h"
+#include "fem/detail/near_pairs.h"
 #include "fem/detail/penalty.h"
 #include "fem/detail/surface_tables.h"
 #include "fem/detail/tables.h"
@@ -47,6 +47,10 @@ class SurfaceContacts {
   // How deep the samples of bodies are below the surfaces of others at most, beyond what they are where
   // bodies start; 0 where none is.
   Real deepest_overlap(int lane, const LaneView<Real>& view);
+  // Those whose boxes may be so near, and bodies that touch themselves.
+  const std::vector<NearPair>& near_pairs(int lane, const LaneView<Real>& view) {
+    return near_pairs_.find(lane, view);
+  }
   using Share = typename SurfaceTables<Real>::Share;
   const std::vector<Share>& shares() const { return shares_; }
 
@@ -122,7 +126,8 @@ class SurfaceContacts {
 
   // surface_candidates.cpp
   Real travel_of(const LaneView<Real>&, int a, int b);
-  void find_pair(int lane, const LaneView<Real>&, std::size_t pair);
+  List& list_of(NearPair&);
+  void find_pair(const LaneView<Real>&, NearPair&);
   void find_moved_pair(const LaneView<Real>&, int a, int b, List&);
   void build(const LaneView<Real>&, int from, int into, Real reach, Near&);
   void collect_groups(const LaneView<Real>&, int from, const Real lower[3], const Real upper[3], Real reach);
@@ -158,8 +163,8 @@ class SurfaceContacts {
   int bodies_, world_nodes_, first_sample_row_, first_sample_stamp_, first_slopes_stamp_, first_bends_stamp_;
   std::vector<ContactRecord<Real>>* records_ = nullptr;
   Real step_;
-  std::vector<std::pair<int, int>> pairs_;  // a body with itself, or a < b
-  std::vector<List> lists_;                 // [lane × pairs + pair]
+  NearPairs<Real> near_pairs_;
+  std::vector<List> lists_;  // [NearPair::list] of pairs that have been near, in all lanes
   // [lane × bodies + body], of its wall_nodes: travel before which they cannot be beyond a wall.
   std::vector<std::vector<Real>> walls_asleep_until_;
   std::vector<SurfaceContact<Real>> contacts_;

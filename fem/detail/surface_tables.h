@@ -76,6 +76,7 @@ struct SurfaceTables {
   // metres, counted from its first.
   std::vector<int> first_own_offset;
   std::vector<Real> own_offset;
+  Real largest_offset() const { return core_reach / 2; }
   int first_sample_of(int body) const {
     const std::vector<int>& tets = bodies[std::size_t(body)].sampled_tets;
     return tets.empty() ? 0 : first_sample[std::size_t(tets.front())];
