@@ -72,8 +72,10 @@ TEST(SceneWorld, BodiesThatArePreparedSideBySideHaveTheSameBytes) {
     set_thread_count(threads);
     auto& of_bodies = hashes.emplace_back();
     for (const PreparedBody& body : prepare_bodies(scene, {}, folder / std::to_string(threads))) {
+      const bool is_copied = of_bodies.size() == 2;  // the upper plate is the lower one
       of_bodies.push_back(body.report.files);
-      EXPECT_EQ(body.report.cpu_seconds.empty(), threads > 1) << "the process' costs are not one body's";
+      EXPECT_EQ(body.report.cpu_seconds.empty(), threads > 1 || is_copied)
+          << "the process' costs are not one body's";
     }
   }
   set_thread_count(0);
@@ -90,24 +92,28 @@ name = "robot"
 role = "robot"
 model = { box = { size_m = [1, 1, 1], bevel_m = 0.1, triangle_m = 0.3 } }
 cage = { cells = [2, 2, 2] }
+material = { youngs_modulus_pa = 5e3, density_kg_m3 = 100 }
 pose = { position_m = [0.9, 1, 1] }
 [[bodies]]
 name = "same"
 role = "free"
 model = { box = { size_m = [1, 1, 1], bevel_m = 0.1, triangle_m = 0.3 } }
 cage = { cells = [2, 2, 2] }
+material = { youngs_modulus_pa = 5e3, density_kg_m3 = 100 }
 pose = { position_m = [2.7, 1.1, 0.7] }
 [[bodies]]
 name = "turned"
 role = "free"
 model = { box = { size_m = [1, 1, 1], bevel_m = 0.1, triangle_m = 0.3 } }
 cage = { cells = [2, 2, 2] }
+material = { youngs_modulus_pa = 5e3, density_kg_m3 = 100 }
 pose = { position_m = [4.5, 1, 1], angle_deg = 20 }
 [[bodies]]
 name = "larger"
 role = "free"
 model = { box = { size_m = [1.1, 1, 1], bevel_m = 0.1, triangle_m = 0.3 } }
 cage = { cells = [2, 2, 2] }
+material = { youngs_modulus_pa = 5e3, density_kg_m3 = 100 }
 pose = { position_m = [6.3, 1, 1] }
 [goal]
 center_of_mass_m = [7, 1, 1]
