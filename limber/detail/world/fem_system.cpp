@@ -22,7 +22,7 @@ namespace {
 constexpr int preferred_lanes = 16;
 // Goes up where the laws of motion or of what a search refuses change: plans made before are of another
 // world.
-constexpr int edition = 3;
+constexpr int edition = 4;
 // The same of contact on fine surfaces alone.
 constexpr int surface_edition = 2;
 constexpr int widths[] = {1, 4, 8, 16};
