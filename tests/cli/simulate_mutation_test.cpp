@@ -201,7 +201,7 @@ List of_the_script() {
   set("world.gravity_m_s2=[0, 0, -9.8]", replay);
   set("bodies.cube.friction=0", replay);
   set("film.frames_per_second=21", "frames are as many a second");
-  set("bodies.cube.pose.position_m=[1.3, 1, 0.75]", from_scene);
+  set("bodies.cube.pose.position_m=[1.3, 1, 0.75]", "cube: the cage has changed");
   // Without making world and hash anew: it is another world's.
   list.push_back({"a force more that acts later", "of this world and its script", [](Mutant& m) {
                     m.planned.scene.script.text +=
