@@ -401,7 +401,7 @@ List of_the_scene() {
   add("planner.settle_force_share=0.5", "no force is above the maximum");
   add("planner.goal_bias=0.9", tree);
   add("planner.guidance=0", tree);
-  add("planner.lag=3", tree);
+  add("planner.lag=7", tree);
   add("bodies.ball.max_volume_change=0.0001", "ball: volume changes by at most 0.01 %");
   add("bodies.ball.max_stretch=1.001", "ball: tets are stretched within");
   add("bodies.block.max_contact_load_n=0.01", "block: is pressed by at most 0.01 N");
