@@ -269,7 +269,7 @@ bool stretched_within(const Eigen::Matrix3d& f, double s) {
 
 }  // namespace
 
-bool is_sound(const World& world, const State& state) {
+Fault fault_of(const World& world, const State& state) {
   for (int b = 0; b < int(world.bodies.size()); ++b) {
     const Body& body = world.bodies[b];
     if (!body.moving) continue;
@@ -283,15 +283,15 @@ bool is_sound(const World& world, const State& state) {
       Eigen::Matrix3d edges;
       for (int i = 0; i < 3; ++i) edges.col(i) = corner(t[i + 1]) - a;
       const double of_tet = edges.determinant() / 6;
-      if (!(of_tet > 0)) return false;
+      if (!(of_tet > 0)) return {Fault::inverted, b};
       volume += of_tet;
       if (std::isfinite(body.max_stretch) &&
           !stretched_within(edges * body.inverse_rest_edges[std::size_t(k)], body.max_stretch))
-        return false;
+        return {Fault::stretched, b};
     }
-    if (!(std::abs(volume / body.rest_volume_m3 - 1) <= body.max_volume_change)) return false;
+    if (!(std::abs(volume / body.rest_volume_m3 - 1) <= body.max_volume_change)) return {Fault::volume, b};
   }
-  return true;
+  return {};
 }
 
 Penetration deepest_penetration(const World& world, const State& state) {

@@ -63,9 +63,17 @@ struct LigamentPull {
 std::vector<LigamentPull> ligament_pulls(const World&, const State&);  // in their order
 
 int inverted_tets(const World&, const State&);  // of all moving bodies: volume ≤ 0
-// No tet is inverted, or stretched by more than its body's max_stretch, and no body's volume has changed by
-// more than its max_volume_change.
-bool is_sound(const World&, const State&);
+// What is wrong with a state, of the first body that has anything, and its first tet: one is inverted, or
+// stretched by more than its body's max_stretch; or the body's volume has changed by more than its
+// max_volume_change.
+struct Fault {
+  enum Kind { none, inverted, stretched, volume } kind = none;
+  int body = -1;
+};
+Fault fault_of(const World&, const State&);
+inline bool is_sound(const World& world, const State& state) {
+  return fault_of(world, state).kind == Fault::none;
+}
 
 // The deepest point of one body in another, or beyond a wall of the bounds: distance to the nearest surface,
 // over vertices and along surface edges to a hundredth of it, measured apart from the contact code. Pairs of

@@ -19,6 +19,7 @@
 #include "core/random.h"
 #include "fem/batch.h"
 #include "fem/detail/kernels.h"
+#include "fem/detail/make_tables.h"
 #include "fem/observe.h"
 #include "tests/fem/worlds.h"
 
@@ -144,6 +145,34 @@ Work in_free_space(const Cells& cells, MaterialModel model, double tet_steps) {
     for (float& v : state.velocities) v = float(rng.uniform(-0.05, 0.05));
     work.starts.push_back(state), work.controls.push_back(coast);
   }
+  return work;
+}
+
+// The same body with every edge by itself, as kernels walked it before: two lists.
+Work with_edges_alone(Work work) {
+  using namespace fem::detail;
+  const ElementLists& lists = work.world.elements;
+  ElementTables<double>& all = work.world.tables64.elements;
+  all = {};
+  const auto add = [&]<int Kind>(std::integral_constant<int, Kind>, const auto& elements) {
+    if (elements.empty()) return;
+    all.runs.push_back({Kind, 0, 0, int(elements.size())});
+    for (const auto& element : elements) {
+      auto& added = std::get<Kind>(all.of_kind).elements.emplace_back();
+      std::copy(std::begin(element.node), std::end(element.node), added.node);
+      if constexpr (requires { added.law.solid; })
+        added.law.solid = element.law;
+      else
+        added.law = element.law;
+    }
+  };
+  add(std::integral_constant<int, spring_kind>(), lists.springs);
+  add(std::integral_constant<int, dashpot_kind>(), lists.dashpots);
+  add(std::integral_constant<int, spring_star_kind>(), lists.volumes);
+  add(std::integral_constant<int, neo_hookean_star_kind>(), lists.neo_hookeans);
+  all.runs_of_body = {{0, int(all.runs.size())}};
+  work.world.tables = single_precision(work.world.tables64);
+  work.name = "free, edges alone";
   return work;
 }
 
@@ -441,6 +470,9 @@ int main(int argc, char** argv) {
 
   const auto free = measured(free_works, sets), slab = measured(slab_works, sets);
   const auto contact = measured(contact_works, {sets.back()});
+  std::vector<Work> alone_works;
+  for (const std::size_t k : {2, 3}) alone_works.push_back(with_edges_alone(free_works[k]));
+  const auto alone = measured(alone_works, {sets.back()});
   fmt::print("\nPeak of one core, Gflop/s, independent multiply-adds (SSE2: a product and a sum):");
   for (const Peak& peak : peaks) {
     fmt::print(" {} {:.0f}", peak.set.name, peak.gflops);
@@ -448,6 +480,7 @@ int main(int argc, char** argv) {
   }
   fmt::print(".\n\n## In free space\n");
   print_table(free, peaks, counts);
+  print_table(alone, peaks, counts);
   fmt::print("\n## Pressed on a static slab\n");
   print_table(slab, peaks, counts);
   fmt::print("\n## Where a step goes, {}\n", sets.back().name);
@@ -475,7 +508,7 @@ int main(int argc, char** argv) {
   json["bullet"] = compare_with_bullet(free, repetitions);
   json["threads"] = compare_threads(free_works[2], repetitions);
 
-  bool same = same_bits(free) & same_bits(slab) & same_bits(contact);
+  bool same = same_bits(free) & same_bits(alone) & same_bits(slab) & same_bits(contact);
   if (!quick) {
     const double before_mb = peak_memory_mb();
     std::vector<Work> works;

@@ -2,6 +2,12 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <vector>
+
+#include "fem/batch.h"
 #include "fem/observe.h"
 #include "plan/passage.h"
 
@@ -27,6 +33,33 @@ Block block_at(const fem::World& world, const State& state, const Vec3& way) {
   return block;
 }
 
+// Why pushes come to nothing there, as many as push so, most first. They are fourteen, to the sides and the
+// corners of a box round the robot, with all the force that is allowed and of a middling length.
+std::vector<std::pair<std::string, int>> refusals_at(const fem::World& world, const FemSystem& system,
+                                                     const State& state, const plan::Settings& settings) {
+  std::map<std::string, int> counted;
+  Control push;
+  push.manipulation = Manipulation::body;
+  push.steps =
+      std::max(1, int(std::lround((settings.min_duration_s + settings.max_duration_s) / 2 / system.dt_s())));
+  for (int k = 0; k < 27; ++k) {
+    const Vec3 way(k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1);
+    if (const double axes = way.cwiseAbs().sum(); axes != 1 && axes != 3) continue;
+    push.force_n = (settings.max_force_n * way.normalized()).cast<float>();
+    const fem::Rollout rollout = fem::propagate(world, state, push);
+    if (rollout.outcome.status == fem::RunStatus::diverged)
+      ++counted["it diverges"];
+    else if (!rollout.clear)
+      ++counted["two bodies overlap by more than they may"];
+    else if (const std::string why = system.why_not_acceptable(rollout.end); !why.empty())
+      ++counted[why];
+  }
+  std::vector<std::pair<std::string, int>> sorted(counted.begin(), counted.end());
+  std::stable_sort(sorted.begin(), sorted.end(),
+                   [](const auto& a, const auto& b) { return a.second > b.second; });
+  return sorted;
+}
+
 }  // namespace
 
 Diagnosis diagnose(const fem::World& world, const FemSystem& system, const plan::Plan& plan) {
@@ -49,12 +82,17 @@ Diagnosis diagnose(const fem::World& world, const FemSystem& system, const plan:
   }
 
   const plan::Statistics& statistics = plan.statistics;
-  if (2 * statistics.rejected > statistics.iterations)
-    d.text +=
-        " Most pushes led to states that are refused: a tet is inverted, a body's volume has changed by more "
-        "than its max_volume_change, one is pressed by more than its max_contact_load_n, or the goal is "
-        "lost; "
-        "try larger limits or a smaller max_force_n.";
+  if (2 * statistics.rejected > statistics.iterations) {
+    d.text += " Most pushes led to states that are refused";
+    const auto refusals = refusals_at(world, system, state, plan.settings);
+    d.json["refused_pushes_there"] = Json::object();
+    for (const auto& [why, count] : refusals) d.json["refused_pushes_there"][why] = count;
+    if (refusals.empty())
+      d.text += ", though none of fourteen from there does";
+    else
+      d.text += fmt::format(": of fourteen from there {}, since {}", refusals[0].second, refusals[0].first);
+    d.text += "; try a larger limit or a smaller max_force_n.";
+  }
 
   const plan::Workspace space = system.workspace();
   const State from = plan.tree.states[std::size_t(plan.legs.back().root)];

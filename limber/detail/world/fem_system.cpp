@@ -406,12 +406,31 @@ Box FemSystem::sample_bounds() const { return world_.bounds_m; }
 double FemSystem::dt_s() const { return world_.dt_s; }
 std::uint64_t FemSystem::hash() const { return hash_; }
 bool FemSystem::acceptable(const State& state) const {
-  if (const GoalRules& last = last_->goal_; last.lost_below_m) {
-    const fem::Body& body = world_.bodies[std::size_t(last.body)];
-    for (int n = body.first_node; body.moving && n < body.first_node + body.node_count(); ++n)
-      if (double(state.positions[std::size_t(3 * n + 2)]) < *last.lost_below_m) return false;
+  return !loses_goal(state) && fem::is_sound(world_, state) && bears_contact(state);
+}
+bool FemSystem::loses_goal(const State& state) const {
+  const GoalRules& last = last_->goal_;
+  if (!last.lost_below_m) return false;
+  const fem::Body& body = world_.bodies[std::size_t(last.body)];
+  for (int n = body.first_node; body.moving && n < body.first_node + body.node_count(); ++n)
+    if (double(state.positions[std::size_t(3 * n + 2)]) < *last.lost_below_m) return true;
+  return false;
+}
+std::string FemSystem::why_not_acceptable(const State& state) const {
+  if (loses_goal(state)) return "the goal is lost (goal.lost_below_m)";
+  const fem::Fault fault = fem::fault_of(world_, state);
+  const auto name = [&] { return world_.bodies[std::size_t(fault.body)].name; };
+  switch (fault.kind) {
+    case fem::Fault::inverted:
+      return fmt::format("a tet of {} is inverted", name());
+    case fem::Fault::stretched:
+      return fmt::format("a tet of {} is stretched beyond its max_stretch", name());
+    case fem::Fault::volume:
+      return fmt::format("the volume of {} has changed by more than its max_volume_change", name());
+    case fem::Fault::none:
+      break;
   }
-  return fem::is_sound(world_, state) && bears_contact(state);
+  return bears_contact(state) ? "" : "a body is pressed by more than its max_contact_load_n";
 }
 // Probes are dear to make and belong to one thread at a time, so they are lent.
 bool FemSystem::bears_contact(const State& state) const {

@@ -60,6 +60,7 @@ class FemSystem final : public plan::System {
   std::uint64_t hash() const override;
   // It is sound, nothing is pressed by more than it may be, and the goal is not lost.
   bool acceptable(const State&) const override;
+  std::string why_not_acceptable(const State&) const;  // "" where it is
   bool goal_holds(const State&) const override;
   plan::Windings windings(const State&) const override;
   const System& on_leg(int) const override;
@@ -90,7 +91,8 @@ class FemSystem final : public plan::System {
   const FemSystem* last_ = this;  // on the leg to the last goal: what is lost to it is lost
   void find_patches();
   Vec3 mean_of_lead(const std::vector<float>& of_nodes) const;
-  bool bears_contact(const State&) const;  // nothing is pressed by more than its max_contact_load_n
+  bool bears_contact(const State&) const;
+  bool loses_goal(const State&) const;  // nothing is pressed by more than its max_contact_load_n
   Vec3 goal_body_start_m_;
   bool limits_contact_;  // some body has such a limit
   std::uint64_t hash_;
