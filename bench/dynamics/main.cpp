@@ -2,7 +2,7 @@
 // lanes must give the same hash, else the exit code is 1. CPU time, best of several short runs that take
 // turns, so that a busy machine shows as spread. A tet-step is one pass over every tet and its share of edges
 // and nodes, for one rollout.
-//   build/bench/dynamics_bench [--repetitions 5] [--quick] [--json FILE]
+//   build/bench/dynamics_bench [--repetitions 5] [--quick] [--orders [--cage FILE.msh]] [--json FILE]
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <chrono>
@@ -15,12 +15,14 @@
 #include "core/error.h"
 #include "core/hash.h"
 #include "core/json.h"
+#include "core/mesh_files.h"
 #include "core/progress.h"
 #include "core/random.h"
 #include "fem/batch.h"
 #include "fem/detail/kernels.h"
 #include "fem/detail/make_tables.h"
 #include "fem/observe.h"
+#include "tests/core/node_order.h"
 #include "tests/fem/worlds.h"
 
 namespace limber::bench {
@@ -130,12 +132,8 @@ fem::BodySpec soft(const char* name, TetMesh mesh, MaterialModel model) {
 int steps_for(int tets, double tet_steps) { return std::max(4, int(tet_steps / rollouts / tets)); }
 
 // Stretched, and each rollout stirred in its own way.
-Work in_free_space(const Cells& cells, MaterialModel model, double tet_steps) {
-  Work work{"free",
-            build_world(fem::testing::alone(
-                soft("block", block({-0.2, -0.2, -0.2}, cells.x, cells.y, cells.z), model))),
-            {},
-            {}};
+Work in_free_space(std::string name, TetMesh mesh, MaterialModel model, double tet_steps) {
+  Work work{std::move(name), build_world(fem::testing::alone(soft("block", std::move(mesh), model))), {}, {}};
   Control coast;
   coast.steps = steps_for(moving_tets(work.world), tet_steps);
   Rng rng(51, 0);
@@ -182,6 +180,10 @@ Control push(const Vec3& force_n, int steps) {
   control.force_n = force_n.cast<float>();
   control.steps = steps;
   return control;
+}
+
+Work in_free_space(const Cells& cells, MaterialModel model, double tet_steps) {
+  return in_free_space("free", block({-0.2, -0.2, -0.2}, cells.x, cells.y, cells.z), model, tet_steps);
 }
 
 // Sixteen moments of a robot that is pressed by `force_n` for `seconds` and then on, pushed sixteen ways.
@@ -418,6 +420,47 @@ Json compare_threads(const Work& work, int repetitions) {
   return {{"one", one}, {"two", two}};
 }
 
+// The same mesh with its nodes and tets in other orders: what a step costs, and how far apart the ends of an
+// edge are numbered.
+Json compare_orders(const std::string& cage_file, int repetitions, double tet_steps) {
+  const auto blocks = [](int x, int y, int z) {
+    return fem::testing::leaning_grid(Vec3::Zero(), 0.016 * Vec3(x, y, z), x, y, z);
+  };
+  std::vector<std::pair<std::string, TetMesh>> meshes{{"block", blocks(large.x, large.y, large.z)},
+                                                      {"plate, layer by layer", blocks(75, 75, 3)},
+                                                      {"plate, row by row", blocks(3, 75, 75)}};
+  if (!cage_file.empty()) meshes.push_back({cage_file, read_msh(cage_file)});
+  const Set set = sets_here().back();
+  fmt::print(
+      "\n## Orders of nodes and tets, springs, {}\n\n"
+      "| µs a step of one rollout: W = 1, W = 16; mean of |i − j| | as made | shuffled | and banded |\n"
+      "|---|---|---|---|\n",
+      set.name);
+  Json json = Json::array();
+  for (const auto& [name, made] : meshes) {
+    const TetMesh shuffled = reordered(made, shuffled_order(made, 91));
+    const TetMesh banded = reordered(shuffled, banded_order(shuffled));
+    std::vector<Work> works;
+    for (const TetMesh& mesh : {made, shuffled, banded})
+      works.push_back(in_free_space(name, mesh, MaterialModel::springs, tet_steps));
+    std::vector<Measurement> measurements;
+    for (const Work& work : works)
+      for (const int lanes : {1, 16}) measurements.push_back({&work, set, lanes, {}, {}, 0});
+    run_in_turns(measurements, repetitions);
+    fmt::print("| {}, {} tets |", name, made.tets.rows());
+    for (const Measurement& m : measurements) {
+      const double step_us = 1e-3 * m.best_ns() * double(made.tets.rows());
+      if (m.lanes == 1)
+        fmt::print(" {:.0f},", step_us);
+      else
+        fmt::print(" {:.0f}; {:.0f} |", step_us, mean_bandwidth(m.work->world.bodies[0].cage.tets));
+      json.push_back(json_of(m));
+    }
+    fmt::print("\n");
+  }
+  return json;
+}
+
 int main(int argc, char** argv) {
   std::setvbuf(stdout, nullptr, _IOLBF, 0);  // what was measured is seen, however the run ends
   CLI::App program("What dynamics cost.");
@@ -428,9 +471,18 @@ int main(int argc, char** argv) {
       ->check(CLI::Range(1, 1000));
   program.add_flag("--quick", quick, "a tenth of the steps, and no large block");
   program.add_option("--json", json_file, "writes the same numbers there");
+  bool orders = false;
+  std::string cage_file;
+  CLI::Option* const of_orders = program.add_flag("--orders", orders, "orders of nodes and tets, no more");
+  program.add_option("--cage", cage_file, "a cage.msh besides")->needs(of_orders);
   CLI11_PARSE(program, argc, argv);
 
   const double tet_steps = quick ? 3e5 : 3e6;
+  if (orders) {
+    const Json json = compare_orders(cage_file, repetitions, 2 * tet_steps);
+    if (!json_file.empty()) write_json(json_file, json);
+    return 0;
+  }
   const std::vector<Set> sets = sets_here();
   if (sets.size() < 3)
     fmt::print("This machine has no {}; no rows for it.\n", sets.size() < 2 ? "AVX2" : "AVX-512");

@@ -13,6 +13,7 @@
 #include "meshing/certificate.h"
 #include "meshing/detail/lattice.h"
 #include "meshing/quality.h"
+#include "tests/core/node_order.h"
 #include "tests/meshing/brute_force.h"
 #include "tests/meshing/cage_models.h"
 #include "tests/meshing/made_meshes.h"
@@ -56,6 +57,23 @@ TEST(Cage, MeetsTheBudgetWithinTenPercentOrSaysSo) {
       noted += missed, ++asked;
     }
   EXPECT_LE(noted, asked / 10);
+}
+
+// Forces walk through memory by the nodes' numbers. In any order whatever the ends of an edge are a third of
+// all nodes apart.
+TEST(Cage, NodesAreNumberedNearlyAsNearAsInABand) {
+  for (const auto& [name, m] :
+       {std::pair{"ball", made_sphere(24)}, std::pair{"ring", made_ring(0.3, 48, 16)}})
+    for (const CageMode mode : {CageMode::lattice, CageMode::fast}) {
+      SCOPED_TRACE(std::string(name) + (mode == CageMode::fast ? ", fast" : ", lattice"));
+      const TetMesh cage = cage_of(m, 6000, mode).mesh, banded = reordered(cage, banded_order(cage));
+      validate(banded, name);
+      EXPECT_LT(mean_bandwidth(cage.tets), 4 * mean_bandwidth(banded.tets));
+      double step = 0;  // from a tet's lowest node to the next one's
+      for (Eigen::Index t = 1; t < cage.tets.rows(); ++t)
+        step += std::abs(cage.tets.row(t).minCoeff() - cage.tets.row(t - 1).minCoeff());
+      EXPECT_LT(step / double(cage.tets.rows()), 2 * mean_bandwidth(banded.tets));
+    }
 }
 
 TEST(Cage_slow, SaysWhenTheLatticeCannotMeetTheBudget) {
