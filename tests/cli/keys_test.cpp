@@ -1,6 +1,9 @@
 // What a result depends on, key by key: each key of a scene changes the identity of what it shapes, and of
 // nothing else. A new key wants its row here.
+#include <gmock/gmock.h>
+
 #include <map>
+#include <numeric>
 #include <set>
 
 #include "core/hash.h"
@@ -11,6 +14,7 @@
 #include "limber/detail/world/scene_world.h"
 #include "scenes/detail/schema.h"
 #include "tests/cli/program.h"
+#include "tests/core/node_order.h"
 
 namespace limber::detail {
 namespace {
@@ -606,6 +610,15 @@ TEST_F(Keys_slow, AGoalsCageGoesWithThePlan) {
     return read_plan_folder(out()).plan.system_hash;
   };
   EXPECT_NE(hash_with(1), hash_with(1.1));
+  // The numbers of its nodes are the robot's; the order of its tets is free.
+  MeshOrder order = shuffled_order(cage, 17);
+  write_msh(folder / "goal.msh", reordered(cage, order));
+  const Result renumbered = limber_program({"plan", scene(text), "-o", out(), "--iterations", "0"});
+  EXPECT_EQ(renumbered.code, exit_bad_input);
+  EXPECT_THAT(renumbered.err, testing::HasSubstr("numbered anew"));
+  std::iota(order.node_from_place.begin(), order.node_from_place.end(), 0);
+  cage = reordered(cage, order);
+  hash_with(1.1);
   fs::remove(folder / "goal.msh");
   const Json verified = limber_program({"verify", out(), "--json"}).json();
   bool same_world = false;

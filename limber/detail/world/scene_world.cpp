@@ -8,8 +8,11 @@
 // build_world.cpp.
 #include "limber/detail/world/scene_world.h"
 
+#include <algorithm>
+#include <array>
 #include <map>
 #include <numeric>
+#include <set>
 
 #include "core/error.h"
 #include "core/log.h"
@@ -67,6 +70,26 @@ void keep_goal_cage(const scenes::Scene& scene, std::vector<fs::path> folders, c
   const std::optional<fs::path> file = find_goal_cage(scene, std::move(folders));
   if (!file && fs::exists(copy)) return;
   write_msh(copy, read_msh(file.value_or(scene.folder / scene.goal.shape->cage)));
+}
+
+// Other programs may number nodes anew when they write a mesh, and its shape would be another. Tets and their
+// corners may come in any order, and how many nodes there are is build_world's to say.
+void require_same_numbers(const TetMesh& goal, const TetMesh& robot, const std::string& file) {
+  const auto nodes_of = [](const TetMesh& mesh, Eigen::Index t) {
+    std::array<int, 4> nodes{mesh.tets(t, 0), mesh.tets(t, 1), mesh.tets(t, 2), mesh.tets(t, 3)};
+    std::sort(nodes.begin(), nodes.end());
+    return nodes;
+  };
+  if (goal.positions.rows() != robot.positions.rows()) return;
+  std::set<std::array<int, 4>> known;
+  for (Eigen::Index t = 0; t < robot.tets.rows(); ++t) known.insert(nodes_of(robot, t));
+  for (Eigen::Index t = 0; t < goal.tets.rows(); ++t)
+    if (!known.contains(nodes_of(goal, t)))
+      throw InputError(fmt::format(
+          "{}: goal.shape.cage: element {} joins nodes that no tet of the robot's cage joins; its "
+          "nodes were numbered anew: deform the cage.msh of its folder in bodies/, and keep its "
+          "numbers",
+          file, t + 1));
 }
 
 }  // namespace
@@ -189,8 +212,12 @@ std::vector<PreparedBody> read_bodies(const scenes::Scene& scene, const fs::path
     bodies.back().deformation = body.deformation;
     place(bodies.back(), body.pose.position_m);
   }
-  if (has_goal_cage(scene))
-    bodies[std::size_t(scene.robot)].goal_shape_m = read_msh(goal_cage_file(scene, work_folder)).positions;
+  if (has_goal_cage(scene)) {
+    PreparedBody& robot = bodies[std::size_t(scene.robot)];
+    const TetMesh goal = read_msh(goal_cage_file(scene, work_folder));
+    require_same_numbers(goal, robot.cage, scene.goal.shape->cage);
+    robot.goal_shape_m = goal.positions;
+  }
   return bodies;
 }
 
