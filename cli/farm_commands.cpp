@@ -34,6 +34,11 @@ std::vector<CLI::Option*> add_result(CLI::App& command, FarmOptions& options) {
       command.add_option("--cost", plan.cost, "what they make less of")
           ->check(CLI::IsMember({"duration", "effort", "strain", "volume"}))
           ->capture_default_str(),
+      command
+          .add_option("--keep-tree", plan.keep_tree,
+                      "what plan.npz keeps: all nodes of the tree, or those of the path alone")
+          ->check(CLI::IsMember({"all", "path"}))
+          ->capture_default_str(),
       command.add_option("--size", film.size, "pixels of a frame, 16x16 … 8192x8192; default: the scene's")
           ->type_name("WxH"),
       command.add_option("--camera", film.camera, "one of the scene's cameras")->capture_default_str(),

@@ -37,6 +37,7 @@ FarmStatus farm_status(const std::filesystem::path& work_folder, const Context& 
 
 Submitted submit_to_farm(const FarmOptions& options, const Context& context) {
   detail::require_limber_itself(context, "limber farm");
+  detail::require_one_of("keep_tree", options.plan.keep_tree, {"all", "path"});
   return working_for(context, [&] { return detail::submit(options); });
 }
 

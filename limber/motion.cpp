@@ -32,8 +32,7 @@ KeptPlan plan_scene(const PlanOptions& options, const Context& context) {
   if (options.seed) require_in("seed", *options.seed, 0, std::int64_t{1} << 53);
   require_in("portfolio", options.portfolio, 1, 1000);
   require_limits(options.iterations, options.in_flight);
-  if (options.keep_tree != "all" && options.keep_tree != "path")
-    throw InputError(fmt::format("keep_tree is \"{}\"; it must be all or path", options.keep_tree));
+  detail::require_one_of("keep_tree", options.keep_tree, {"all", "path"});
   if (options.shortcut_rounds) require_in("shortcut_rounds", *options.shortcut_rounds, 0, 100'000);
   return working_for(context, [&] { return detail::plan(options); });
 }

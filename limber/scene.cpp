@@ -432,7 +432,10 @@ std::string Plan::summary_json(const Context& context) const {
   });
 }
 
-void Plan::save(const std::filesystem::path& folder, const Context& context) const {
+void Plan::save(const std::filesystem::path& folder, const SaveOptions& options,
+                const Context& context) const {
+  detail::require_one_of("keep_tree", options.keep_tree, {"all", "path"});
+  const bool path_alone = options.keep_tree == "path";
   working_for(context, [&] {
     const Problem::Impl& p = impl_->problem.impl();
     make_folder(folder);
@@ -440,6 +443,9 @@ void Plan::save(const std::filesystem::path& folder, const Context& context) con
       if (!std::filesystem::equivalent(folder, p.folder.path()))
         throw InputError(fmt::format("{}: the plan was read from {}, where it is; copy that folder",
                                      folder.string(), p.folder.path().string()));
+      if (path_alone && !impl_->plan.left_out && !impl_->plan.simulation)
+        throw InputError(fmt::format(
+            "{}: holds the whole tree, and stays as it is; plan anew with keep_tree path", folder.string()));
       return;
     }
     const FolderLock lock(folder, FolderLock::alone);
@@ -455,8 +461,10 @@ void Plan::save(const std::filesystem::path& folder, const Context& context) con
                 fmt::format("{}: writing it failed: {}", (folder / part).string(), failed.message()));
         }
     plan::Plan plan = impl_->plan;
+    const detail::MotionFigures figures = impl_->motion_figures();
+    if (path_alone) detail::leave_path_alone(plan, impl_->extra, folder);
     detail::keep_measured_plan(folder, p.scene.impl().scene, p.prepared, p.world, system_of(*impl_), plan,
-                               impl_->motion_figures(), impl_->extra);
+                               figures, impl_->extra);
   });
 }
 

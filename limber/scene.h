@@ -92,6 +92,12 @@ struct SolveOptions {
   bool improve = false;           // go on after the first solution
 };
 
+struct SaveOptions {
+  // As of PlanOptions: "all" nodes of the tree, or those of the "path" alone, where the search is finished.
+  // What the film shows is not asked: limber render refuses film.tree of a path alone.
+  std::string keep_tree = "all";
+};
+
 class Plan;
 
 // A scene's bodies and the world they share, ready to be stepped; never changes, cheap to copy, and several
@@ -154,8 +160,10 @@ class LIMBER_API Plan {
   Vertices surface(int body, int frame) const;
   // What the command tells, as the text of a JSON object: docs/files.md.
   std::string summary_json(const Context& = {}) const;
-  // plan.npz and all that `limber plan` leaves in a work folder, bodies included.
-  void save(const std::filesystem::path& folder, const Context& = {}) const;
+  // plan.npz and all that `limber plan` leaves in a work folder, bodies included. The plan itself stays
+  // whole. Throws InputError where an option is none, or it was read from another folder or with all of its
+  // tree.
+  void save(const std::filesystem::path& folder, const SaveOptions& = {}, const Context& = {}) const;
   const Problem& problem() const;
 
   struct Impl;

@@ -205,13 +205,13 @@ void add_plan(py::module_& m) {
            })
       .def(
           "save",
-          [](const limber::Plan& self, const std::filesystem::path& folder) {
+          [](const limber::Plan& self, const std::filesystem::path& folder, const std::string& keep_tree) {
             call(py::none(), 0, [&](const limber::Context& context) {
-              self.save(folder, context);
+              self.save(folder, {keep_tree}, context);
               return true;
             });
           },
-          "folder"_a);
+          "folder"_a, py::kw_only(), "keep_tree"_a);
 }
 
 }  // namespace

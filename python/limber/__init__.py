@@ -659,9 +659,13 @@ class Plan:
         """What `limber plan --json` prints."""
         return json.loads(self._plan.summary_json())  # type: ignore[no-any-return]
 
-    def save(self, folder: Path) -> None:
-        """plan.npz and all that `limber plan -o` leaves in a work folder, bodies included."""
-        self._plan.save(folder)
+    def save(self, folder: Path, *, keep_tree: str = "all") -> None:
+        """plan.npz and all that `limber plan -o` leaves in a work folder, bodies included.
+
+        `keep_tree`: all nodes of the tree, or those of the "path" alone, where the search is finished; then no search
+        goes on from it.
+        """
+        self._plan.save(folder, keep_tree=keep_tree)
 
     def __len__(self) -> int:
         return self._plan.frame_count
@@ -696,13 +700,17 @@ def _scene_of(scene: Union[Scene, Path], preset: str, set: Optional[Dict[str, An
 def plan(scene: Union[Scene, Path], out: Optional[Path] = None, *, preset: str = "",
          set: Optional[Dict[str, Any]] = None, data: Sequence[Path] = (), seed: Optional[int] = None,
          iterations: Optional[int] = None, time_limit: float = float("inf"), shortcut: Optional[int] = None,
-         cost: str = "duration", improve: bool = False, resume: bool = False,
+         cost: str = "duration", improve: bool = False, resume: bool = False, keep_tree: str = "all",
          progress: Optional[Progress] = None, threads: int = 0) -> Plan:
     """Plans a scene; with `out` in a work folder, where its bodies are kept and the plan is saved.
+
+    `keep_tree` as of Plan.save; what is returned has the whole tree.
 
     A search that Ctrl-C ends is saved there, too, and `resume` goes on from it; of one that has not begun (bodies
     are prepared first) there is nothing to resume.
     """
+    if keep_tree not in ("all", "path"):  # now: the search would be lost
+        raise InputError(f"keep_tree is {keep_tree!r}; it must be all or path")
     if resume and out is None:
         raise InputError("resume goes on from the plan in the folder `out`, and none is named")
     if resume and out is not None and not os.path.exists(os.path.join(out, "plan.npz")):
@@ -714,7 +722,7 @@ def plan(scene: Union[Scene, Path], out: Optional[Path] = None, *, preset: str =
                        keep=lambda so_far: None if out is None else so_far.save(out), progress=progress,
                        threads=threads)
     if out is not None:
-        found.save(out)
+        found.save(out, keep_tree=keep_tree)
     return found
 
 

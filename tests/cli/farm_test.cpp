@@ -179,6 +179,19 @@ TEST_F(Farm_slow, LocalWorkersGiveTheBytesOfOneProcess) {
   expect_same("one", "farm");
 }
 
+TEST_F(Farm_slow, APathIsKeptAlone) {
+  ASSERT_EQ(run({"plan", quick_scene(), "-o", out("one"), "--keep-tree", "path"}).code, exit_done);
+  ASSERT_EQ(run(submit("farm", {"--keep-tree", "path", "--until", "plan"})).code, exit_done);
+  EXPECT_EQ(read_file(fs::path(out("farm")) / "plan.npz"), read_file(fs::path(out("one")) / "plan.npz"));
+  const Ended again = run({"farm", "submit", "-o", out("farm"), "--engine", "local", "--until", "plan"});
+  EXPECT_TRUE(again.json.at("was_done").get<bool>());
+  // What is to be kept is part of the result.
+  ASSERT_EQ(run(submit("farm", {"--until", "plan"})).code, exit_done);
+  EXPECT_GT(fs::file_size(fs::path(out("farm")) / "plan.npz"),
+            fs::file_size(fs::path(out("one")) / "plan.npz"));
+  EXPECT_EQ(run(submit("tree", {"--keep-tree", "path", "--set", "film.tree=true"})).code, exit_bad_input);
+}
+
 TEST_F(Farm_slow, KilledAtAnyTimeItEndsWithTheSameBytes) {
   ::unsetenv("LIMBER_STORE");  // bodies are made each time
   const std::vector<std::string> until_film{"--until", "film"};

@@ -207,6 +207,32 @@ TEST_F(Library_slow, APlanIsTheCommands) {
   for (const Promise& promise : verify(path("by library"))) EXPECT_TRUE(promise.kept) << promise.name;
 }
 
+TEST_F(Library_slow, APathIsSavedAlone) {
+  const Problem problem(small());
+  ASSERT_EQ(limber_program(
+                {"plan", path("small.toml"), "-o", path("by command"), "--seed", "1", "--keep-tree", "path"})
+                .code,
+            0);
+  const auto plan_in = [&](const char* folder) { return read_file(path(std::string(folder) + "/plan.npz")); };
+  const Plan plan = problem.solve({.seed = 1});
+  plan.save(path("alone"), {.keep_tree = "path"});
+  EXPECT_EQ(plan_in("alone"), plan_in("by command"));
+  plan.save(path("whole"));  // for the plan itself has all of it
+  EXPECT_GT(plan_in("whole").size(), plan_in("alone").size());
+  const Plan alone = Plan::load(path("alone")), whole = Plan::load(path("whole"));
+  EXPECT_EQ(alone.tree_hash(), whole.tree_hash());
+  alone.save(path("alone"), {.keep_tree = "path"});
+  EXPECT_THAT(complaint([&] { whole.save(path("whole"), {.keep_tree = "path"}); }),
+              HasSubstr("holds the whole tree"));
+  EXPECT_THAT(complaint([&] { problem.resume(alone, {.seed = 1}); }), HasSubstr("path alone"));
+  EXPECT_THAT(complaint([&] { plan.save(path("none"), {.keep_tree = "foo"}); }), HasSubstr("keep_tree"));
+  EXPECT_FALSE(std::filesystem::exists(path("none")));
+
+  const Plan cut = problem.solve({.seed = 1, .iterations = 1, .time_limit_s = 0});
+  cut.save(path("cut"), {.keep_tree = "path"});
+  EXPECT_EQ(problem.resume(Plan::load(path("cut")), {.seed = 1}).tree_hash(), plan.tree_hash());
+}
+
 TEST_F(Library_slow, WorkFoldersStayAndTemporaryOnesGo) {
   std::filesystem::create_directory(path("temporary"));
   ::setenv("TMPDIR", path("temporary").c_str(), 1);

@@ -410,6 +410,20 @@ class Scenes(unittest.TestCase):
         with self.assertRaisesRegex(limber.InputError, "no plan to go on from"):
             limber.plan("squeeze", self.path("empty"), resume=True)
 
+    def test_the_path_is_kept_alone(self):
+        whole = limber.plan("squeeze", self.path("path"), preset="fast", seed=1, keep_tree="path")
+        alone = limber.load_plan(self.path("path"))
+        self.assertEqual((alone.tree_hash, alone.trajectory_hash), (whole.tree_hash, whole.trajectory_hash))
+        whole.save(self.path("saved"), keep_tree="path")
+        whole.save(self.path("all"))
+        files = [open(os.path.join(self.path(f), "plan.npz"), "rb").read() for f in ("path", "saved", "all")]
+        self.assertEqual(files[0], files[1])
+        self.assertLess(len(files[0]), len(files[2]))
+        with self.assertRaisesRegex(limber.InputError, "path alone"):
+            limber.plan("squeeze", self.path("path"), preset="fast", seed=1, resume=True)
+        with self.assertRaisesRegex(limber.InputError, "keep_tree"):
+            limber.plan("squeeze", self.path("path"), keep_tree="foo")
+
     def test_other_threads_run_meanwhile(self):
         world = world_of("barriers1")
         counted, done = [0], threading.Event()

@@ -38,6 +38,7 @@ struct ResultOfScene {
     f("scene", plan.scene.scene), f("scene_hash", spec.scene_hash), f("set", plan.scene.sets);
     f("preset", plan.preset), f("seed", spec.first_seed), f.within("portfolio", plan.portfolio, 1, 1000);
     f("iterations", plan.iterations), f("shortcut", plan.shortcut_rounds), f("cost", plan.cost);
+    f.unless_usual("keep_tree", plan.keep_tree, std::string("all"));
     f("size", film.size), f("camera", film.camera), f("passes", film.passes), f("bits", film.bits);
     f("program", spec.program);
   }
@@ -291,6 +292,7 @@ FarmSpec spec_of(FarmOptions options) {
   }
   if (options.until >= Stage::film) render::require_film_possible(scene.film.frames_per_second, "film.mp4");
   require_letters(scene.film);
+  require_tree_for_film(plan.keep_tree, scene);
   require_camera(scene, options.film.camera);
   if (!options.film.size.empty()) parse_size(options.film.size);
   if (options.chunks > 0 && options.frames_per_task != FarmOptions{}.frames_per_task)

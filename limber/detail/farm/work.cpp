@@ -471,8 +471,8 @@ class Worker {
     const Setup& of = setup();
     Found found = make_better(scene_, of.system, plan_options(), std::move(searched), searches);
     throw_if_ended();
-    const KeptPlan kept =
-        keep_plan(farm_.work(), scene_, of.bodies, of.world, of.system, found.plan, found.extra);
+    const KeptPlan kept = keep_plan(farm_.work(), scene_, of.bodies, of.world, of.system, found.plan,
+                                    found.extra, plan_options().keep_tree == "path");
     throw_if_ended();
 
     drop_film();
@@ -486,7 +486,7 @@ class Worker {
     }
     const plan::Plan& plan = shown.planned.plan;
     told.solved = kept.reached, told.explanation = shown.planned.told.explanation;
-    told.seed = plan.settings.seed, told.tree_hash = hex(plan::hash_of(plan.tree));
+    told.seed = plan.settings.seed, told.tree_hash = hex(plan::tree_hash_of(plan));
     told.trajectory_hash = hex(plan::hash_of(plan.trajectory));
     told.plan_file = hex(shown.planned.file_hash);
     told.frames_folder = shown.files.folder.filename().string();

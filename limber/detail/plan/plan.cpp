@@ -275,10 +275,7 @@ KeptPlan plan(const PlanOptions& options, const scenes::Scene& scene) {
     throw InputError(fmt::format("--portfolio is of several searches, {} of one; leave one of the two out",
                                  options.resume ? "--resume" : "--stats"));
 
-  if (options.keep_tree == "path" && scene.film.tree)
-    throw InputError(
-        "--keep-tree path: film.tree shows the whole tree; add --set film.tree=false, or keep all of it");
-
+  require_tree_for_film(options.keep_tree, scene);
   std::optional<plan::Plan> earlier;
   Json earlier_summary;
   int nodes_kept = 0;  // in the file
@@ -346,11 +343,22 @@ KeptPlan keep_plan(const fs::path& folder, const scenes::Scene& scene,
   } catch (const Interrupted&) {
     plan.measured = false;
   }
-  if (path_alone && plan.measured && finished(plan) && !extra.contains("refine"))
-    plan::keep_path(plan);
-  else if (path_alone)
-    log::info("{}: the whole tree is kept, for a search may go on from it", (folder / "plan.npz").string());
+  if (path_alone) leave_path_alone(plan, extra, folder);
   return keep_measured_plan(folder, scene, bodies, world, system, plan, figures, extra);
+}
+
+void leave_path_alone(plan::Plan& plan, const Json& extra, const fs::path& folder) {
+  if (plan.simulation) return;
+  if (plan.measured && finished(plan) && !extra.contains("refine"))
+    plan::keep_path(plan);
+  else
+    log::info("{}: the whole tree is kept, for a search may go on from it", (folder / "plan.npz").string());
+}
+
+void require_tree_for_film(const std::string& keep_tree, const scenes::Scene& scene) {
+  if (keep_tree == "path" && scene.film.tree)
+    throw InputError(
+        "--keep-tree path: film.tree shows the whole tree; add --set film.tree=false, or keep all of it");
 }
 
 KeptPlan keep_measured_plan(const fs::path& folder, const scenes::Scene& scene,

@@ -28,11 +28,16 @@ Found make_better(const scenes::Scene&, const FemSystem&, const PlanOptions&, pl
                   const std::optional<plan::PortfolioReport>&, const Json& earlier_summary = {});
 
 // Measures the plan's motion, writes plan.npz, volume.svg and the manifest; after a stop signal writes it
-// unmeasured. `extra` goes into the summary. With `path_alone` the plan's tree is cut to its path, unless a
-// search can still go on from it (it is not finished, or a signal came), or it was carried to finer cages.
+// unmeasured. `extra` goes into the summary. With `path_alone` as by leave_path_alone().
 KeptPlan keep_plan(const fs::path& folder, const scenes::Scene&, const std::vector<PreparedBody>&,
                    const fem::World&, const FemSystem&, plan::Plan&, const Json& extra,
                    bool path_alone = false);
+
+// Cuts the plan's tree to its path, unless a search can still go on from it (it is not finished, or a signal
+// came), or it was carried to finer cages, as `extra` tells. A simulation has no more than its path.
+void leave_path_alone(plan::Plan&, const Json& extra, const fs::path& folder);
+// Throws InputError where that is asked for, and the scene's film shows the tree.
+void require_tree_for_film(const std::string& keep_tree, const scenes::Scene&);
 
 // The same of a motion that is measured already.
 KeptPlan keep_measured_plan(const fs::path& folder, const scenes::Scene&, const std::vector<PreparedBody>&,
