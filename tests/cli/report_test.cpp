@@ -145,7 +145,9 @@ TEST_F(Report, TheViewerMovesSurfacesAsFilmsDo) {
 
 TEST_F(Report, HoldsEveryPromiseOnceAndTextOfTheUserOnlyAsText) {
   const std::string hostile = "</script><script>alert(1)</script>&\\\"'";
-  plan(replaced("name = \"small\"\n", "name = \"small\"\ndescription = \"" + hostile + "\"\n"));
+  std::string text = replaced("name = \"small\"\n", "name = \"small\"\ndescription = \"" + hostile + "\"\n");
+  text.replace(text.find("seed = 1"), 8, "seed = 6");  // a plan that keeps all
+  plan(text);
   const Result made = limber_program({"report", out(), "--json"});
   ASSERT_EQ(made.code, exit_done) << made.err;
   const std::string html = page();
