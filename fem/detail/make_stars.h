@@ -1,6 +1,6 @@
 // From what materials give to edges and tets to what kernels walk: each edge goes with one tet that has it,
 // all edges of a tet from its node 0, and few stay alone (kernels.h, StarLaw). A spring by itself loads two
-// nodes' places, velocities and forces for 26 operations; in a star it loads nothing.
+// nodes' places, velocities and forces for 35 operations; in a star it loads nothing.
 #pragma once
 
 #include "fem/detail/tables.h"

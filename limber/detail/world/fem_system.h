@@ -91,8 +91,8 @@ class FemSystem final : public plan::System {
   const FemSystem* last_ = this;  // on the leg to the last goal: what is lost to it is lost
   void find_patches();
   Vec3 mean_of_lead(const std::vector<float>& of_nodes) const;
-  bool bears_contact(const State&) const;
-  bool loses_goal(const State&) const;  // nothing is pressed by more than its max_contact_load_n
+  bool loses_goal(const State&) const;     // it is below goal.lost_below_m
+  bool bears_contact(const State&) const;  // nothing is pressed by more than its max_contact_load_n
   Vec3 goal_body_start_m_;
   bool limits_contact_;  // some body has such a limit
   std::uint64_t hash_;
