@@ -214,6 +214,11 @@ void Shells::count_uncovered() {
   }
   const int triangles = int(mesh_.triangles.rows());
   std::vector<char> uncovered(std::size_t(triangles), 0), seen(std::size_t(triangles), 0);
+  std::vector<std::vector<int>> outside(parts_.size());  // of a part its rows that are not in its shell
+  parallel_for(int(parts_.size()), [&](int s) {
+    for (const int p : points_of(parts_[std::size_t(s)]))
+      if (!encloses(shells[std::size_t(s)], user_point(p))) outside[std::size_t(s)].push_back(p);
+  });
   for (std::size_t s = 0; s < parts_.size(); ++s) {
     const Polygons& surface = parts_[s].surface;
     for (int i = 0; i < surface.count(); ++i) {
@@ -221,7 +226,8 @@ void Shells::count_uncovered() {
       const std::size_t t = std::size_t(surface.triangle[std::size_t(i)] % triangles);
       seen[t] = 1;
       for (int k = surface.first[std::size_t(i)]; k < surface.first[std::size_t(i) + 1]; ++k)
-        if (!encloses(shells[s], user_point(surface.corners[std::size_t(k)]))) uncovered[t] = 1;
+        uncovered[t] |=
+            std::binary_search(outside[s].begin(), outside[s].end(), surface.corners[std::size_t(k)]);
     }
   }
   for (std::size_t t = 0; t < uncovered.size(); ++t) result_.triangles_uncovered += uncovered[t] || !seen[t];

@@ -1,5 +1,7 @@
 #include "meshing/detail/growing_hull.h"
 
+#include <immintrin.h>
+
 #include <algorithm>
 #include <cmath>
 
@@ -20,32 +22,48 @@ const std::vector<Vec3> offcuts = [] {
 
 constexpr std::size_t lanes = 8;
 
-// The first block of 8 planes that has one which p is more than `tolerance` beyond; `count` when none has.
-// Most of the search's time is spent here. Without contraction wider registers give the same bits.
-[[gnu::always_inline]] inline std::size_t find_beyond(const double* nx, const double* ny, const double* nz,
-                                                      const double* offset, std::size_t count, const Vec3& p,
-                                                      double tolerance) {
-  const double x = p.x(), y = p.y(), z = p.z();
-  for (std::size_t block = 0; block < count; block += lanes) {
-    double d[lanes];
-    for (std::size_t k = 0; k < lanes; ++k)
-      d[k] = nx[block + k] * x + ny[block + k] * y + nz[block + k] * z + offset[block + k];
-    for (std::size_t half = lanes / 2; half > 0; half /= 2)
-      for (std::size_t k = 0; k < half; ++k) d[k] = d[k] > d[k + half] ? d[k] : d[k + half];
-    if (d[0] > tolerance) return block;
+// Blocks of 8 planes, rounded to float: the first, from `block` on, that has one which p may be more than
+// `distance` beyond; `count` when none has. `slack` is what rounding can hide, so an answer is only where to
+// look closer. Most points are in the hull, and are done with here.
+[[gnu::target("avx2,fma")]] std::size_t find_block_avx2(const float* blocks, std::size_t block,
+                                                        std::size_t count, const Vec3& p, float distance) {
+  const __m256 x = _mm256_set1_ps(float(p.x())), y = _mm256_set1_ps(float(p.y())),
+               z = _mm256_set1_ps(float(p.z())), least = _mm256_set1_ps(distance);
+  for (; block < count; ++block) {
+    const float* const at = blocks + 4 * lanes * block;
+    const __m256 d = _mm256_fmadd_ps(_mm256_loadu_ps(at), x,
+                                     _mm256_fmadd_ps(_mm256_loadu_ps(at + lanes), y,
+                                                     _mm256_fmadd_ps(_mm256_loadu_ps(at + 2 * lanes), z,
+                                                                     _mm256_loadu_ps(at + 3 * lanes))));
+    if (_mm256_movemask_ps(_mm256_cmp_ps(d, least, _CMP_GT_OQ)) != 0) break;
   }
-  return count;
+  return block;
 }
-[[gnu::target("avx2")]] std::size_t find_beyond_avx2(const double* nx, const double* ny, const double* nz,
-                                                     const double* offset, std::size_t count, const Vec3& p,
-                                                     double tolerance) {
-  return find_beyond(nx, ny, nz, offset, count, p, tolerance);
+std::size_t find_block_any(const float* blocks, std::size_t block, std::size_t count, const Vec3& p,
+                           float distance) {
+  const float x = float(p.x()), y = float(p.y()), z = float(p.z());
+  for (; block < count; ++block) {
+    const float* const at = blocks + 4 * lanes * block;
+    bool any = false;
+    for (std::size_t k = 0; k < lanes; ++k)
+      any |= at[k] * x + at[lanes + k] * y + at[2 * lanes + k] * z + at[3 * lanes + k] > distance;
+    if (any) break;
+  }
+  return block;
 }
-std::size_t find_beyond_any(const double* nx, const double* ny, const double* nz, const double* offset,
-                            std::size_t count, const Vec3& p, double tolerance) {
-  return find_beyond(nx, ny, nz, offset, count, p, tolerance);
+const auto find_block =
+    __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") ? find_block_avx2 : find_block_any;
+
+// Two doubles at once: + − × ÷ of each, with the bits of one alone.
+using Two = __m128d;
+struct TwoPlaces {
+  Two x, y, z;
+  TwoPlaces operator-(const TwoPlaces& o) const { return {x - o.x, y - o.y, z - o.z}; }
+};
+Two dot(const TwoPlaces& a, const TwoPlaces& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
+TwoPlaces cross(const TwoPlaces& a, const TwoPlaces& b) {
+  return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
 }
-const auto find_beyond_here = __builtin_cpu_supports("avx2") ? find_beyond_avx2 : find_beyond_any;
 
 }  // namespace
 
@@ -55,48 +73,74 @@ GrowingHull::GrowingHull(double tolerance)
 
 void GrowingHull::clear() {
   points_.clear(), waiting_.clear(), faces_.clear(), free_.clear();
-  nx_.clear(), ny_.clear(), nz_.clear(), offset_.clear();
-  rim_from_vertex_.clear(), mark_.clear();
-  volume_ = 0;
+  rough_.clear(), rim_from_vertex_.clear();
+  volume_ = reach_ = 0;
   stamp_ = 0;
 }
 
-double GrowingHull::distance(int face, const Vec3& p) const {
-  const std::size_t f = std::size_t(face);
-  return nx_[f] * p.x() + ny_[f] * p.y() + nz_[f] * p.z() + offset_[f];
-}
-
-bool GrowingHull::visible(int face, const Vec3& p) const {
-  const Face& f = faces_[std::size_t(face)];
-  const double d = distance(face, p);
+bool GrowingHull::visible(const Face& f, const Vec3& p, double d) const {
   if (std::abs(d) > f.noise) return d > 0;
   return orientation(points_[std::size_t(f.vertex[0])], points_[std::size_t(f.vertex[1])],
                      points_[std::size_t(f.vertex[2])], p) > 0;
 }
 
-int GrowingHull::new_face(int a, int b, int c) {
-  std::size_t f = faces_.size();
-  if (free_.empty()) {
-    faces_.emplace_back();
-    mark_.push_back(0);
-    if (f == nx_.size()) {
-      for (auto* row : {&nx_, &ny_, &nz_}) row->resize(f + lanes, 0.0);
-      offset_.resize(f + lanes, -1.0);
+void GrowingHull::keep_point(const Vec3& p) {
+  points_.push_back(p);
+  reach_ = std::max(reach_, p.lpNorm<1>());
+}
+
+void GrowingHull::new_faces(std::span<const int> corners, int apex) {
+  const std::size_t count = corners.size() - 1;
+  for (auto& column : columns_) column.resize(count + 2);
+  for (std::size_t i = 0; i < corners.size(); ++i)
+    for (int c = 0; c < 3; ++c) columns_[c][i] = points_[std::size_t(corners[i])][c];
+  for (int c = 0; c < 3; ++c) columns_[c][count + 1] = columns_[c][count];  // of an odd number the last
+  made_.resize(count);
+  for (int& f : made_) {
+    if (!free_.empty()) {
+      f = free_.back(), free_.pop_back();
+      continue;
     }
-  } else {
-    f = std::size_t(free_.back());
-    free_.pop_back();
+    f = int(faces_.size());
+    faces_.emplace_back();
+    if (faces_.size() * 4 > rough_.size()) {
+      rough_.resize(rough_.size() + 4 * lanes, 0.0f);
+      std::fill(rough_.end() - lanes, rough_.end(), -1.0f);
+    }
   }
-  const Vec3 &pa = points_[std::size_t(a)], &pb = points_[std::size_t(b)], &pc = points_[std::size_t(c)];
-  const Vec3 cross = (pb - pa).cross(pc - pa);
-  const double twice_area = cross.norm();
-  const Vec3 normal = twice_area > 0 ? Vec3(cross / twice_area) : Vec3::Zero();
-  nx_[f] = normal.x(), ny_[f] = normal.y(), nz_[f] = normal.z(), offset_[f] = -normal.dot(pa);
-  const double longest =
-      std::max({(pb - pa).squaredNorm(), (pc - pb).squaredNorm(), (pa - pc).squaredNorm()});
-  faces_[f] = {
-      {a, b, c}, {-1, -1, -1}, twice_area, twice_area > 0 ? 2e-15 * (1 + longest / twice_area) : 1e300};
-  return int(f);
+  const Vec3& top = points_[std::size_t(apex)];
+  const TwoPlaces c{_mm_set1_pd(top.x()), _mm_set1_pd(top.y()), _mm_set1_pd(top.z())};
+  const Two zero = _mm_setzero_pd();
+  for (std::size_t i = 0; i < count; i += 2) {
+    const auto two_from = [&](std::size_t first) {
+      return TwoPlaces{_mm_loadu_pd(&columns_[0][first]), _mm_loadu_pd(&columns_[1][first]),
+                       _mm_loadu_pd(&columns_[2][first])};
+    };
+    const TwoPlaces a = two_from(i), b = two_from(i + 1), ab = b - a, ac = c - a, bc = c - b;
+    const TwoPlaces across = cross(ab, ac);
+    const Two twice_area = _mm_sqrt_pd(dot(across, across));
+    const Two some = _mm_cmpgt_pd(twice_area, zero);
+    const auto where_some = [&](Two value) { return _mm_and_pd(value, some); };
+    const TwoPlaces normal{where_some(across.x / twice_area), where_some(across.y / twice_area),
+                           where_some(across.z / twice_area)};
+    const Two offset = -dot(normal, a);
+    const Two longest = _mm_max_pd(_mm_max_pd(dot(ab, ab), dot(bc, bc)), dot(ac, ac));
+    const Two noise =
+        _mm_or_pd(where_some(2e-15 * (1 + longest / twice_area)), _mm_andnot_pd(some, _mm_set1_pd(1e300)));
+    for (std::size_t k = 0; k < 2 && i + k < count; ++k) {
+      const std::size_t f = std::size_t(made_[i + k]);
+      float* const rough = &rough_[4 * lanes * (f / lanes) + f % lanes];
+      rough[0] = float(normal.x[k]), rough[lanes] = float(normal.y[k]);
+      rough[2 * lanes] = float(normal.z[k]), rough[3 * lanes] = float(offset[k]);
+      faces_[f] = {{normal.x[k], normal.y[k], normal.z[k]},
+                   offset[k],
+                   twice_area[k],
+                   noise[k],
+                   {corners[i + k], corners[i + k + 1], apex},
+                   {-1, -1, -1},
+                   0};
+    }
+  }
 }
 
 void GrowingHull::add(std::span<const Vec3> points) {
@@ -129,10 +173,11 @@ bool GrowingHull::start() {
   const Vec3 normal = along.cross(c - a).normalized();
   const auto [d, thickness] = farthest([&](const Vec3& p) { return std::abs((p - a).dot(normal)); });
   if (thickness < flat_distance) return false;
-  points_ = {a, b, c, d};
+  for (const Vec3& p : {a, b, c, d}) keep_point(p);
   if (signed_volume(a, b, c, d) > 0) std::swap(points_[1], points_[2]);  // abc seen from outside: d is behind
   rim_from_vertex_.assign(4, -1);
-  new_face(0, 1, 2), new_face(0, 3, 1), new_face(1, 3, 2), new_face(2, 3, 0);
+  for (const auto& [from, to, apex] : {std::array{0, 1, 2}, {0, 3, 1}, {1, 3, 2}, {2, 3, 0}})
+    new_faces(std::array{from, to}, apex);
   faces_[0].neighbour = {1, 2, 3};
   faces_[1].neighbour = {3, 2, 0};
   faces_[2].neighbour = {1, 3, 0};
@@ -141,91 +186,97 @@ bool GrowingHull::start() {
   return true;
 }
 
-std::size_t GrowingHull::block_beyond(const Vec3& p) const {
-  return find_beyond_here(nx_.data(), ny_.data(), nz_.data(), offset_.data(), nx_.size(), p, tolerance_);
+template <class Accept>
+int GrowingHull::first_beyond(int first, const Vec3& p, double least, const Accept& accept) const {
+  // Of a number rounded to float, and of each product and sum, at most 2⁻²⁴ is lost.
+  const double slack = 5e-7 * (p.lpNorm<1>() + reach_);
+  const std::size_t blocks = rough_.size() / (4 * lanes), count = faces_.size();
+  for (std::size_t f = std::size_t(first); f < count;) {
+    const std::size_t block = find_block(rough_.data(), f / lanes, blocks, p, float(least - slack));
+    f = std::max(f, block * lanes);
+    for (const std::size_t end = std::min(count, (block + 1) * lanes); f < end; ++f) {
+      const double d = faces_[f].distance(p);
+      if (d > least && accept(faces_[f], d)) return int(f);
+    }
+  }
+  return int(count);
 }
 
-bool GrowingHull::holds(const Vec3& p) const { return !flat() && block_beyond(p) == nx_.size(); }
+bool GrowingHull::holds(const Vec3& p) const {
+  return !flat() &&
+         first_beyond(0, p, tolerance_, [](const Face&, double) { return true; }) == int(faces_.size());
+}
 
 void GrowingHull::insert(Vec3 p) {
-  int seed = int(block_beyond(p));
   const int end = int(faces_.size());
-  while (seed < end && (distance(seed, p) <= tolerance_ || !visible(seed, p))) ++seed;
+  const auto first_seen = [&](int first, double least) {
+    return first_beyond(first, p, least, [&](const Face& face, double d) { return visible(face, p, d); });
+  };
+  int seed = first_seen(0, tolerance_);
   if (seed >= end) return;
   // Points of a cut lie in one plane, where only exact arithmetic finds signs; a little to the side, rounding
   // does. The seed may have been a sliver, whose plane a step of any length can cross: the moved point must
   // see it.
   if (jitter_ > 0) {
     p += jitter_ * offcuts[points_.size() % offcuts.size()];
-    while (seed < end && (distance(seed, p) <= 0.5 * tolerance_ || !visible(seed, p))) ++seed;
+    seed = first_seen(seed, 0.5 * tolerance_);
     if (seed >= end) return;
   }
 
   // The faces seen from p, connected to the seed, and the sides that bound them.
-  ++stamp_;
-  visible_.assign(1, seed);
-  mark_[std::size_t(seed)] = stamp_;
-  rim_face_.clear(), rim_side_.clear();
+  stamp_ += 2;
+  Face* const faces = faces_.data();
+  if (visible_.size() < faces_.size()) visible_.resize(faces_.size()), rim_.resize(3 * faces_.size());
+  std::size_t seen = 1, sides = 0;
+  visible_[0] = seed;
+  faces[seed].mark = stamp_;
   double gained = 0;
-  for (std::size_t i = 0; i < visible_.size(); ++i) {
-    const Face& face = faces_[std::size_t(visible_[i])];
-    gained += distance(visible_[i], p) * face.twice_area / 6;
-    for (int k = 0; k < 3; ++k) {
-      const int other = face.neighbour[std::size_t(k)];
-      if (mark_[std::size_t(other)] == stamp_) continue;
-      if (visible(other, p)) {
-        mark_[std::size_t(other)] = stamp_;
-        visible_.push_back(other);
-      } else {
-        rim_face_.push_back(visible_[i]), rim_side_.push_back(k);
+  for (std::size_t i = 0; i < seen; ++i) {
+    const Face& face = faces[visible_[i]];
+    gained += face.distance(p) * face.twice_area / 6;
+    for (std::size_t k = 0; k < 3; ++k) {
+      Face& other = faces[face.neighbour[k]];
+      if (other.mark < stamp_) {
+        other.mark = stamp_ + (visible(other, p, other.distance(p)) ? 0 : 1);
+        if (other.mark == stamp_) visible_[seen++] = face.neighbour[k];
       }
+      if (other.mark == stamp_) continue;
+      rim_from_vertex_[std::size_t(face.vertex[k])] = int(sides);
+      rim_[sides++] = {face.vertex[k], face.vertex[(k + 1) % 3], face.neighbour[k]};
     }
   }
   // With exact signs the rim is one loop.
-  for (std::size_t i = 0; i < rim_face_.size(); ++i)
-    rim_from_vertex_[std::size_t(faces_[std::size_t(rim_face_[i])].vertex[std::size_t(rim_side_[i])])] =
-        int(i);
-  const auto end_of = [&](int rim) {
-    return faces_[std::size_t(rim_face_[std::size_t(rim)])]
-        .vertex[std::size_t((rim_side_[std::size_t(rim)] + 1) % 3)];
-  };
-
   volume_ += gained;
   const int apex = int(points_.size());
-  points_.push_back(p);
+  keep_point(p);
   rim_from_vertex_.push_back(-1);
-  rim_.clear();
-  for (int rim = 0;;) {
-    const Face& face = faces_[std::size_t(rim_face_[std::size_t(rim)])];
-    const std::size_t side = std::size_t(rim_side_[std::size_t(rim)]);
-    rim_.push_back({face.vertex[side], end_of(rim), face.neighbour[side]});
-    rim = rim_from_vertex_[std::size_t(end_of(rim))];
-    if (rim == 0 || rim_.size() > rim_face_.size()) break;
+  loop_.clear(), beyond_.clear();
+  int at = 0;
+  do {
+    const Rim& rim = rim_[std::size_t(at)];
+    loop_.push_back(rim.from), beyond_.push_back(rim);
+    at = rim_from_vertex_[std::size_t(rim.to)];
+  } while (at != 0 && beyond_.size() <= sides);
+  LIMBER_CHECK(beyond_.size() == sides, beyond_.size(), sides);
+  loop_.push_back(rim_[0].from);
+  for (std::size_t i = 0; i < seen; ++i) {
+    const std::size_t f = std::size_t(visible_[i]);
+    faces[f].vertex[0] = -1, faces[f].offset = -1;
+    std::fill_n(faces[f].normal, 3, 0.0);
+    float* const rough = &rough_[4 * lanes * (f / lanes) + f % lanes];
+    rough[0] = rough[lanes] = rough[2 * lanes] = 0, rough[3 * lanes] = -1;
   }
-  LIMBER_CHECK(rim_.size() == rim_face_.size(), rim_.size(), rim_face_.size());
-  for (int f : visible_) {
-    faces_[std::size_t(f)].vertex[0] = -1;
-    nx_[std::size_t(f)] = ny_[std::size_t(f)] = nz_[std::size_t(f)] = 0;
-    offset_[std::size_t(f)] = -1;
-    free_.push_back(f);
-  }
-  int first = -1, previous = -1;
-  for (const auto& [from, to, beyond] : rim_) {
-    const int f = new_face(from, to, apex);
-    faces_[std::size_t(f)].neighbour[0] = beyond;
+  free_.insert(free_.end(), visible_.begin(), visible_.begin() + std::ptrdiff_t(seen));
+  new_faces(loop_, apex);
+  for (std::size_t i = 0; i < beyond_.size(); ++i) {
+    const auto& [from, to, beyond] = beyond_[i];
+    const int f = made_[i];
+    faces_[std::size_t(f)].neighbour = {beyond, made_[i + 1 < made_.size() ? i + 1 : 0],
+                                        made_[i > 0 ? i - 1 : made_.size() - 1]};
     Face& outer = faces_[std::size_t(beyond)];
     for (std::size_t k = 0; k < 3; ++k)
       if (outer.vertex[k] == to && outer.vertex[(k + 1) % 3] == from) outer.neighbour[k] = f;
-    if (previous >= 0) {
-      faces_[std::size_t(previous)].neighbour[1] = f;
-      faces_[std::size_t(f)].neighbour[2] = previous;
-    } else {
-      first = f;
-    }
-    previous = f;
   }
-  faces_[std::size_t(previous)].neighbour[1] = first;
-  faces_[std::size_t(first)].neighbour[2] = previous;
 }
 
 std::vector<Vec3> GrowingHull::vertices() const {
@@ -249,8 +300,10 @@ Eigen::Matrix<double, Eigen::Dynamic, 4> GrowingHull::planes() const {
     if (a < 0) continue;
     const Vec3 &pa = points_[std::size_t(a)], &pb = points_[std::size_t(b)], &pc = points_[std::size_t(c)];
     const double longest = std::max({(pb - pa).norm(), (pc - pb).norm(), (pa - pc).norm()});
-    if (faces_[f].twice_area > min_altitude * longest)
-      planes.row(count++) << nx_[f], ny_[f], nz_[f], offset_[f];
+    if (faces_[f].twice_area > min_altitude * longest) {
+      const auto& [x, y, z] = faces_[f].normal;
+      planes.row(count++) << x, y, z, faces_[f].offset;
+    }
   }
   return planes.topRows(count);
 }

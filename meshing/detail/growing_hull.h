@@ -34,34 +34,47 @@ class GrowingHull {
 
  private:
   struct Face {
+    double normal[3], offset;  // its unit plane; of a free one such that nothing is beyond
+    double twice_area;
+    double noise;                  // a distance below this has no certain sign
     std::array<int, 3> vertex;     // vertex[0] = −1: free
     std::array<int, 3> neighbour;  // across the side from vertex[k] to vertex[k+1]
-    double twice_area;
-    double noise;  // a distance below this has no certain sign
+    int mark;                      // 2 × the insertion that saw it, or 1 more: that did not
+    double distance(const Vec3& p) const {
+      return normal[0] * p.x() + normal[1] * p.y() + normal[2] * p.z() + offset;
+    }
+  };
+  // A side of the visible part: from a vertex to another, and the face beyond it.
+  struct Rim {
+    int from, to, beyond;
   };
   bool start();  // a tetrahedron from the waiting points
   void insert(Vec3 point);
-  int new_face(int a, int b, int c);
-  double distance(int face, const Vec3& p) const;
-  // The first block of planes with one that p is beyond, as the row of its first plane; nx_.size(): none.
-  std::size_t block_beyond(const Vec3& p) const;
+  void keep_point(const Vec3&);
+  // A face of each two of `corners` that follow one another, and of `apex`; their numbers become `made_`.
+  void new_faces(std::span<const int> corners, int apex);
+  // The first face from `first` on that p is more than `least` beyond, by a distance that is accepted; the
+  // number of faces: none.
+  template <class Accept>
+  int first_beyond(int first, const Vec3& p, double least, const Accept&) const;
   // Exact: points of a cut lie in one plane, and a hull whose faces disagree about them by rounding comes
   // apart.
-  bool visible(int face, const Vec3& p) const;
+  bool visible(const Face&, const Vec3& p, double distance) const;
 
   double tolerance_, jitter_;
   std::vector<Vec3> points_, waiting_;
   std::vector<Face> faces_;
-  std::vector<double> nx_, ny_, nz_, offset_;  // unit plane of each face, in whole blocks; a free row is
-                                               // nowhere visible
+  // The planes of faces rounded, in blocks: of each block the x of its normals, then y, z, and the offsets.
+  std::vector<float> rough_;
+  double reach_ = 0;  // no point has coordinates whose magnitudes sum to more
   std::vector<int> free_;
   double volume_ = 0;
   // Scratch of insert.
-  std::vector<int> visible_, rim_face_, rim_side_;
+  std::vector<int> visible_, made_, loop_;
+  std::vector<Rim> rim_, beyond_;
   std::vector<int> rim_from_vertex_;  // a vertex → its rim side in this insertion
-  std::vector<int> mark_;
-  std::vector<std::array<int, 3>> rim_;  // from vertex, to vertex, the face beyond
   int stamp_ = 0;
+  std::vector<double> columns_[3];  // of the loop's points
 };
 
 }  // namespace limber::meshing::detail

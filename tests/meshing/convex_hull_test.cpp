@@ -89,6 +89,28 @@ TEST(ConvexHull, GrowingHullHasTheVolumeOfTheExactOneAfterEveryPoint) {
   }
 }
 
+// Planes that are rounded to float, which are asked first, are off by more than the tolerance.
+TEST(ConvexHull, AGrowingHullHoldsWhatNoPlaneOfItIsBelow) {
+  const Points points = ball_of_points(300, 11);
+  detail::GrowingHull hull;
+  for (Eigen::Index i = 0; i < points.rows(); ++i) hull.add(Vec3(points.row(i)) + Vec3(0.3, -0.2, 0.7));
+  const auto planes = hull.planes();
+  ASSERT_GT(planes.rows(), 50);
+  int held = 0, out = 0;
+  for (const Vec3& corner : hull.vertices())
+    for (Eigen::Index f = 0; f < planes.rows(); ++f)
+      for (const double off : {-2.0, 0.5, 0.999, 1.001, 2.0}) {
+        // The corner's shadow on the plane, pulled towards the hull's middle, and then so far off the plane.
+        const Vec3 n = planes.row(f).head<3>(), pulled = 0.99 * corner + 0.01 * Vec3(0.3, -0.2, 0.7);
+        const Vec3 p = pulled - (n.dot(pulled) + planes(f, 3) - off * hull.tolerance()) * n;
+        const bool is_held = (planes.leftCols<3>() * p + planes.col(3)).maxCoeff() <= hull.tolerance();
+        ASSERT_EQ(hull.holds(p), is_held) << "plane " << f << ", " << off << " tolerances off it";
+        ++(is_held ? held : out);
+      }
+  EXPECT_GT(held, 50);
+  EXPECT_GT(out, 50);
+}
+
 // Every rounding of these products is wrong by more than the answer: the sign follows the last bit.
 TEST(ConvexHull, OrientationSeesOneBit) {
   const Vec3 a(12, 12, 0), b(24, 24, 1), c(24, 24, 0);
