@@ -22,9 +22,9 @@ const std::vector<Vec3> offcuts = [] {
 
 constexpr std::size_t lanes = 8;
 
-// Blocks of 8 planes, rounded to float: the first, from `block` on, that has one which p may be more than
-// `distance` beyond; `count` when none has. `slack` is what rounding can hide, so an answer is only where to
-// look closer. Most points are in the hull, and are done with here.
+// Blocks of 8 planes, rounded to float: the first, from `block` on, that has one which p is more than
+// `distance` beyond, as floats see it; `count` when none has. So an answer is only where to look closer. Most
+// points are in the hull, and are done with here.
 [[gnu::target("avx2,fma")]] std::size_t find_block_avx2(const float* blocks, std::size_t block,
                                                         std::size_t count, const Vec3& p, float distance) {
   const __m256 x = _mm256_set1_ps(float(p.x())), y = _mm256_set1_ps(float(p.y())),
