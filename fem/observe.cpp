@@ -175,23 +175,38 @@ Points robot_from_center(const World& world, const State& state) {
   return places;
 }
 
-}  // namespace
-
-double turn_from_goal_shape_deg(const World& world, const State& state) {
-  const Points now = robot_from_center(world, state);
-  const Body& robot = world.bodies[std::size_t(world.robot)];
-  Eigen::Matrix3d sum = Eigen::Matrix3d::Zero();
-  for (int n = 0; n < robot.node_count(); ++n)
-    sum += robot.node_mass_kg[std::size_t(n)] * now.row(n).transpose() * world.goal_shape_m.row(n);
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(sum, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  Eigen::Matrix3d u = svd.matrixU();
-  if ((u * svd.matrixV().transpose()).determinant() < 0) u.col(2) *= -1;  // a rotation, not a mirror
-  const Eigen::AngleAxisd turn(Eigen::Matrix3d(u * svd.matrixV().transpose()));
-  return std::abs(turn.angle()) * 180 / std::numbers::pi;
+// About a unit axis a: x ↦ 2 a (a·x) − x.
+Points half_turned(const Points& shape, const Vec3& axis) {
+  return 2 * (shape * axis) * axis.transpose() - shape;
 }
 
-double distance_from_goal_shape_m(const World& world, const State& state) {
-  return (robot_from_center(world, state) - world.goal_shape_m).rowwise().norm().maxCoeff();
+}  // namespace
+
+double turn_from_goal_shape_deg(const World& world, const State& state,
+                                const std::optional<Vec3>& half_turn) {
+  const Points now = robot_from_center(world, state);
+  const Body& robot = world.bodies[std::size_t(world.robot)];
+  const auto turn_from = [&](const Points& shape) {
+    Eigen::Matrix3d sum = Eigen::Matrix3d::Zero();
+    for (int n = 0; n < robot.node_count(); ++n)
+      sum += robot.node_mass_kg[std::size_t(n)] * now.row(n).transpose() * shape.row(n);
+    const Eigen::JacobiSVD<Eigen::Matrix3d> svd(sum, Eigen::ComputeFullU | Eigen::ComputeFullV);
+    Eigen::Matrix3d u = svd.matrixU();
+    if ((u * svd.matrixV().transpose()).determinant() < 0) u.col(2) *= -1;  // a rotation, not a mirror
+    const Eigen::AngleAxisd turn(Eigen::Matrix3d(u * svd.matrixV().transpose()));
+    return std::abs(turn.angle()) * 180 / std::numbers::pi;
+  };
+  const double turn = turn_from(world.goal_shape_m);
+  return half_turn ? std::min(turn, turn_from(half_turned(world.goal_shape_m, *half_turn))) : turn;
+}
+
+double distance_from_goal_shape_m(const World& world, const State& state,
+                                  const std::optional<Vec3>& half_turn) {
+  const Points now = robot_from_center(world, state);
+  const auto distance_from = [&](const Points& shape) { return (now - shape).rowwise().norm().maxCoeff(); };
+  const double distance = distance_from(world.goal_shape_m);
+  return half_turn ? std::min(distance, distance_from(half_turned(world.goal_shape_m, *half_turn)))
+                   : distance;
 }
 
 Hole hole_of(const World& world, const State& state, int ring) {

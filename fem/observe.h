@@ -2,6 +2,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "fem/world.h"
@@ -41,8 +42,9 @@ std::vector<double> volume_changes(const World&, const State&, int body);  // (T
 
 // Of the robot against World::goal_shape_m, their centres of mass laid on one another: the angle of the
 // rotation that fits best (Kabsch 1976, weighed by mass), and the largest distance of a node from its place.
-double turn_from_goal_shape_deg(const World&, const State&);
-double distance_from_goal_shape_m(const World&, const State&);
+// With the unit axis of a half turn the less of that and of the same against that shape, turned so.
+double turn_from_goal_shape_deg(const World&, const State&, const std::optional<Vec3>& half_turn = {});
+double distance_from_goal_shape_m(const World&, const State&, const std::optional<Vec3>& half_turn = {});
 
 // The hole of a body that is a ring: the plane in which the nodes of its cage lie best, round their middle,
 // as far as they are in the mean. What is nearer there cannot be in the ring itself.

@@ -207,6 +207,7 @@ struct Goal {
     Vec3 stretch = Vec3::Ones();  // of the rest shape along x, y, z, before the turn
     std::string cage;             // or a .msh file with the robot's cage as it shall be; empty: none
     std::optional<double> turn_tolerance_deg, tolerance_m;
+    std::optional<Vec3> half_turn;  // a unit axis: turned about it by half a turn from there it is as good
   };
   std::optional<Shape> shape;
   int above = -1, below = -1, clear_of = -1;  // indices of bodies; −1: none

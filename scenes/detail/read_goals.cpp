@@ -13,16 +13,25 @@ namespace limber::scenes {
 
 namespace {
 
-Goal::Shape read_goal_shape(const Node& table) {
+Goal::Shape read_goal_shape(const Node& table, const Node& planner) {
   Goal::Shape shape{direction(table, "axis", "goal.shape.axis"),
                     number(table, "angle_deg"),
                     vector(table, "stretch"),
                     text(table, "cage"),
                     maybe_number(table, "turn_tolerance_deg"),
-                    maybe_number(table, "tolerance_m")};
+                    maybe_number(table, "tolerance_m"),
+                    {}};
   if (!shape.turn_tolerance_deg && !shape.tolerance_m)
     complain(table,
              "goal.shape asks for nothing without a tolerance; write for example turn_tolerance_deg = 10");
+  if (const Node* half_turn = table.find("half_turn")) {
+    shape.half_turn = direction(table, "half_turn", "goal.shape.half_turn");
+    if (number(child(planner, "weights"), "interpolation") > 0 ||
+        (number(planner, "settle_time_s") > 0 && number(planner, "settle_force_share") > 0))
+      complain(*half_turn,
+               "the robot would be drawn into goal.shape, also where it is about to lie turned by half a "
+               "turn; write planner.weights.interpolation = 0 and planner.settle_force_share = 0");
+  }
   return shape;
 }
 
@@ -83,7 +92,7 @@ void require_of_balloon(const Node& volume, const Node& planner, const Goal& goa
 Goal read_goal(const Node& root, const Scene& scene) {
   const Node& table = child(root, "goal");
   Goal goal = read_any_goal(table, scene, "goal");
-  if (const Node* shape = table.find("shape")) goal.shape = read_goal_shape(*shape);
+  if (const Node* shape = table.find("shape")) goal.shape = read_goal_shape(*shape, child(root, "planner"));
   goal.lost_below_m = maybe_number(table, "lost_below_m");
   goal.volume = maybe_number(table, "volume").value_or(0);
   if (goal.volume > 0) require_of_balloon(child(table, "volume"), child(root, "planner"), goal);

@@ -638,6 +638,11 @@ constexpr Key all_keys[] = {
     {"goal.shape.tolerance_m", Type::number, positive, 0, may_lack,
      "m; how far a node may be from its place in that shape, the centres of mass laid on one another", "",
      ""},
+    {"goal.shape.half_turn", Type::vector, any, 3, may_lack,
+     "an axis of any length but 0: turned by half a turn about it from that shape it is as good (a mattress "
+     "that may lie on either face); nothing draws it there, so planner.weights.interpolation and "
+     "settle_force_share must be 0",
+     "", ""},
 
     {"via",
      Type::tables,

@@ -329,6 +329,8 @@ const std::vector<Row> rows{
     {"goal.shape.stretch", "goal.shape.stretch=[1.1, 1, 1]", world},
     {"goal.shape.turn_tolerance_deg", "goal.shape.turn_tolerance_deg=30", world},
     {"goal.shape.tolerance_m", "goal.shape.tolerance_m=0.4", world},
+    {"goal.shape.half_turn", "goal.shape.half_turn=[0, 0, 1]", world,
+     "planner.weights.interpolation=0|planner.settle_force_share=0"},
     {"via[].center_of_mass_m", "via=[{ center_of_mass_m = [2, 1, 1.4], radius_m = 0.3 }]", search, one_via},
     {"via[].radius_m", "via=[{ center_of_mass_m = [2, 1, 1.5], radius_m = 0.2 }]", search, one_via},
     {"via[].box_m", "via=[{ center_of_mass_m = [2, 1, 1.5], box_m = [[1.9, 0.9, 1.4], [2.1, 1.1, 1.6]] }]",

@@ -54,6 +54,20 @@ TEST(Goal, TurnAndShapeAreMeasuredFromTheGoalShape) {
         << deg;
     EXPECT_EQ(fem::distance_from_goal_shape_m(world, with_robot_at(world, now)) < 1e-5, deg == 70.0);
   }
+  // With a half turn it may be so as well, and nothing else changes.
+  const Vec3 half_axis = Vec3(2, -1, 3).normalized();
+  const Points half = turned(turned(rest, axis, 70), half_axis, 180);
+  GoalRules rules;
+  rules.turn_tolerance_deg = 1, rules.shape_tolerance_m = 0.01;
+  const FemSystem as_it_is(world, rules);
+  rules.half_turn = half_axis;
+  const FemSystem also_turned(world, rules);
+  EXPECT_NE(as_it_is.hash(), also_turned.hash()) << "another search";
+  EXPECT_TRUE(as_it_is.goal_holds(with_robot_at(world, turned(rest, axis, 70))));
+  EXPECT_TRUE(also_turned.goal_holds(with_robot_at(world, turned(rest, axis, 70))));
+  EXPECT_FALSE(as_it_is.goal_holds(with_robot_at(world, half)));
+  EXPECT_TRUE(also_turned.goal_holds(with_robot_at(world, half)));
+  EXPECT_FALSE(also_turned.goal_holds(fem::rest_state(world)));
   // A stretch along x by 1.1 moves the ends, 0.3 m from the middle, by 3 cm; it does not turn.
   spec.goal_shape_m = rest;
   const fem::World upright = fem::build_world(spec);

@@ -323,6 +323,10 @@ TEST(ReadScene, ComplainsWithLineAndColumn) {
        "lost_below_m", "unknown key"},
       {"radius_m = 0.25\n", "radius_m = 0.25\nshape = { angle_deg = 90 }\n", "{ angle_deg",
        "without a tolerance"},
+      {"radius_m = 0.25\n", "radius_m = 0.25\nshape = { tolerance_m = 1, half_turn = [0, 0, 2] }\n",
+       "[0, 0, 2]", "would be drawn into goal.shape"},
+      {"radius_m = 0.25\n", "radius_m = 0.25\nshape = { tolerance_m = 1, half_turn = [0, 0, 0] }\n",
+       "[0, 0, 0] }\n", "points nowhere"},
       {"name = \"gate\"", "name = \"robot\"", "\"robot\"\nrole = \"obst", "two bodies are called \"robot\""},
       {"name = \"gate\"", "name = \"../gate\"", "\"../gate\"", "letters, digits"},
       {"[9, 1.5, 1.5]", "[11, 1.5, 1.5]", "[11,",
@@ -816,6 +820,8 @@ TEST(Keys, EveryKeyChangesTheScene) {
     if (key.path == "goal.box_m")
       sets = {"goal={ center_of_mass_m = [9, 1.5, 1.5], box_m = [[8, 1, 1], [9.5, 2, 2]] }"};
     if (key.parent() == "goal.shape") sets = {"goal.shape.tolerance_m=0.25"};
+    if (key.path == "goal.shape.half_turn")
+      sets = {"goal.shape.tolerance_m=0.25", "planner.weights.interpolation=0", "planner.settle_time_s=0"};
     if (key.path == "goal.lost_below_m") sets = {"planner.settle_time_s=0", "goal.moves_with=gate"};
     if (key.path == "bodies[].triangles")
       sets = {"cameras.side.follow=robot",
@@ -1043,6 +1049,7 @@ std::string all_of(const Scene& s) {
   if (const auto& shape = s.goal.shape)
     t += fmt::format("{} {} {} {} {} {}\n", v(shape->axis), shape->angle_deg, v(shape->stretch), shape->cage,
                      shape->turn_tolerance_deg.value_or(-1), shape->tolerance_m.value_or(-1));
+  if (s.goal.shape && s.goal.shape->half_turn) t += v(*s.goal.shape->half_turn);
   t += fmt::format("{} {} {} {} {} {} {} {} {} {} {} {} {} {} {} {}\n", p.preset, p.seed, p.iterations,
                    p.goal_bias, p.weight_body, p.weight_control_point, p.weight_interpolation, p.max_force_n,
                    p.min_force_share, p.max_force_share, p.min_duration_s, p.max_duration_s,

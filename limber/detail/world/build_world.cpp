@@ -217,7 +217,7 @@ GoalRules goal_rules_of(const scenes::Scene& scene) {
     rules.body = goal.moves_with, rules.lost_below_m = goal.lost_below_m;
     if (goal.shape)
       rules.turn_tolerance_deg = goal.shape->turn_tolerance_deg,
-      rules.shape_tolerance_m = goal.shape->tolerance_m;
+      rules.shape_tolerance_m = goal.shape->tolerance_m, rules.half_turn = goal.shape->half_turn;
     rules.above = goal.above, rules.below = goal.below, rules.clear_of = goal.clear_of;
     rules.through = goal.through, rules.volume = goal.volume;
     return rules;

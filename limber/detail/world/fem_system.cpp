@@ -296,6 +296,7 @@ FemSystem::FemSystem(const fem::World& world, const GoalRules& goal, std::option
   for (const int body : {goal.body, goal.above, goal.below, goal.clear_of}) hasher.value(body);
   for (const auto& rule : {goal.lost_below_m, goal.turn_tolerance_deg, goal.shape_tolerance_m})
     hasher.value(int(rule.has_value())).value(rule.value_or(0));
+  if (goal.half_turn) hasher.text("half turn").matrix(*goal.half_turn);
   for (const auto& [ring, pieces] : goal.through) hasher.text("through").value(ring).value(pieces);
   if (goal.volume > 0) hasher.text("volume").value(goal.volume);
   if (!goal.patches_m.empty()) find_patches(), hasher.text("patches").value(int(goal.lead));
@@ -501,9 +502,11 @@ const plan::System& FemSystem::on_leg(int leg) const {
   return leg < int(via_.size()) ? static_cast<const plan::System&>(*via_[std::size_t(leg)]) : *this;
 }
 bool FemSystem::goal_holds(const State& state) const {
-  if (goal_.turn_tolerance_deg && fem::turn_from_goal_shape_deg(world_, state) > *goal_.turn_tolerance_deg)
+  if (goal_.turn_tolerance_deg &&
+      fem::turn_from_goal_shape_deg(world_, state, goal_.half_turn) > *goal_.turn_tolerance_deg)
     return false;
-  if (goal_.shape_tolerance_m && fem::distance_from_goal_shape_m(world_, state) > *goal_.shape_tolerance_m)
+  if (goal_.shape_tolerance_m &&
+      fem::distance_from_goal_shape_m(world_, state, goal_.half_turn) > *goal_.shape_tolerance_m)
     return false;
   const auto height = [&](int body, bool top) {
     const Points places = fem::body_positions(world_, state, body);

@@ -21,6 +21,7 @@ struct GoalRules {
   std::optional<double> lost_below_m;  // the goal is lost once that body's lowest node is below this height
   std::optional<double> turn_tolerance_deg;  // the robot is turned as fem::World::goal_shape_m is
   std::optional<double> shape_tolerance_m;   // no node is farther from its place in that shape
+  std::optional<Vec3> half_turn;             // about this unit axis from there it is as good
   int above = -1, below = -1;                // the whole robot is higher, lower than all of this body
   double volume = 0;                         // > 0: the robot's cage holds so many times what it does at rest
   int clear_of = -1;                         // no contact with this body pushes the robot

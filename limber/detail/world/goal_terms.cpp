@@ -84,15 +84,18 @@ std::vector<GoalTerm> terms_of(const scenes::Scene& scene, const scenes::Goal& g
     terms.push_back({fmt::format("{} of the robot's pieces in the hole of {}", asked, name(ring)),
                      pieces == asked, fmt::format("{}", pieces)});
   }
+  const char* or_turned = goal.shape && goal.shape->half_turn ? ", or half a turn from it" : "";
   if (goal.shape && goal.shape->turn_tolerance_deg) {
-    const double most = *goal.shape->turn_tolerance_deg, turn = fem::turn_from_goal_shape_deg(world, state);
-    terms.push_back({fmt::format("turned within {:g} degrees of the shape asked for", most), turn <= most,
-                     fmt::format("{:.2f} degrees", turn)});
+    const double most = *goal.shape->turn_tolerance_deg,
+                 turn = fem::turn_from_goal_shape_deg(world, state, goal.shape->half_turn);
+    terms.push_back({fmt::format("turned within {:g} degrees of the shape asked for{}", most, or_turned),
+                     turn <= most, fmt::format("{:.2f} degrees", turn)});
   }
   if (goal.shape && goal.shape->tolerance_m) {
-    const double most = *goal.shape->tolerance_m, off = fem::distance_from_goal_shape_m(world, state);
-    terms.push_back({fmt::format("every node within {:g} m of the shape asked for", most), off <= most,
-                     fmt::format("{:.4f} m", off)});
+    const double most = *goal.shape->tolerance_m,
+                 off = fem::distance_from_goal_shape_m(world, state, goal.shape->half_turn);
+    terms.push_back({fmt::format("every node within {:g} m of the shape asked for{}", most, or_turned),
+                     off <= most, fmt::format("{:.4f} m", off)});
   }
   return terms;
 }
