@@ -109,7 +109,7 @@ void Contacts<Real>::respond(const LaneView<Real>& view, int a, int b, const Con
   Share<Real> shares[6];
   for (int i = 0; i < 6; ++i) shares[i] = {node[i], share[i]};
   friction->add(side[0], side[1], place, contact.direction, tables_.pair_friction[a * bodies_ + b] * push,
-                shares, shares + 2, shares + 6, records_ ? int(records_->size()) - 1 : -1);
+                {shares, shares + 2}, {shares + 2, shares + 6}, records_ ? int(records_->size()) - 1 : -1);
 }
 
 // Calls each(node, axis, normal, depth) for each surface node of a body that is beyond a wall: `normal` is
@@ -157,8 +157,8 @@ void Contacts<Real>::add_wall_forces(const LaneView<Real>& view, Friction<Real>*
                              {push * normal[0], push * normal[1], push * normal[2]}});
       if (!friction) return;
       const Share<Real> share{n, 1};
-      friction->add(body, -1, place, normal, tables_.pair_friction[body * bodies_ + body] * push, &share,
-                    &share + 1, &share + 1, records_ ? int(records_->size()) - 1 : -1);
+      friction->add(body, -1, place, normal, tables_.pair_friction[body * bodies_ + body] * push,
+                    {&share, &share + 1}, {}, records_ ? int(records_->size()) - 1 : -1);
     });
   }
 }

@@ -50,6 +50,7 @@ Friction<Real>::Friction(const World& world)
       tables_(tables_of<Real>(world)),
       dt_(Real(world.substep_s())),
       slot_of_node_(std::size_t(world.nodes), -1),
+      wall_nodes_of_node_(std::size_t(world.nodes), {-1, -1, -1, -1, -1, -1}),
       wall_loads_(6 * world.bodies.size()) {
   for (const Body& body : world.bodies)
     if (body.kind == BodyKind::rigid) spins_.resize(world.bodies.size());
@@ -63,10 +64,12 @@ bool Friction<Real>::is_rigid(int body) const {
 // Forgets the places of the last step; of the large arrays only what was used.
 template <class Real>
 void Friction<Real>::begin() {
+  for (const WallNode& node : wall_nodes_)
+    wall_nodes_of_node_[std::size_t(slots_[std::size_t(node.slot)].node)][std::size_t(node.side)] = -1;
   for (const Slot& slot : slots_) slot_of_node_[std::size_t(slot.node)] = -1;
   for (Spin& spin : spins_) spin.met = false;
   slots_.clear(), shares_.clear(), slips_.clear(), limited_ = goes_on_ = false;
-  wall_nodes_of_slot_.clear(), wall_nodes_.clear(), wall_tellings_.clear(), wall_shares_.clear();
+  wall_nodes_.clear(), wall_tellings_.clear(), wall_shares_.clear();
 }
 
 // The slot of a node. Nodes that take part get slots in the order in which they are met, so that sweeps go
@@ -77,7 +80,6 @@ int Friction<Real>::slot_of(int node, int body) {
   if (slot < 0) {
     slot = int(slots_.size());
     slots_.push_back({node, body});
-    wall_nodes_of_slot_.push_back({-1, -1, -1, -1, -1, -1});
   }
   return slot;
 }
@@ -88,26 +90,27 @@ int Friction<Real>::slot_of(int node, int body) {
 // summed here once.
 template <class Real>
 void Friction<Real>::add(int body, int against, const Real place[3], const Real normal[3], Real most,
-                         const Share<Real>* first, const Share<Real>* second, const Share<Real>* last,
-                         int records, Real told_share) {
+                         const Shares<Real>& shares, const Shares<Real>& others, int records,
+                         Real told_share) {
   if (!(most > 0)) return;
-  if (against < 0 && !is_rigid(body)) return bear(body, normal, dt_ * most, first, last, records);
+  if (against < 0 && !is_rigid(body)) return bear(body, normal, dt_ * most, shares, records);
   Slip& slip = slips_.emplace_back();
   slip.side[0] = body, slip.side[1] = against;
   std::copy_n(place, 3, slip.place), std::copy_n(normal, 3, slip.normal);
   std::fill_n(slip.impulse, 3, Real(0));
   slip.most = dt_ * most, slip.records = records, slip.told_share = told_share;
   slip.first = int(shares_.size()), slip.inverse_mass = 0;
-  const int second_share = slip.first + int(second - first);
-  slip.last = slip.first + int(last - first);
+  const int second_share = slip.first + int(shares.last - shares.first);
+  slip.last = second_share + int(others.last - others.first);
   slip.first_soft = is_rigid(body) ? second_share : slip.first;
   slip.last_soft = is_rigid(against) ? second_share : slip.last;
-  for (const Share<Real>* share = first; share < last; ++share) {
-    const int of = share < second ? body : against;
-    const Real gain = is_rigid(of) ? Real(0) : share->weight * tables_.inverse_mass[share->node];
-    shares_.push_back({slot_of(share->node, of), share->weight, gain});
-    slip.inverse_mass += share->weight * gain;
-  }
+  for (const int side : {0, 1})
+    for (const auto [node, weight] : side == 0 ? shares : others) {
+      const int of = slip.side[side];
+      const Real gain = is_rigid(of) ? Real(0) : weight * tables_.inverse_mass[node];
+      shares_.push_back({slot_of(node, of), weight, gain});
+      slip.inverse_mass += weight * gain;
+    }
   for (const int side : slip.side)
     if (is_rigid(side)) spins_[std::size_t(side)].met = true;
 }
@@ -116,21 +119,20 @@ void Friction<Real>::add(int body, int against, const Real place[3], const Real 
 // Hundreds of samples of a flat side press a wall, and all of them hold the few nodes behind; what holds
 // these holds the samples. The side of the wall follows from its normal, which is along an axis.
 template <class Real>
-void Friction<Real>::bear(int body, const Real normal[3], Real most, const Share<Real>* first,
-                          const Share<Real>* last, int records) {
+void Friction<Real>::bear(int body, const Real normal[3], Real most, const Shares<Real>& shares,
+                          int records) {
   int axis = 0;
   while (axis < 2 && normal[axis] == 0) ++axis;
   const int side = normal[axis] > 0 ? axis : 3 + axis, first_share = int(wall_shares_.size());
-  for (const Share<Real>* share = first; share < last; ++share) {
-    if (!(tables_.inverse_mass[share->node] > 0)) continue;
-    const int slot = slot_of(share->node, body);
-    int& wall_node = wall_nodes_of_slot_[std::size_t(slot)][std::size_t(side)];
+  for (const auto [node, weight] : shares) {
+    int& wall_node = wall_nodes_of_node_[std::size_t(node)][std::size_t(side)];
     if (wall_node < 0) {
+      if (!(tables_.inverse_mass[node] > 0)) continue;
       wall_node = int(wall_nodes_.size());
-      wall_nodes_.push_back({slot, body, side, 0, 0, false, {0, 0, 0}});
+      wall_nodes_.push_back({slot_of(node, body), body, side, 0, 0, false, {0, 0, 0}});
     }
-    wall_nodes_[std::size_t(wall_node)].load += share->weight * most;
-    if (records >= 0) wall_shares_.push_back({wall_node, share->weight * most});
+    wall_nodes_[std::size_t(wall_node)].load += weight * most;
+    if (records >= 0) wall_shares_.push_back({wall_node, weight * most});
   }
   if (records >= 0) wall_tellings_.push_back({records, first_share, int(wall_shares_.size())});
 }
@@ -148,10 +150,10 @@ void Friction<Real>::limit_wall_nodes() {
     load_of(node).all += node.load, load_of(node).positive += std::max(node.load, Real(0));
   for (const Slip& slip : slips_)
     for (int k = slip.first_soft; k < slip.last_soft; ++k)
-      for (const int wall_node : wall_nodes_of_slot_[std::size_t(shares_[std::size_t(k)].slot)])
+      for (const int wall_node : wall_nodes_of(shares_[std::size_t(k)].slot))
         if (wall_node >= 0) wall_nodes_[std::size_t(wall_node)].meets_others = true;
   for (WallNode& node : wall_nodes_) {
-    for (const int other : wall_nodes_of_slot_[std::size_t(node.slot)])
+    for (const int other : wall_nodes_of(node.slot))
       node.meets_others |= other >= 0 && &wall_nodes_[std::size_t(other)] != &node;
     const WallLoad& of_all = load_of(node);
     node.most = of_all.all > 0 ? std::max(node.load, Real(0)) * (of_all.all / of_all.positive) : Real(0);

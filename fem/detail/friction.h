@@ -26,12 +26,10 @@ class Friction {
   // What touches in the step that begins; nothing yet.
   void begin();
   // Some place of `body` presses one of `against`, or a wall (−1), whose normal is along an axis: `most` is μ
-  // times the normal force, in newtons. Shares: those of the first place, then, from `second` on, minus those
-  // of the other. `records` is where among what is told the force is to be added, times `told_share`; −1:
-  // nowhere.
+  // times the normal force, in newtons. Shares: those of the first place, and minus those of the other.
+  // `records` is where among what is told the force is to be added, times `told_share`; −1: nowhere.
   void add(int body, int against, const Real place[3], const Real normal[3], Real most,
-           const Share<Real>* first, const Share<Real>* second, const Share<Real>* last, int records = -1,
-           Real told_share = 1);
+           const Shares<Real>& shares, const Shares<Real>& others, int records = -1, Real told_share = 1);
   // When view.f holds all other forces: adds those of friction, and to what was told; in each substep again,
   // of the same touches. `pushes` [body] as of Motion, at the lane, or null.
   void add_forces(const LaneView<Real>& view, const std::vector<const Real*>& pushes,
@@ -92,8 +90,10 @@ class Friction {
 
   bool is_rigid(int body) const;
   int slot_of(int node, int body);
-  void bear(int body, const Real normal[3], Real most, const Share<Real>* first, const Share<Real>* last,
-            int records);
+  const std::array<int, 6>& wall_nodes_of(int slot) const {
+    return wall_nodes_of_node_[std::size_t(slots_[std::size_t(slot)].node)];
+  }
+  void bear(int body, const Real normal[3], Real most, const Shares<Real>&, int records);
   void limit_wall_nodes();
   Real step_of(WallNode&);
   Real energy_by_impulses();
@@ -111,7 +111,7 @@ class Friction {
   std::vector<Velocity> velocities_;  // a slot
   std::vector<SlotShare> shares_;
   std::vector<Slip> slips_;
-  std::vector<std::array<int, 6>> wall_nodes_of_slot_;  // by side; −1: none
+  std::vector<std::array<int, 6>> wall_nodes_of_node_;  // by side; −1: none
   std::vector<WallNode> wall_nodes_;
   bool limited_ = false;              // `most` of wall nodes is known
   bool goes_on_ = false;              // impulses are those of the substep before

@@ -197,6 +197,33 @@ struct WayOut {
   Real height[4];     // of the point above the faces, in lengths of the normals
 };
 
+// A place near a tet of a body whose fine surface it may touch; and how far from the tet's core, metres.
+template <class Real>
+struct PlaceInTet {
+  Real place[3], out;
+  int node[4], tet, sample;  // of the world's
+};
+// Where things of tets are: in rows of four numbers, the first three of them x y z, unless it is said how
+// many.
+template <class Real>
+struct SurfaceRows {
+  const Real* places;  // of nodes; from first_core on corners of cores, four a tet
+  int first_core;
+  const Real* cores;             // (core_numbers a tet) first the least weights
+  const Real* rest_places;       // of nodes
+  const Real* slopes;            // columns of nodes' deformation gradients, three a node
+  const Real* bends;             // of edges, six a tet
+  const Real* weight_gradients;  // (9 a tet, and one more) of nodes 1 to 3
+};
+inline constexpr int core_numbers = 5;
+// The signed distance to a surface at rest, on a grid, in units.
+template <class Real>
+struct FieldGrid {
+  const short* values;
+  int nodes[3];
+  Real lower[3], inverse_cell, unit;
+};
+
 // When a body is at rest, [lane].
 template <class Real>
 struct Rest {
@@ -265,6 +292,21 @@ struct Kernels {
   // share of the way. Multiples of block_size as above.
   void (*exits)(const WayOut<Real>&, const Real* x, const Real* y, const Real* z, int count, Real* share,
                 int* face);
+  // For each place its weights in its tet, columns 0 to 3, and in the next the least of them where it is no
+  // farther than `out` from the tet's core; lowest where it is. All columns: multiples of block_size.
+  void (*weigh_in_cores)(const PlaceInTet<Real>*, int count, const SurfaceRows<Real>&, Real* const* columns);
+  // The weights of the place of the body that is there now, how far the surface is, negative below it, and
+  // its unit normal, in eight columns. A largest distance where there is no such place, or no slope. Linear
+  // deformation, and Phong's, until places are as near as `exact`.
+  void (*find_surfaces)(const PlaceInTet<Real>*, int count, const SurfaceRows<Real>&, const FieldGrid<Real>&,
+                        Real* const* columns);
+  void (*find_bent_surfaces)(const PlaceInTet<Real>*, int count, const SurfaceRows<Real>&,
+                             const FieldGrid<Real>&, Real exact, Real* const* columns);
+  // How far samples of one tet, of weights in columns, are within a wall, if its nodes are so far; with the
+  // bends of its edges away from it. And which are at most 0, ascending; returns how many. Reads and
+  // writes multiples of block_size.
+  int (*find_beyond_wall)(const Real* const weights[4], int count, const Real node[4], const Real* edge,
+                          Real* within, int* index);
 };
 
 enum class Isa { sse2, avx2, avx512 };

@@ -61,7 +61,7 @@ void append_slopes(const World& world, Tables64& tables) {
     tables.slopes.insert(tables.slopes.end(), of_node.begin(), of_node.end());
   }
   tables.first_slope.push_back(int(tables.slopes.size()));
-  tables.weight_gradients.resize(9 * world.topology.tets.size());
+  tables.weight_gradients.resize(9 * world.topology.tets.size() + 1);
   for (const Body& body : world.bodies)
     for (std::size_t t = 0; t < body.inverse_rest_edges.size(); ++t)
       for (int i = 0; i < 9; ++i)
@@ -161,15 +161,39 @@ void append_tets_round_nodes(const Body& body, Tables64& tables) {
 }
 
 void append_shares(const World& world, Tables64& tables) {
-  if (tables.slopes.empty()) return;
   std::vector<double> scratch(std::size_t(world.nodes), 0.0);
   const double* rest = world.tables64.rest_positions.data();
   for (const auto& sample : tables.samples) {
     tables.first_share.push_back(int(tables.shares.size()));
-    if (tables.first_slope[std::size_t(sample.node[0])] < tables.first_slope[std::size_t(sample.node[0]) + 1])
+    if (!tables.slopes.empty() &&
+        tables.first_slope[std::size_t(sample.node[0])] < tables.first_slope[std::size_t(sample.node[0]) + 1])
       tables.spread(rest, sample.node, sample.weight, 1, scratch, tables.shares);
+    else
+      for (int i = 0; i < 4; ++i) tables.shares.push_back({sample.node[i], sample.weight[i]});
   }
   tables.first_share.push_back(int(tables.shares.size()));
+}
+
+// What each precision computes by itself.
+template <class Real>
+void complete(const Topology& topology, const Tables<Real>& world, SurfaceTables<Real>& tables) {
+  for (int sample = 0; sample < int(tables.samples.size()); ++sample) {
+    auto& sizes = tables.sizes.emplace_back();
+    for (const auto [node, weight] : tables.shares_of(sample)) {
+      sizes.all += std::abs(weight);
+      if (world.inverse_mass[std::size_t(node)] > 0) sizes.borne += std::abs(weight);
+    }
+  }
+  const Real* rest = world.rest_positions.data();
+  for (std::size_t n = 0; n < world.rest_positions.size(); n += 3)
+    tables.rest_places.insert(tables.rest_places.end(), {rest[n], rest[n + 1], rest[n + 2], 0});
+  if (tables.slopes.empty()) return;
+  for (const Topology::Tet& tet : topology.tets)
+    for (int i = 0; i < 4; ++i)
+      for (int j = i + 1; j < 4; ++j)
+        for (int c = 0; c < 4; ++c)
+          tables.half_edges.push_back(
+              c < 3 ? Real(0.5) * (rest[3 * tet.node[j] + c] - rest[3 * tet.node[i] + c]) : Real(0));
 }
 
 SurfaceTables<float> single_precision(const Tables64& t) {
@@ -233,10 +257,13 @@ void make_surface_tables(double offset_m, World& world) {
       if (world.bodies[b].self_contact) append_tets_round_nodes(world.bodies[b], tables);
     }
   tables.first_sample.push_back(int(tables.samples.size()));
+  for (auto& column : tables.weights) column.resize(column.size() + block_size, 0);
   append_shares(world, tables);
   const std::size_t bodies = world.bodies.size();
   tables.offset.assign(bodies * bodies, offset_m);
   world.surfaces = single_precision(tables);
+  complete(world.topology, world.tables64, tables);
+  complete(world.topology, world.tables, world.surfaces);
 }
 
 }  // namespace limber::fem::detail

@@ -41,6 +41,13 @@ struct Share {
   int node;  // of the world
   Real weight;
 };
+// Some that lie one behind the other.
+template <class Real>
+struct Shares {
+  const Share<Real>*first = nullptr, *last = nullptr;
+  const Share<Real>* begin() const { return first; }
+  const Share<Real>* end() const { return last; }
+};
 
 // A force that a contact or a wall gave, for those who ask.
 template <class Real>

@@ -62,16 +62,12 @@ Gaps gaps(const World& world, double offset_m, const Positions& positions) {
                                                lower.data(), upper.data(), travel.data(), travel.data()})) {
     if (contact.against < 0) continue;
     const std::size_t one = std::size_t(contact.body), other = std::size_t(contact.against);
+    const auto one_side = contacts.shares_of(contact), other_side = contacts.shares_against(contact);
     const double gap = offset_m - contact.depth;
     gaps.of_sample[{contact.body, contact.against, contact.sample}] = gap;
     if (gap < gaps[one * bodies + other].gap_m)
-      gaps.of_pair[one * bodies + other] =
-          gaps.of_pair[other * bodies + one] = {gap,
-                                                contact,
-                                                {{contacts.shares().begin() + contact.first_share,
-                                                  contacts.shares().begin() + contact.first_against},
-                                                 {contacts.shares().begin() + contact.first_against,
-                                                  contacts.shares().begin() + contact.last_share}}};
+      gaps.of_pair[one * bodies + other] = gaps.of_pair[other * bodies + one] = {
+          gap, contact, {{one_side.begin(), one_side.end()}, {other_side.begin(), other_side.end()}}};
   }
   return gaps;
 }

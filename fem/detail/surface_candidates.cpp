@@ -45,7 +45,7 @@ template <class Contact>
 void append(const std::vector<Contact>& from, std::size_t first, int shift, std::vector<Contact>& to) {
   for (std::size_t k = first; k < from.size(); ++k) {
     Contact& contact = to.emplace_back(from[k]);
-    contact.first_share += shift, contact.first_against += shift, contact.last_share += shift;
+    contact.first_against += shift, contact.last_against += shift;
   }
 }
 
@@ -244,7 +244,7 @@ void SurfaceContacts<Real>::build(const LaneView<Real>& view, int from, int into
       lower[c] -= margin, upper[c] += margin;
     }
     for (const int tet : surface_.bodies[into].cored_tets) {
-      find_core(view, tet);
+      need_core(view, tet);
       const int row = row_of_core(tet);
       bool meet = true;
       for (int c = 0; c < 3; ++c) {

@@ -60,7 +60,6 @@ SurfaceContacts<Real>::SurfaceContacts(const World& world, const Kernels<Real>& 
       first_sample_row_(world.nodes + 4 * int(world.topology.tets.size())),
       first_sample_stamp_(world.nodes + int(world.topology.tets.size())),
       first_slopes_stamp_(first_sample_stamp_ + int(surface_.samples.size())),
-      first_bends_stamp_(first_slopes_stamp_ + (surface_.slopes.empty() ? 0 : world.nodes)),
       step_(Real(world.contact_dt_s)),
       near_pairs_(world, tables_.skin, reaches_of(surface_), lanes) {
   for (const auto& body : world.bodies)
@@ -68,11 +67,11 @@ SurfaceContacts<Real>::SurfaceContacts(const World& world, const Kernels<Real>& 
   const std::size_t tets = topology_.tets.size(), samples = surface_.samples.size();
   places_.resize(std::size_t(first_sample_row_) + samples);
   if (!surface_.slopes.empty())
-    slopes_.resize(std::size_t(world_nodes_)), spread_.resize(slopes_.size(), 0), bends_.resize(tets);
-  stamps_.assign(std::size_t(first_bends_stamp_) + bends_.size(), 0);
-  loads_.assign(std::size_t(world_nodes_), 0);
+    slopes_.resize(std::size_t(world_nodes_)), spread_.resize(slopes_.size(), 0), bends_.resize(tets),
+        bulges_.resize(tets);
+  stamps_.assign(std::size_t(first_slopes_stamp_) + slopes_.size(), 0);
   for (const Real mass : tables_.node_mass) reciprocal_mass_.push_back(1 / mass);
-  velocities_.resize(std::size_t(world_nodes_)), forces_.assign(std::size_t(world_nodes_), Place{});
+  motions_.assign(std::size_t(world_nodes_), Place{}), forces_ = motions_;
   beside_.assign(tets, -1), sides_.assign(tets, 0);
   walls_asleep_until_.resize(std::size_t(lanes * bodies_));
   for (int k = 0; k < lanes * bodies_; ++k)
@@ -109,7 +108,10 @@ Real SurfaceContacts<Real>::deepest_overlap(int lane, const LaneView<Real>& view
 // All touches of the lane. When the count of calls wraps round to 0, which is no stamp, all stamps are reset.
 template <class Real>
 const std::vector<SurfaceContact<Real>>& SurfaceContacts<Real>::find(int lane, const LaneView<Real>& view) {
-  if (++stamp_ == 0) std::fill(stamps_.begin(), stamps_.end(), 0u), stamp_ = 1;
+  if (++stamp_ == 0) {
+    std::fill(stamps_.begin(), stamps_.end(), 0u), stamp_ = 1;
+    for (Bulge& bulge : bulges_) bulge.stamp = 0;
+  }
   contacts_.clear(), shares_.clear();
   for (NearPair& pair : near_pairs_.find(lane, view)) find_pair(view, pair);
   for (int body = 0; body < bodies_ && world_.walls; ++body)

@@ -20,10 +20,9 @@ namespace limber::fem::detail {
 // positions.
 template <class Real>
 struct SurfaceContact {
-  int body, against;  // whose sample, in whose cage; against −1: a wall
-  int sample, tet;    // of the world's; tet −1: a wall
-  // Of shares(): those of the nodes that move the sample, then minus those that move the place it is at.
-  int first_share, first_against, last_share;
+  int body, against;                // whose sample, in whose cage; against −1: a wall
+  int sample, tet;                  // of the world's; tet −1: a wall
+  int first_against, last_against;  // shares of the place it is at, with minus signs: shares_of
   Real place[3], depth, normal[3];  // depth > 0, along the unit normal, out of `against`
 };
 
@@ -52,7 +51,13 @@ class SurfaceContacts {
     return near_pairs_.find(lane, view);
   }
   using Share = typename SurfaceTables<Real>::Share;
-  const std::vector<Share>& shares() const { return shares_; }
+  // Of the nodes that move the sample, and minus those of the nodes that move the place it is at, if any do.
+  Shares<Real> shares_of(const SurfaceContact<Real>& contact) const {
+    return surface_.shares_of(contact.sample);
+  }
+  Shares<Real> shares_against(const SurfaceContact<Real>& contact) const {
+    return {shares_.data() + contact.first_against, shares_.data() + contact.last_against};
+  }
 
  private:
   using Tables = SurfaceTables<Real>;
@@ -91,38 +96,37 @@ class SurfaceContacts {
     Place column[3];  // of a node's deformation gradient
   };
 
-  // How Phong Deformation moves the places of a tet: by wᵢ wⱼ times this of each edge. And how far the middle
-  // of the edge that bends most.
+  // How Phong Deformation moves the places of a tet: by wᵢ wⱼ times this of each edge.
   struct Bends {
     Place of_edge[6];  // 01 02 03 12 13 23
-    Real most;
   };
-  // How far a surface is, negative below it, along its unit normal.
-  struct Surface {
-    Real distance, normal[3];
-    // By the field's value and gradient at rest, and what the gradient becomes as the body is deformed. The
-    // value is the distance at rest, and the ratio of the two slopes says how the body's deformation scales
-    // it. It does not jump where the gradient does, at borders of the grid's cells.
-    bool set(Real at_rest, const Real rest_gradient[3], const Real gradient[3]) {
-      const Real steepness = std::sqrt(dot(gradient, gradient));
-      distance = at_rest * (std::sqrt(dot(rest_gradient, rest_gradient)) / steepness);
-      for (int c = 0; c < 3; ++c) normal[c] = gradient[c] / steepness;
-      return steepness > Real(1e-3);
-    }
+  // And how far the middle of the edge that bends most.
+  struct Bulge {
+    unsigned stamp = 0;
+    Real most = 0;
   };
-
   // surface_places.h
   const Place& node_place(const LaneView<Real>&, int node);
   const Place& sample_place(const LaneView<Real>&, int sample);
-  const Slopes& slopes_at(const LaneView<Real>&, int node);
-  const Bends& bends_of(const LaneView<Real>&, int tet);
+  const Slopes& slopes_at(const LaneView<Real>& view, int node) {
+    if (stamps_[first_slopes_stamp_ + node] != stamp_) find_slopes(view, node);
+    return slopes_[node];
+  }
+  void find_slopes(const LaneView<Real>&, int node);
+  const Bends& bends_of(const LaneView<Real>& view, int tet) {
+    if (bulges_[tet].stamp != stamp_) find_bends(view, tet);
+    return bends_[tet];
+  }
+  void find_bends(const LaneView<Real>&, int tet);
   Real bulge_of(const LaneView<Real>&, int body, int tet);
   Real sample_bulge(const LaneView<Real>&, int body, int sample);
   static Place bend(const Bends&, const Real weight[4]);
+  void need_core(const LaneView<Real>& view, int tet) {
+    if (stamps_[world_nodes_ + tet] != stamp_) find_core(view, tet);
+  }
   void find_core(const LaneView<Real>&, int tet);
   int row_of_core(int tet) const { return world_nodes_ + 4 * tet; }
   int row_of_sample(int sample) const { return first_sample_row_ + sample; }
-  void share_sample(int body, int sample, SurfaceContact<Real>&);
 
   // surface_candidates.cpp
   Real travel_of(const LaneView<Real>&, int a, int b);
@@ -139,12 +143,11 @@ class SurfaceContacts {
 
   // surface_depth.cpp
   void find_in(const LaneView<Real>&, int from, int into, Real reach, Real travel, Near&);
-  bool measure(const LaneView<Real>&, int from, int into, int sample, int tet, const Real weight[4]);
-  bool near_core(const LaneView<Real>&, int tet, const Real place[3], const Real weight[4], Real out);
+  void choose_tets(const LaneView<Real>&, int from, int into);
+  void measure(const LaneView<Real>&, int from, int into);
+  void touch(const LaneView<Real>&, int from, int into, int k);
   bool is_beside(int tet, const Real weight[4], Real slack) const;
-  bool barycentric(const LaneView<Real>&, int tet, const Real place[3], Real weight[4]);
-  bool find_surface(const LaneView<Real>&, int body, int tet, const Real weight[4], Surface&);
-  bool find_bent_surface(const LaneView<Real>&, int body, int tet, const Place&, Real weight[4], Surface&);
+  SurfaceRows<Real> rows() const;
 
   // surface_walls.cpp
   void find_walls(int lane, const LaneView<Real>&, int body);
@@ -160,7 +163,7 @@ class SurfaceContacts {
   const detail::Tables<Real>& tables_;
   const Tables& surface_;
   const Kernels<Real>& kernels_;
-  int bodies_, world_nodes_, first_sample_row_, first_sample_stamp_, first_slopes_stamp_, first_bends_stamp_;
+  int bodies_, world_nodes_, first_sample_row_, first_sample_stamp_, first_slopes_stamp_;
   std::vector<ContactRecord<Real>>* records_ = nullptr;
   Real step_;
   NearPairs<Real> near_pairs_;
@@ -168,19 +171,25 @@ class SurfaceContacts {
   // [lane × bodies + body], of its wall_nodes: travel before which they cannot be beyond a wall.
   std::vector<std::vector<Real>> walls_asleep_until_;
   std::vector<SurfaceContact<Real>> contacts_;
-  std::vector<Share> shares_;
-  std::vector<Real> spread_;  // a node: 0
+  std::vector<Share> shares_;  // of places that samples are at
+  std::vector<Real> spread_;   // a node: 0
   // Rows: the world's nodes, four corners of each core, the samples; those are of this call whose stamp is.
   std::vector<Place> places_;
-  std::vector<Slopes> slopes_;    // a node; empty without phong bodies
-  std::vector<Bends> bends_;      // a tet; empty without phong bodies
-  std::vector<unsigned> stamps_;  // a node, a tet's core, a sample, a node's slopes, a tet's bends
+  std::vector<Slopes> slopes_;  // a node; empty without phong bodies
+  std::vector<Bends> bends_;    // a tet; empty without phong bodies
+  std::vector<Bulge> bulges_;
+  std::vector<unsigned> stamps_;  // a node, a tet's core, a sample, a node's slopes
   unsigned stamp_ = 0;
   std::vector<int> awake_;
   std::vector<Real> distance_;
-  std::vector<Real> loads_;            // a node: Σ area × depth × weight of its touches, over its mass
+  std::vector<PlaceInTet<Real>> asked_;  // and what kernels answer, in columns
+  std::vector<Real> answers_[8];
+  Real* columns_of_answers_[8];
   std::vector<Real> reciprocal_mass_;  // a node, held ones too
-  std::vector<Place> velocities_, forces_;       // of nodes with a load; 0 of the others' forces
+  // A node's velocity, and behind it its load, Σ area × depth × weight of its touches, over its mass; 0 of
+  // those that no touch has a share of, as their forces are.
+  std::vector<Place> motions_, forces_;
+  std::vector<int> loaded_;                      // nodes that have a load
   std::vector<EffectiveMass> effective_masses_;  // a body; empty without rigid ones
   // Scratch of a list's building.
   static constexpr int slabs = 32;

@@ -12,9 +12,10 @@
 // cells 3 mm for a tenth, and jumps where |∇φ| does, at borders of cells: a node that a sample hangs on got
 // more speed there than it came with, and trembled for ever.
 //
-// Where Phong Deformation bends the surface, X is found by Newton's method and F is the mean F̄ = Σ λᵢ Fᵢ
-// of the nodes', so g does not jump at borders of tets. What a bend moves farther than a body's `bulge` may
-// be missed.
+// These formulas are in kernels_surface.inc, for many samples side by side; here is who is asked, and what
+// follows. Where Phong Deformation bends the surface, X is found by Newton's method and F is the mean F̄ = Σ
+// λᵢ Fᵢ of the nodes', so g does not jump at borders of tets. What a bend moves farther than a body's `bulge`
+// may be missed.
 //
 // Tried and not kept (docs/contact.md): two steps of Newton alone pressed through 6 % of air at strong
 // bends. Without gain: a plane over the surface in each core; letting what is in a core sleep until the
@@ -36,173 +37,121 @@ using namespace list_margins;
 }  // namespace
 
 // The touches of samples of `from` in `into`. Candidates that are awake are measured against their cores
-// and sleep anew. Several cores may hold a sample, since cores reach over their tets by twice the offset.
-// The tet that has it is the one in which its least barycentric coordinate is largest: the one that holds
-// it, or, just outside of the cage, the nearest. Each sample touches once.
+// and sleep anew; those that may be near are asked for in asked_, in the order of samples.
 template <class Real>
 void SurfaceContacts<Real>::find_in(const LaneView<Real>& view, int from, int into, Real reach, Real travel,
                                     Near& near) {
+  const TetAndEdge* const all = near.candidates.data();
   const std::size_t count = near.candidates.size();
   if (awake_.size() < count + block_size) awake_.resize(count + block_size), distance_.resize(awake_.size());
+  const int* const index = awake_.data();
   const int awake = kernels_.find_at_most(near.asleep_until.data(), int(count), travel, awake_.data());
-  for (int i = 0; i < awake; ++i) {
-    find_core(view, near.candidates[awake_[i]].tet);
-    sample_place(view, near.candidates[awake_[i]].point);
-  }
-  kernels_.middle_distances(near.candidates.data(), awake_.data(), awake, &places_[0].at[0],
-                            distance_.data());
+  for (int i = 0; i < awake; ++i) need_core(view, all[index[i]].tet), sample_place(view, all[index[i]].point);
+  kernels_.middle_distances(all, index, awake, &places_[0].at[0], distance_.data());
+  asked_.resize(std::size_t(awake));
+  std::size_t asked = 0;
   for (int i = 0; i < awake;) {
-    const int sample = near.candidates[awake_[i]].point;
-    const Real* place = places_[row_of_sample(sample)].at;
+    const int sample = all[index[i]].point;
     const Real own_bulge = sample_bulge(view, from, sample);
-    int best = -1;
-    Real best_weight[4], best_min = -std::numeric_limits<Real>::max();
-    for (; i < awake && near.candidates[awake_[i]].point == sample; ++i) {
-      const int tet = near.candidates[awake_[i]].tet;
-      const Real bulge = own_bulge + bulge_of(view, into, tet);
-      near.asleep_until[awake_[i]] = travel + kept * (distance_[i] - bulge) - rounding * reach;
-      if (distance_[i] > bulge + certain * reach) continue;
-      Real weight[4];
-      if (!barycentric(view, tet, place, weight) || !near_core(view, tet, place, weight, bulge)) continue;
-      const Real least = std::min(std::min(weight[0], weight[1]), std::min(weight[2], weight[3]));
-      if (!(least > best_min)) continue;
-      best = tet, best_min = least;
-      std::copy_n(weight, 4, best_weight);
+    for (; i < awake && all[index[i]].point == sample; ++i) {
+      const int tet = all[index[i]].tet;
+      const Real bulge = own_bulge + bulge_of(view, into, tet), distance = distance_[i];
+      near.asleep_until[index[i]] = travel + kept * (distance - bulge) - rounding * reach;
+      PlaceInTet<Real>& one = asked_[asked];
+      one.out = bulge, one.tet = tet, one.sample = sample;
+      asked += distance > bulge + certain * reach ? 0 : 1;  // half of them, and no way to guess which
     }
-    if (best >= 0) measure(view, from, into, sample, best, best_weight);
   }
+  asked_.resize(asked);
+  for (PlaceInTet<Real>& one : asked_) {
+    std::copy_n(places_[row_of_sample(one.sample)].at, 3, one.place);
+    std::copy_n(topology_.tets[one.tet].node, 4, one.node);
+  }
+  if (asked_.empty()) return;
+  choose_tets(view, from, into);
+  measure(view, from, into);
 }
 
-// Whether a place is within `out`, metres, of the core of a tet. Its weights decide where `out` is 0. Else
-// it may lie beyond no side of the core's box and no plane of the core by more than `out`: the plane i is
-// where λᵢ = lᵢ, and 6V (lᵢ − λᵢ) / |nᵢ| is how far the place lies beyond it, with nᵢ = 6V ∇λᵢ.
+// Of several cores that hold a sample, since cores reach over their tets by twice the offset, asked_ keeps
+// one: the tet in which the sample's least barycentric coordinate is largest, which is the one that holds
+// it, or, just outside of the cage, the nearest. Each sample touches once. What is beyond the offset of the
+// body's box is not in every list, and never touches.
 template <class Real>
-bool SurfaceContacts<Real>::near_core(const LaneView<Real>& view, int tet, const Real place[3],
-                                      const Real weight[4], Real out) {
-  const typename Tables::Core& core = surface_.cores[tet];
-  bool inside = true;
-  for (int i = 0; i < 4; ++i) inside &= weight[i] >= core.least[i];
-  if (inside || out == 0) return inside;
-  const Place* at = &places_[row_of_core(tet)];
-  for (int c = 0; c < 3; ++c)
-    if (place[c] < std::min(std::min(at[0].at[c], at[1].at[c]), std::min(at[2].at[c], at[3].at[c])) - out ||
-        place[c] > std::max(std::max(at[0].at[c], at[1].at[c]), std::max(at[2].at[c], at[3].at[c])) + out)
-      return false;
-  const int* node = topology_.tets[tet].node;
-  const Real* corner[4];
-  for (int i = 0; i < 4; ++i) corner[i] = node_place(view, node[i]).at;
-  Real edge[3][3], normal[4][3];
-  for (int i = 0; i < 3; ++i)
-    for (int c = 0; c < 3; ++c) edge[i][c] = corner[i + 1][c] - corner[0][c];
-  for (int i = 0; i < 3; ++i) cross(edge[(i + 1) % 3], edge[(i + 2) % 3], normal[i + 1]);
-  for (int c = 0; c < 3; ++c) normal[0][c] = normal[1][c] + normal[2][c] + normal[3][c];
-  const Real volume6 = dot(normal[1], edge[0]);
-  for (int i = 0; i < 4; ++i)
-    if ((core.least[i] - weight[i]) * volume6 > out * std::sqrt(dot(normal[i], normal[i]))) return false;
-  return true;
-}
-
-// Barycentric weights of a place in a tet where it is now: λᵢ = nᵢ·(p − x₀)/6V for i = 1, 2, 3, and λ₀ what
-// is left to 1. False in a tet that is flat or inverted.
-template <class Real>
-bool SurfaceContacts<Real>::barycentric(const LaneView<Real>& view, int tet, const Real place[3],
-                                        Real weight[4]) {
-  const int* node = topology_.tets[tet].node;
-  const Real* corner[4];
-  for (int i = 0; i < 4; ++i) corner[i] = node_place(view, node[i]).at;
-  Real edge[3][3], normal[3], p[3];
+void SurfaceContacts<Real>::choose_tets(const LaneView<Real>& view, int from, int into) {
+  for (int i = 0; i < 8; ++i) {
+    answers_[i].resize(std::max(answers_[i].size(), asked_.size() + block_size));
+    columns_of_answers_[i] = answers_[i].data();
+  }
+  kernels_.weigh_in_cores(asked_.data(), int(asked_.size()), rows(), columns_of_answers_);
+  Real lower[3], upper[3];
   for (int c = 0; c < 3; ++c) {
-    p[c] = place[c] - corner[0][c];
-    for (int i = 0; i < 3; ++i) edge[i][c] = corner[i + 1][c] - corner[0][c];
+    const int k = (3 * into + c) * view.stride;
+    lower[c] = view.lower[k] - offset(from, into), upper[c] = view.upper[k] + offset(from, into);
   }
-  Real volume6 = 0;
-  weight[0] = 1;
-  for (int i = 0; i < 3; ++i) {
-    cross(edge[(i + 1) % 3], edge[(i + 2) % 3], normal);
-    if (i == 0) volume6 = dot(normal, edge[0]);
-    if (!(volume6 > 0)) return false;
-    weight[i + 1] = dot(normal, p) / volume6;
-    weight[0] -= weight[i + 1];
+  std::size_t chosen = 0;
+  for (std::size_t k = 0; k < asked_.size();) {
+    const int sample = asked_[k].sample;
+    std::size_t best = asked_.size();
+    Real best_least = std::numeric_limits<Real>::lowest();
+    for (; k < asked_.size() && asked_[k].sample == sample; ++k)
+      if (answers_[4][k] > best_least) best = k, best_least = answers_[4][k];
+    if (best == asked_.size()) continue;
+    const PlaceInTet<Real>& one = asked_[best];
+    bool far = false;
+    for (int c = 0; c < 3; ++c) far |= one.place[c] < lower[c] || one.place[c] > upper[c];
+    if (!far) asked_[chosen++] = PlaceInTet<Real>(one);
   }
-  return true;
+  asked_.resize(chosen);
 }
 
-// How far the surface of a body is from the place of these weights, and along which normal, in a tet that
-// deforms linearly: the formulas at the top of this file. False where the field has no slope to speak of.
+// Measures samples of `from`, each in its tet of `into`, and appends touches of those that are nearer to the
+// surface than the offset, or below it. Where something bends, samples are first measured as if nothing
+// did: most are too far off then, whichever way the bends go, and end there. Only then come the exact place
+// and Newton's method.
 template <class Real>
-bool SurfaceContacts<Real>::find_surface(const LaneView<Real>& view, int body, int tet, const Real weight[4],
-                                         Surface& found) {
-  const int* node = topology_.tets[tet].node;
-  const Real* rest = tables_.rest_positions.data();
-  Real at_rest[3] = {0, 0, 0}, gradient[3];
-  for (int i = 0; i < 4; ++i)
-    for (int c = 0; c < 3; ++c) at_rest[c] += weight[i] * rest[3 * node[i] + c];
-  const Real distance = surface_.bodies[body].field.at(at_rest, gradient);
-  const Real* corner[4];
-  for (int i = 0; i < 4; ++i) corner[i] = node_place(view, node[i]).at;
-  Real edge[3][3], normal[3], now[3] = {0, 0, 0}, volume6 = 0;
-  for (int i = 0; i < 3; ++i)
-    for (int c = 0; c < 3; ++c) edge[i][c] = corner[i + 1][c] - corner[0][c];
-  for (int i = 0; i < 3; ++i) {
-    cross(edge[(i + 1) % 3], edge[(i + 2) % 3], normal);
-    if (i == 0) volume6 = dot(normal, edge[0]);
-    Real rise = 0;
-    for (int c = 0; c < 3; ++c) rise += gradient[c] * (rest[3 * node[i + 1] + c] - rest[3 * node[0] + c]);
-    for (int c = 0; c < 3; ++c) now[c] += rise / volume6 * normal[c];
+void SurfaceContacts<Real>::measure(const LaneView<Real>& view, int from, int into) {
+  const bool from_bends = surface_.bodies[from].phong, into_bends = surface_.bodies[into].phong;
+  const FieldGrid<Real>& field = surface_.bodies[into].field;
+  kernels_.find_surfaces(asked_.data(), int(asked_.size()), rows(), field, columns_of_answers_);
+  if (from_bends || into_bends) {
+    std::size_t bent = 0;
+    for (std::size_t k = 0; k < asked_.size(); ++k) {
+      const PlaceInTet<Real>& one = asked_[k];
+      const Real weight[4] = {answers_[0][k], answers_[1][k], answers_[2][k], answers_[3][k]};
+      // No bend can bring it nearer than by its own length: a field's slope is 1, or little more.
+      Place own, against;
+      own.row = against.row = Row{};
+      const typename Tables::Sample& sample = surface_.samples[one.sample];
+      if (from_bends) own = bend(bends_of(view, sample.tet), sample.weight);
+      if (into_bends) against = bend(bends_of(view, one.tet), weight);
+      constexpr Real steepest = Real(1.2);
+      const Real nearer = std::sqrt(dot(own.at, own.at)) + std::sqrt(dot(against.at, against.at));
+      if (answers_[4][k] > surface_.offset_of(from, into, one.sample) + steepest * nearer) continue;
+      PlaceInTet<Real>& next = asked_[bent++] = PlaceInTet<Real>(one);
+      for (int c = 0; c < 3; ++c) next.place[c] += own.at[c];
+    }
+    asked_.resize(bent);
+    if (into_bends)
+      kernels_.find_bent_surfaces(asked_.data(), int(bent), rows(), field,
+                                  surface_.wall_slack + Real(1e-3) * tables_.skin[into], columns_of_answers_);
+    else
+      kernels_.find_surfaces(asked_.data(), int(bent), rows(), field, columns_of_answers_);
   }
-  return found.set(distance, gradient, now);
+  for (int k = 0; k < int(asked_.size()); ++k) touch(view, from, into, k);
 }
 
-// The same of a surface that Phong Deformation bends. Looks for the weights λ at which x(λ) = Σ λᵢ xᵢ +
-// bend(λ) is the place p, from those of linear deformation on:
-//
-//     off = p − x(λ),    ΔX = F̄⁻¹ off,    λᵢ += ∇λᵢ·ΔX  (∇λᵢ at rest),
-//
-// two times at least and six at most, until |off| is no more than a twentieth of the offset plus a
-// thousandth of the skin. F̄ stands for the derivative of x(X). False where F̄ is nearly flat or inverted
-// (det F̄ ≤ 0.01), and where six steps do not do. `weight` becomes that of the place found. The rows of
-// F̄⁻¹ also give g = F̄⁻ᵀ ∇φ.
+// Where kernels find things of tets and nodes.
 template <class Real>
-bool SurfaceContacts<Real>::find_bent_surface(const LaneView<Real>& view, int body, int tet,
-                                              const Place& place, Real weight[4], Surface& found) {
-  constexpr int usual_steps = 2, max_steps = 6;
-  constexpr Real thin = Real(1e-2);
-  const int* node = topology_.tets[tet].node;
-  const Real* weight_gradient = &surface_.weight_gradients[9 * std::size_t(tet)];
-  const Bends& bends = bends_of(view, tet);
-  const Real exact = surface_.wall_slack + Real(1e-3) * tables_.skin[body];
-  Place row[3];  // of the inverse of the deformation gradient
-  for (int step = 0;; ++step) {
-    Place column[3], off;
-    for (Place& c : column) c.row = Row{};
-    off.row = place.row - bend(bends, weight).row;
-    for (int i = 0; i < 4; ++i) {
-      const Slopes& slopes = slopes_at(view, node[i]);
-      for (int c = 0; c < 3; ++c) column[c].row += weight[i] * slopes.column[c].row;
-      off.row -= weight[i] * node_place(view, node[i]).row;
-    }
-    for (int c = 0; c < 3; ++c)
-      cross(column[(c + 1) % 3].at, column[(c + 2) % 3].at, row[c].at), row[c].at[3] = 0;
-    const Real volume = dot(row[0].at, column[0].at);
-    if (!(volume > thin)) return false;
-    for (int c = 0; c < 3; ++c) row[c].row *= 1 / volume;
-    if (step >= usual_steps && dot(off.at, off.at) <= exact * exact) break;
-    if (step == max_steps) return false;
-    Real way[3];
-    for (int c = 0; c < 3; ++c) way[c] = dot(row[c].at, off.at);
-    for (int i = 0; i < 3; ++i) {
-      const Real more = dot(weight_gradient + 3 * i, way);
-      weight[i + 1] += more, weight[0] -= more;
-    }
-  }
-  const Real* rest = tables_.rest_positions.data();
-  Real at_rest[3] = {0, 0, 0}, gradient[3], now[3] = {0, 0, 0};
-  for (int i = 0; i < 4; ++i)
-    for (int c = 0; c < 3; ++c) at_rest[c] += weight[i] * rest[3 * node[i] + c];
-  const Real distance = surface_.bodies[body].field.at(at_rest, gradient);
-  for (int i = 0; i < 3; ++i)
-    for (int c = 0; c < 3; ++c) now[c] += gradient[i] * row[i].at[c];
-  return found.set(distance, gradient, now);
+SurfaceRows<Real> SurfaceContacts<Real>::rows() const {
+  static_assert(sizeof(typename Tables::Core) == core_numbers * sizeof(Real));
+  static_assert(sizeof(Slopes) == 12 * sizeof(Real) && sizeof(Bends) == 24 * sizeof(Real));
+  return {&places_[0].at[0],
+          row_of_core(0),
+          surface_.cores[0].least,
+          surface_.rest_places.data(),
+          slopes_.empty() ? nullptr : &slopes_[0].column[0].at[0],
+          bends_.empty() ? nullptr : &bends_[0].of_edge[0].at[0],
+          surface_.weight_gradients.data()};
 }
 
 // Whether a place at rest lies in the box of a tet, or no farther out than `slack`, metres. Cores have long
@@ -223,64 +172,31 @@ bool SurfaceContacts<Real>::is_beside(int tet, const Real weight[4], Real slack)
   return true;
 }
 
-// Measures a sample of `from` in a tet of `into`, and appends a touch where it is nearer to the surface
-// than the offset, or below it. Where something bends, the sample is first measured as if nothing did: most
-// candidates are too far off then, whichever way the bends go, and end there. Only then come the exact place
-// and Newton's method.
+// Appends the touch of the k-th that was asked for, if it is one.
 template <class Real>
-bool SurfaceContacts<Real>::measure(const LaneView<Real>& view, int from, int into, int sample, int tet,
-                                    const Real weight[4]) {
-  const Real near = offset(from, into), apart = surface_.offset_of(from, into, sample);
-  for (int c = 0; c < 3; ++c) {  // what is farther off is not in every list
-    const int k = (3 * into + c) * view.stride;
-    const Real at = places_[row_of_sample(sample)].at[c];
-    if (at < view.lower[k] - near || at > view.upper[k] + near) return false;
-  }
-  const bool from_bends = surface_.bodies[from].phong, into_bends = surface_.bodies[into].phong;
-  const typename Tables::Sample& own = surface_.samples[sample];
-  const int* node = topology_.tets[tet].node;
-  Surface surface;
-  if (!find_surface(view, into, tet, weight, surface)) return false;
-  Place place = places_[row_of_sample(sample)];
-  Real against[4];
-  std::copy_n(weight, 4, against);
-  if (from_bends || into_bends) {
-    // No bend can bring it nearer than by its own length: a field's slope is 1, or little more.
-    Place bent, against_bent;
-    bent.row = against_bent.row = Row{};
-    if (from_bends) bent = bend(bends_of(view, own.tet), own.weight);
-    if (into_bends) against_bent = bend(bends_of(view, tet), weight);
-    constexpr Real steepest = Real(1.2);
-    const Real nearer = std::sqrt(dot(bent.at, bent.at)) + std::sqrt(dot(against_bent.at, against_bent.at));
-    if (surface.distance > apart + steepest * nearer) return false;
-    if (from_bends) {
-      place.row += bent.row;
-      if (!barycentric(view, tet, place.at, against)) return false;
-    }
-    if (!(into_bends ? find_bent_surface(view, into, tet, place, against, surface)
-                     : find_surface(view, into, tet, against, surface)))
-      return false;
-  }
+void SurfaceContacts<Real>::touch(const LaneView<Real>& view, int from, int into, int k) {
+  const PlaceInTet<Real>& one = asked_[k];
   SurfaceContact<Real> contact;
-  contact.depth = apart - surface.distance;
-  if (!(contact.depth > 0)) return false;
+  contact.depth = surface_.offset_of(from, into, one.sample) - answers_[4][k];
+  if (!(contact.depth > 0)) return;
+  const Real against[4] = {answers_[0][k], answers_[1][k], answers_[2][k], answers_[3][k]};
+  const bool bends = surface_.bodies[into].phong;
   Real slack = surface_.core_reach;
-  if (into_bends) {
-    const Place way = bend(bends_of(view, tet), against);
+  if (bends) {
+    const Place way = bend(bends_of(view, one.tet), against);
     slack += std::sqrt(dot(way.at, way.at));
   }
-  if (!is_beside(tet, against, slack)) return false;
-  contact.body = from, contact.against = into, contact.sample = sample, contact.tet = tet;
-  share_sample(from, sample, contact);
-  if (into_bends)
-    surface_.spread(tables_.rest_positions.data(), node, against, -1, spread_, shares_);
+  if (!is_beside(one.tet, against, slack)) return;
+  contact.body = from, contact.against = into, contact.sample = one.sample, contact.tet = one.tet;
+  contact.first_against = int(shares_.size());
+  if (bends)
+    surface_.spread(tables_.rest_positions.data(), one.node, against, -1, spread_, shares_);
   else
-    for (int i = 0; i < 4; ++i) shares_.push_back({node[i], -against[i]});
-  contact.last_share = int(shares_.size());
-  std::copy_n(place.at, 3, contact.place);
-  std::copy_n(surface.normal, 3, contact.normal);
+    for (int i = 0; i < 4; ++i) shares_.push_back({one.node[i], -against[i]});
+  contact.last_against = int(shares_.size());
+  std::copy_n(one.place, 3, contact.place);
+  for (int c = 0; c < 3; ++c) contact.normal[c] = answers_[5 + c][k];
   contacts_.push_back(contact);
-  return true;
 }
 
 // What other files call.

@@ -44,19 +44,15 @@ auto SurfaceContacts<Real>::sample_place(const LaneView<Real>& view, int index) 
 // The deformation gradient of a node, F = Σⱼ xⱼ gⱼᵀ over the node and those round it: the mean of its
 // tets', by rest volume. Without a unit.
 template <class Real>
-auto SurfaceContacts<Real>::slopes_at(const LaneView<Real>& view, int node) -> const Slopes& {
-  Slopes& slopes = slopes_[node];
-  unsigned& stamp = stamps_[first_slopes_stamp_ + node];
-  if (stamp == stamp_) return slopes;
-  stamp = stamp_;
+void SurfaceContacts<Real>::find_slopes(const LaneView<Real>& view, int node) {
+  stamps_[first_slopes_stamp_ + node] = stamp_;
   Row sum[3] = {{}, {}, {}};
   for (int k = surface_.first_slope[node]; k < surface_.first_slope[node + 1]; ++k) {
     const typename Tables::Slope& slope = surface_.slopes[k];
     const Row place = node_place(view, slope.node).row;
     for (int c = 0; c < 3; ++c) sum[c] += slope.gradient[c] * place;
   }
-  for (int c = 0; c < 3; ++c) slopes.column[c].row = sum[c];
-  return slopes;
+  for (int c = 0; c < 3; ++c) slopes_[node].column[c].row = sum[c];
 }
 
 // The bend of a tet. A place of weights w, at rest X = Σ wᵢ Xᵢ, is moved away from Σ wᵢ xᵢ by
@@ -66,29 +62,22 @@ auto SurfaceContacts<Real>::slopes_at(const LaneView<Real>& view, int node) -> c
 // since X − Xᵢ = Σⱼ wⱼ (Xⱼ − Xᵢ). `most` is how far the middle of the edge that bends most is moved: there
 // wᵢ wⱼ = ¼ and all other products are 0.
 template <class Real>
-auto SurfaceContacts<Real>::bends_of(const LaneView<Real>& view, int tet) -> const Bends& {
+void SurfaceContacts<Real>::find_bends(const LaneView<Real>& view, int tet) {
   Bends& bends = bends_[tet];
-  unsigned& stamp = stamps_[first_bends_stamp_ + tet];
-  if (stamp == stamp_) return bends;
-  stamp = stamp_;
+  bulges_[tet].stamp = stamp_;
   const int* node = topology_.tets[tet].node;
-  const Real* rest = tables_.rest_positions.data();
+  const Slopes* slopes[4];
+  for (int i = 0; i < 4; ++i) slopes[i] = &slopes_at(view, node[i]);
+  const Real* half = &surface_.half_edges[24 * std::size_t(tet)];
   Real most2 = 0;
-  for (int i = 0, e = 0; i < 4; ++i) {
-    const Slopes& own = slopes_at(view, node[i]);
-    for (int j = i + 1; j < 4; ++j, ++e) {
-      const Slopes& other = slopes_at(view, node[j]);
+  for (int i = 0, e = 0; i < 4; ++i)
+    for (int j = i + 1; j < 4; ++j, ++e, half += 4) {
       Row sum = {};
-      for (int c = 0; c < 3; ++c) {
-        const Real way = Real(0.5) * (rest[3 * node[j] + c] - rest[3 * node[i] + c]);
-        sum += way * (own.column[c].row - other.column[c].row);
-      }
+      for (int c = 0; c < 3; ++c) sum += half[c] * (slopes[i]->column[c].row - slopes[j]->column[c].row);
       bends.of_edge[e].row = sum;
       most2 = std::max(most2, dot(bends.of_edge[e].at, bends.of_edge[e].at));
     }
-  }
-  bends.most = Real(0.25) * std::sqrt(most2);
-  return bends;
+  bulges_[tet].most = Real(0.25) * std::sqrt(most2);
 }
 
 // By how much bending may move what lies in a tet, as far as contact heeds it: no more than the body's
@@ -96,7 +85,9 @@ auto SurfaceContacts<Real>::bends_of(const LaneView<Real>& view, int tet) -> con
 template <class Real>
 Real SurfaceContacts<Real>::bulge_of(const LaneView<Real>& view, int body, int tet) {
   const typename Tables::Body& table = surface_.bodies[body];
-  return table.phong ? std::min(bends_of(view, tet).most, table.bulge) : Real(0);
+  if (!table.phong) return 0;
+  if (bulges_[tet].stamp != stamp_) find_bends(view, tet);
+  return std::min(bulges_[tet].most, table.bulge);
 }
 
 // The same of one sample, whose weights are known.
@@ -123,30 +114,12 @@ auto SurfaceContacts<Real>::bend(const Bends& bends, const Real w[4]) -> Place {
 // at least lᵢ. With s = 1 − Σ lᵢ the corners are Σⱼ lⱼ xⱼ + s xᵢ.
 template <class Real>
 void SurfaceContacts<Real>::find_core(const LaneView<Real>& view, int tet) {
-  unsigned& stamp = stamps_[world_nodes_ + tet];
-  if (stamp == stamp_) return;
-  stamp = stamp_;
+  stamps_[world_nodes_ + tet] = stamp_;
   const typename Tables::Core& core = surface_.cores[tet];
   const int* node = topology_.tets[tet].node;
   Row corner[4], base = core.least[0] * (corner[0] = node_place(view, node[0]).row);
   for (int i = 1; i < 4; ++i) base += core.least[i] * (corner[i] = node_place(view, node[i]).row);
   for (int i = 0; i < 4; ++i) places_[row_of_core(tet) + i].row = base + core.scale * corner[i];
-}
-
-// Begins a touch's list of shares: the nodes that move its sample, with their weights. Those of the other
-// side are appended behind, with minus signs, where there is one; until then the touch has none.
-template <class Real>
-void SurfaceContacts<Real>::share_sample(int body, int index, SurfaceContact<Real>& contact) {
-  contact.first_share = int(shares_.size());
-  if (surface_.bodies[body].phong) {
-    const Share* shares = surface_.shares.data();
-    shares_.insert(shares_.end(), shares + surface_.first_share[index],
-                   shares + surface_.first_share[index + 1]);
-  } else {
-    const typename Tables::Sample& sample = surface_.samples[index];
-    for (int i = 0; i < 4; ++i) shares_.push_back({sample.node[i], sample.weight[i]});
-  }
-  contact.first_against = contact.last_share = int(shares_.size());
 }
 
 }  // namespace limber::fem::detail

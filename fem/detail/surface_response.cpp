@@ -29,21 +29,19 @@ bool SurfaceContacts<Real>::is_rigid(int body) const {
   return world_.bodies[body].kind == BodyKind::rigid;
 }
 
-// Forces are summed by node in forces_ and added to view.f at the end: samples share few nodes. That last
-// loop also sets loads_ and forces_ back to zero for the next call.
+// Forces are summed by node in forces_ and added to view.f at the end, of nodes that move: samples share few
+// nodes. That last loop also sets loads and forces back to zero for the next call.
 template <class Real>
 void SurfaceContacts<Real>::add_forces(int lane, const LaneView<Real>& view, Friction<Real>* friction) {
   find(lane, view);
   if (contacts_.empty()) return;
   share_loads(view);
   for (const SurfaceContact<Real>& contact : contacts_) respond(contact, friction);
-  for (const SurfaceContact<Real>& contact : contacts_)
-    for (int i = contact.first_share; i < contact.last_share; ++i) {
-      const int node = shares_[i].node;
-      if (loads_[node] == 0) continue;
-      for (int c = 0; c < 3; ++c) view.f[view.force.at(node, c)] += forces_[node].at[c];
-      loads_[node] = 0, forces_[node].row = Row{};
-    }
+  for (const int node : loaded_) {
+    const bool moves = tables_.inverse_mass[node] > 0;
+    for (int c = 0; c < 3; ++c) view.f[view.force.at(node, c)] += moves ? forces_[node].at[c] : Real(0);
+    motions_[node].row = forces_[node].row = Row{};
+  }
 }
 
 // The load of a touch by which masses are shared: area × depth, m³.
@@ -57,16 +55,20 @@ Real SurfaceContacts<Real>::load_of(const SurfaceContact<Real>& contact) const {
 template <class Real>
 void SurfaceContacts<Real>::share_loads(const LaneView<Real>& view) {
   for (EffectiveMass& effective_mass : effective_masses_) effective_mass.depths = 0;
+  loaded_.clear();
   for (const SurfaceContact<Real>& contact : contacts_) {
     const Real load = load_of(contact);
-    for (int i = contact.first_share; i < contact.last_share; ++i) {
-      const auto [node, weight] = shares_[i];
-      if (loads_[node] == 0) {
-        const Real* v = view.v + view.state.at(node, 0);
-        velocities_[node].row = Row{v[0], v[view.state.component], v[2 * view.state.component], 0};
+    for (const Shares<Real>& shares : {shares_of(contact), shares_against(contact)})
+      for (const auto [node, weight] : shares) {
+        Place& motion = motions_[node];
+        const Real before = motion.at[3];
+        if (before == 0) {
+          const Real* v = view.v + view.state.at(node, 0);
+          motion.row = Row{v[0], v[view.state.component], v[2 * view.state.component], 0};
+          loaded_.push_back(node);
+        }
+        motion.at[3] = before + load * std::abs(weight) * reciprocal_mass_[node];
       }
-      loads_[node] += load * std::abs(weight) * reciprocal_mass_[node];
-    }
     if (effective_masses_.empty()) continue;
     effective_masses_[contact.body].depths += double(load);
     if (contact.against >= 0) effective_masses_[contact.against].depths += double(load);
@@ -84,43 +86,40 @@ template <class Real>
 void SurfaceContacts<Real>::respond(const SurfaceContact<Real>& contact, Friction<Real>* friction) {
   const Real load = load_of(contact);
   const int side[2] = {contact.body, contact.against};
-  Place relative;
-  relative.row = Row{};
-  Real loads = 0;                           // of what is not rigid
-  Real borne[2] = {0, 0}, all[2] = {0, 0};  // of the force: by nodes that move
-  for (const int k : {0, 1}) {
-    const int begin = k == 0 ? contact.first_share : contact.first_against,
-              end = k == 0 ? contact.first_against : contact.last_share;
-    Real loads_of_side = 0;
-    for (int i = begin; i < end; ++i) {
-      const auto [node, weight] = shares_[i];
-      const Real size = std::abs(weight);
-      all[k] += size;
-      if (tables_.inverse_mass[node] > 0) borne[k] += size;
-      relative.row += weight * velocities_[node].row;
-      // A held node counts with its mass. Without it a sample that hangs on held nodes by 99 hundredths
-      // would throw the node that has the rest.
-      loads_of_side += size * loads_[node];
-    }
-    if (begin < end && !is_rigid(side[k]) && topology_.bodies[side[k]].pushed) loads += loads_of_side;
+  const Shares<Real> shares[2] = {shares_of(contact), shares_against(contact)};
+  const auto [all, borne] = surface_.sizes[contact.sample];
+  Real all_against = 0, borne_against = 0;
+  for (const auto [node, weight] : shares[1]) {
+    all_against += std::abs(weight);
+    if (tables_.inverse_mass[node] > 0) borne_against += std::abs(weight);
+  }
+  // A held node counts with its mass. Without it a sample that hangs on held nodes by 99 hundredths would
+  // throw the node that has the rest.
+  Row relative = {};  // and behind it the loads of a side
+  Real loads = 0;     // of what is not rigid
+  for (int k = 0; k < 2 && side[k] >= 0; ++k) {
+    relative[3] = 0;
+    for (const auto [node, weight] : shares[k])
+      relative += Row{weight, weight, weight, std::abs(weight)} * motions_[node].row;
+    if (!is_rigid(side[k]) && topology_.bodies[side[k]].pushed) loads += relative[3];
   }
   bool any_rigid = false;
   for (const int body : side) any_rigid |= body >= 0 && is_rigid(body);
-  if (!any_rigid && !(borne[0] + borne[1] > 0)) return;
+  if (!any_rigid && !(borne + borne_against > 0)) return;
   Real inverse_mass = loads / load;
   for (const int body : side)
     if (body >= 0 && is_rigid(body))
       inverse_mass += Real(effective_masses_[body].inverse_mass(contact.place, contact.normal, load));
-  const Real push = penalty_push(Real(surface_beta), contact.depth, dot(relative.at, contact.normal),
-                                 1 / inverse_mass, step_);
+  const Real speed[3] = {relative[0], relative[1], relative[2]};
+  const Real push =
+      penalty_push(Real(surface_beta), contact.depth, dot(speed, contact.normal), 1 / inverse_mass, step_);
   if (!(push > 0)) return;
   const Real force[3] = {push * contact.normal[0], push * contact.normal[1], push * contact.normal[2]};
-  for (int i = contact.first_share; i < contact.last_share; ++i) {
-    const auto [node, weight] = shares_[i];
-    if (tables_.inverse_mass[node] > 0) forces_[node].row += weight * Row{force[0], force[1], force[2], 0};
-  }
+  const Row force_row = {force[0], force[1], force[2], 0};
+  for (const Shares<Real>& of_side : shares)
+    for (const auto [node, weight] : of_side) forces_[node].row += weight * force_row;
   // The part of the force that falls on nodes that never move, on both sides or at a wall, moves nothing.
-  const Real share = contact.against < 0 ? borne[0] / all[0] : std::max(borne[0] / all[0], borne[1] / all[1]);
+  const Real share = contact.against < 0 ? borne / all : std::max(borne / all, borne_against / all_against);
   if (records_)
     records_->push_back({contact.body,
                          contact.against,
@@ -129,10 +128,8 @@ void SurfaceContacts<Real>::respond(const SurfaceContact<Real>& contact, Frictio
                          {share * force[0], share * force[1], share * force[2]}});
   if (!friction) return;
   const int other = contact.against < 0 ? contact.body : contact.against;
-  const Share* shares = shares_.data();
   friction->add(contact.body, contact.against, contact.place, contact.normal,
-                tables_.pair_friction[contact.body * bodies_ + other] * push, shares + contact.first_share,
-                shares + contact.first_against, shares + contact.last_share,
+                tables_.pair_friction[contact.body * bodies_ + other] * push, shares[0], shares[1],
                 records_ ? int(records_->size()) - 1 : -1, share);
 }
 

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "fem/detail/kernels.h"
 #include "fem/detail/penalty.h"
 
 #include "core/contact_shape.h"
@@ -24,15 +25,8 @@ struct SurfaceTables {
   struct Core {
     Real least[4], scale;  // scale ≤ 0: there is none
   };
-  struct Field {
-    const std::int16_t* values;  // of the ContactShape that the body shares
-    int nodes[3];
-    Real lower[3], inverse_cell, unit;
-    // The distance at a place at rest, and its gradient; of the nearest place that lies in the grid.
-    Real at(const Real place[3], Real gradient[3]) const;
-  };
   struct Body {
-    Field field;
+    FieldGrid<Real> field;
     bool phong;
     // Phong Deformation moves surfaces away from where linear deformation has them, in each tet by a bend.
     // What it moves farther than `bulge`, metres, may be missed; no tet's bend grows by more than
@@ -55,11 +49,24 @@ struct SurfaceTables {
   // after.
   void spread(const Real* rest, const int node[4], const Real weight[4], Real sign,
               std::vector<Real>& scratch, std::vector<Share>& out) const;
-  std::vector<Share> shares;     // of samples of phong bodies: where they are, by all nodes that move them
+  std::vector<Share> shares;     // of samples: where they are, by all nodes that move them
   std::vector<int> first_share;  // (samples + 1)
-  std::vector<Real> weight_gradients;  // (9 a tet) of the weights of nodes 1 … 3; empty without phong bodies
-  std::vector<Sample> samples;         // ascending by tet
-  std::vector<Real> weights[4];        // of the samples, in columns
+  Shares<Real> shares_of(int sample) const {
+    return {shares.data() + first_share[sample], shares.data() + first_share[sample + 1]};
+  }
+  // (samples) What its weights sum to without signs, and the part of it that is on nodes that move.
+  struct Sizes {
+    Real all, borne;
+  };
+  std::vector<Sizes> sizes;
+  std::vector<Real> rest_places;  // (4 a node) x y z 0
+  // (24 a tet) Half the way along its edges at rest, 01 02 03 12 13 23, each x y z 0; empty without phong
+  // bodies.
+  std::vector<Real> half_edges;
+  // (9 a tet, and one more) of the weights of nodes 1 … 3; empty without phong bodies
+  std::vector<Real> weight_gradients;
+  std::vector<Sample> samples;   // ascending by tet
+  std::vector<Real> weights[4];  // of the samples, in columns; a block more, for kernels
   // (tets) Of the samples of a tet, those from here on hang on nodes that never move alone: no wall pushes
   // them.
   std::vector<int> first_held_sample;

@@ -86,28 +86,19 @@ void SurfaceContacts<Real>::find_walls(int lane, const LaneView<Real>& view, int
                  wall = side < 3 ? least[axis] - bulge : most[axis] + bulge;
       Real in[4];
       for (int i = 0; i < 4; ++i) in[i] = inward * (corner[i][axis] - wall);
+      Real bends_in[6] = {};
+      for (int e = 0; e < 6 && bends; ++e) bends_in[e] = inward * bends->of_edge[e].at[axis];
+      const Real* const weights[4] = {&surface_.weights[0][first], &surface_.weights[1][first],
+                                      &surface_.weights[2][first], &surface_.weights[3][first]};
       Real* const within = within_.data();
-      const Real *w0 = &surface_.weights[0][first], *w1 = &surface_.weights[1][first],
-                 *w2 = &surface_.weights[2][first], *w3 = &surface_.weights[3][first];
-#pragma GCC ivdep
-      for (int k = 0; k < count; ++k)
-        within[k] = w0[k] * in[0] + w1[k] * in[1] + w2[k] * in[2] + w3[k] * in[3];
-      if (bends) {
-        Real h[6];
-        for (int e = 0; e < 6; ++e) h[e] = inward * bends->of_edge[e].at[axis];
-#pragma GCC ivdep
-        for (int k = 0; k < count; ++k)
-          within[k] += w0[k] * (w1[k] * h[0] + w2[k] * h[1] + w3[k] * h[2]) +
-                       w1[k] * (w2[k] * h[3] + w3[k] * h[4]) + w2[k] * w3[k] * h[5];
-      }
-      const int found = kernels_.find_at_most(within, count, Real(0), awake_.data());
+      const int found = kernels_.find_beyond_wall(weights, count, in, bends_in, within, awake_.data());
       for (int i = 0; i < found; ++i) {
         const int k = awake_[i];
         if (!(within[k] < 0)) continue;
         SurfaceContact<Real>& contact = contacts_.emplace_back();
         contact.body = body, contact.against = -1, contact.sample = first + k, contact.tet = -1;
         contact.depth = -within[k];
-        share_sample(body, first + k, contact);
+        contact.first_against = contact.last_against = 0;
         Place place = sample_place(view, first + k);
         if (bends) place.row += bend(*bends, surface_.samples[first + k].weight).row;
         std::copy_n(place.at, 3, contact.place);

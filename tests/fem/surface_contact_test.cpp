@@ -765,6 +765,63 @@ TEST_P(SurfaceContact, AStateIsClearUntilSurfacesAreTooDeep) {
   EXPECT_GT(deep, 3);
 }
 
+// Of places side by side some need more steps of Newton's method than others. Nodes, their slopes and the
+// bends of edges are made up.
+TEST(SurfaceContacts, APlaceIsMeasuredAloneAsBesideOthers) {
+  const World world = build_world(two_balls(0.03, 0.2, true));
+  const auto& tets = world.topology.tets;
+  Rng rng(5, 0);
+  const auto noise = [&](std::size_t count, double size) {
+    std::vector<float> numbers(count);
+    for (float& x : numbers) x = float(rng.uniform(-size, size));
+    return numbers;
+  };
+  std::vector<float> places = noise(4 * std::size_t(world.nodes), 0.03),
+                     slopes = noise(12 * std::size_t(world.nodes), 0.1), bends = noise(24 * tets.size(), 0.1);
+  for (int i = 0; i < 3 * world.nodes; ++i) {
+    places[std::size_t(i / 3 * 4 + i % 3)] += world.tables.rest_positions[std::size_t(i)];
+    slopes[std::size_t(i / 3 * 12 + i % 3 * 5)] += 1;
+  }
+  const detail::SurfaceRows<float> rows{places.data(),
+                                        0,
+                                        nullptr,
+                                        world.surfaces.rest_places.data(),
+                                        slopes.data(),
+                                        bends.data(),
+                                        world.surfaces.weight_gradients.data()};
+  std::vector<detail::PlaceInTet<float>> asked(100);
+  for (auto& one : asked) {
+    one.tet = int(rng.below(int(tets.size() / 2)));
+    std::copy_n(tets[std::size_t(one.tet)].node, 4, one.node);
+    for (int c = 0; c < 3; ++c)
+      one.place[c] =
+          (places[std::size_t(4 * one.node[0] + c)] + places[std::size_t(4 * one.node[1] + c)]) / 2;
+  }
+  for (const auto isa : {detail::Isa::sse2, detail::Isa::avx2, detail::Isa::avx512}) {
+    if (!detail::machine_has(isa)) continue;
+    const auto answers = [&](std::size_t first, std::size_t count) {
+      std::vector<float> columns[8];
+      float* at[8];
+      for (int i = 0; i < 8; ++i) columns[i].resize(count + 16), at[i] = columns[i].data();
+      detail::kernels<float>(isa, 1).find_bent_surfaces(asked.data() + first, int(count), rows,
+                                                        world.surfaces.bodies[0].field, 3e-4f, at);
+      std::vector<std::array<float, 8>> all(count);
+      for (std::size_t k = 0; k < count; ++k)
+        for (std::size_t i = 0; i < 8; ++i) all[k][i] = columns[i][k];
+      return all;
+    };
+    const auto together = answers(0, asked.size());
+    int found = 0;
+    for (std::size_t k = 0; k < asked.size(); ++k) {
+      if (!(together[k][4] < 1e9f)) continue;
+      EXPECT_EQ(together[k], answers(k, 1)[0]) << int(isa) << " " << k;
+      ++found;
+    }
+    EXPECT_GT(found, 50);
+    EXPECT_LT(found, 100);
+  }
+}
+
 TEST_P(SurfaceContact, SameBitsForAnyLanesNeighboursAndInstructionSet) {
   const World world = build_world(barriers_with_bevels(GetParam()));
   Control press;
