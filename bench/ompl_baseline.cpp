@@ -436,8 +436,16 @@ int compare(int argc, char** argv) {
   plan_settings("paper", 1, &scene);
   const std::vector<PreparedBody> bodies = prepare_bodies(scene, {}, options.out);
   const fem::World world = build_world(scene, bodies);
-  if (goal_rules_of(scene).body >= 0 || !scene.via.empty())
+  const GoalRules rules = goal_rules_of(scene);
+  if (rules.body >= 0 || !scene.via.empty())
     throw InputError("ompl_bench: OMPL knows no goal that moves and no goals on the way; take another scene");
+  if (!rules.patches_m.empty() || !rules.through.empty() || rules.turn_tolerance_deg ||
+      rules.shape_tolerance_m || rules.volume > 0 || rules.above >= 0 || rules.below >= 0 ||
+      rules.clear_of >= 0 || scene.planner.max_pressure_pa > 0)
+    throw InputError(
+        "ompl_bench: OMPL's planners are asked for a place of the robot's centre of mass, and pushed at any "
+        "node; this scene asks for more (patches, a shape, holes, a volume, above, below or clear_of), so "
+        "nothing could be compared; take another scene");
   const FemSystem system(world);
 
   struct Row {

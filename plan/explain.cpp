@@ -51,9 +51,12 @@ std::string explain(const Plan& plan) {
     text = fmt::format("{} of {} goals are reached; from there ", plan.leg(), s.via.size() + 1);
   text += plan.best_distance_m <= s.goal.radius_m
               ? fmt::format(
-                    "the robot got into {}, but did not come to rest there within {:g} s, or not as the "
-                    "goal asks (turn, shape, above, below, clear of or through a body): ",
-                    goal, s.settle.max_duration_s) +
+                    "the robot got into {}, but {}not as the goal asks (turn, shape, above, below, clear of "
+                    "or through a body): ",
+                    goal,
+                    s.settle.max_duration_s > 0 ? fmt::format("did not come to rest there within {:g} s, or ",
+                                                              s.settle.max_duration_s)
+                                                : "") +
                     where + ". "
               : fmt::format("no node reached {}; the nearest is {}. ", goal, where);
   switch (plan.ending) {

@@ -640,8 +640,8 @@ constexpr Key all_keys[] = {
      ""},
     {"goal.shape.half_turn", Type::vector, any, 3, may_lack,
      "an axis of any length but 0: turned by half a turn about it from that shape it is as good (a mattress "
-     "that may lie on either face); nothing draws it there, so planner.weights.interpolation and "
-     "settle_force_share must be 0",
+     "that may lie on either face); nothing draws it there, so planner.weights.interpolation must be 0, and "
+     "settle_force_share, too, where there is a settle",
      "", ""},
 
     {"via",

@@ -84,18 +84,27 @@ std::vector<GoalTerm> terms_of(const scenes::Scene& scene, const scenes::Goal& g
     terms.push_back({fmt::format("{} of the robot's pieces in the hole of {}", asked, name(ring)),
                      pieces == asked, fmt::format("{}", pieces)});
   }
-  const char* or_turned = goal.shape && goal.shape->half_turn ? ", or half a turn from it" : "";
-  if (goal.shape && goal.shape->turn_tolerance_deg) {
+  if (!goal.shape) return terms;
+  const auto& half_turn = goal.shape->half_turn;
+  const std::string about = half_turn ? fmt::format(" half a turn about ({:g} {:g} {:g})", half_turn->x(),
+                                                    half_turn->y(), half_turn->z())
+                                      : "";
+  const auto add = [&](const std::string& asked, double most, double found, double as_it_is,
+                       const std::string& told) {
+    terms.push_back({asked + (half_turn ? ", or" + about + " from it" : ""), found <= most,
+                     told + (found < as_it_is ? ", by" + about : "")});
+  };
+  if (goal.shape->turn_tolerance_deg) {
     const double most = *goal.shape->turn_tolerance_deg,
-                 turn = fem::turn_from_goal_shape_deg(world, state, goal.shape->half_turn);
-    terms.push_back({fmt::format("turned within {:g} degrees of the shape asked for{}", most, or_turned),
-                     turn <= most, fmt::format("{:.2f} degrees", turn)});
+                 turn = fem::turn_from_goal_shape_deg(world, state, half_turn);
+    add(fmt::format("turned within {:g} degrees of the shape asked for", most), most, turn,
+        fem::turn_from_goal_shape_deg(world, state), fmt::format("{:.2f} degrees", turn));
   }
-  if (goal.shape && goal.shape->tolerance_m) {
+  if (goal.shape->tolerance_m) {
     const double most = *goal.shape->tolerance_m,
-                 off = fem::distance_from_goal_shape_m(world, state, goal.shape->half_turn);
-    terms.push_back({fmt::format("every node within {:g} m of the shape asked for{}", most, or_turned),
-                     off <= most, fmt::format("{:.4f} m", off)});
+                 off = fem::distance_from_goal_shape_m(world, state, half_turn);
+    add(fmt::format("every node within {:g} m of the shape asked for", most), most, off,
+        fem::distance_from_goal_shape_m(world, state), fmt::format("{:.4f} m", off));
   }
   return terms;
 }
