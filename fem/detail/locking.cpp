@@ -7,10 +7,11 @@
 // Multiplied by it the elements give way as their material does. The material's answer is that of quadratic
 // tets on the cage, and on the cage with each tet cut in eight, extrapolated from the two to finer ones.
 // Loads are those that move the body most easily: a uniform force along each axis where nodes are held,
-// else its four softest modes.
+// else its four softest modes, and those that are as soft as the fourth.
 //
 // What always holds: the result is a multiple of 1/512, so no rounding on the way shows in it; the modes
-// begin from a written seed.
+// begin from a written seed; of modes that are equally soft, as a cube has them, those combinations are taken
+// that the material has for its own, for which of them an eigensolver finds is up to rounding.
 //
 // Tried and not kept (docs/dynamics.md, "One material, any mesh"): the factors of the linear cage to show
 // conjugate gradients the way on the cut mesh. They then took 140 to more than 500 steps in place of 30 to
@@ -26,10 +27,12 @@
 #include <cmath>
 #include <map>
 #include <memory>
+#include <span>
 #include <utility>
 
 #include "core/random.h"
 #include "core/threads.h"
+#include "fem/world.h"
 
 namespace limber::fem::detail {
 namespace {
@@ -39,10 +42,10 @@ using Triplets = std::vector<Eigen::Triplet<double>>;
 using Vector = Eigen::VectorXd;
 using Solver = Eigen::SimplicialLDLT<Sparse>;
 
-// Meshes of more tets are not cut in eight, or, of more than the second number, taken to be fine enough. A
-// free body has six rigid motions as its first modes; the next four count.
+// Meshes of more tets are not cut in eight, or, of more than the second number, taken to be fine enough.
 constexpr int max_refined_tets = 1500, max_tets = 20000;
-constexpr int modes = 4, rigid_modes = 6;
+constexpr int modes = 4;               // that count
+constexpr double equally_soft = 1.01;  // ratio of two modes' ω²
 // Where edges are held stress is singular, and what a mesh of size h is missing falls as h^1.4, so by 2.6
 // when tets are cut. What is then still missing is 1/(2.6 − 1) of the last gain.
 constexpr double still_missing = 0.6;
@@ -342,22 +345,6 @@ Sparse stiffness_at_rest(const ElementLists& elements, const TetMesh& mesh, cons
   return matrix_of(entries, freedoms.count, freedoms.count);
 }
 
-// The softest modes of K and the diagonal mass m, softest first, as columns: K x = ω² m x. Subspace
-// iteration: solve K y = m x for some columns more than are asked for, then take the modes within what
-// these span, twenty times.
-Eigen::MatrixXd softest_modes(const Sparse& k, const Solver& solver, const Vector& m, int count) {
-  Rng rng(19, 0);
-  const int columns = std::min(int(k.rows()), count + 4);
-  Eigen::MatrixXd x = Eigen::MatrixXd::NullaryExpr(k.rows(), columns, [&] { return rng.uniform(-1, 1); });
-  for (int pass = 0; pass < 20; ++pass) {
-    const Eigen::MatrixXd y = solver.solve(m.asDiagonal() * x);
-    const Eigen::GeneralizedSelfAdjointEigenSolver<Eigen::MatrixXd> eigen(y.transpose() * (k * y),
-                                                                          y.transpose() * m.asDiagonal() * y);
-    x = y * eigen.eigenvectors();
-  }
-  return x.leftCols(std::min(columns, count));
-}
-
 // The six rigid motions at small turns, as fields (N × 3): along each axis, and about it through the
 // centre.
 std::vector<Points> rigid_motions(const Points& x) {
@@ -371,6 +358,50 @@ std::vector<Points> rigid_motions(const Points& x) {
     motions.push_back(turn);
   }
   return motions;
+}
+
+// The softest modes of a free body: K x = ω² M x with the diagonal mass M, softest first, apart from its
+// rigid motions. Subspace iteration: solve K y = M x for some columns more than are asked for, then take the
+// modes within what these span, until ω² of those that count stay. Rigid motions are taken out of x and y in
+// each pass: K hardly resists them, so they would soon be all that y has.
+struct Modes {
+  Eigen::MatrixXd shapes;      // as columns: those asked for, and those equally soft as the last of them
+  std::vector<int> same_from;  // of each the first that is equally soft, from one to the next
+};
+Modes softest_modes(const Sparse& k, const Solver& solver, const Vector& m, const Eigen::MatrixXd& rigid,
+                    int count) {
+  constexpr int passes = 200;
+  constexpr double stays = 1e-8;  // of ω²; shapes are then right to its square root
+  Rng rng(19, 0);
+  const int columns = std::min(int(k.rows() - rigid.cols()), count + 8);
+  const Eigen::MatrixXd heavy = m.asDiagonal() * rigid;
+  const Eigen::LDLT<Eigen::MatrixXd> of_rigid(rigid.transpose() * heavy);
+  const auto without_rigid = [&](const Eigen::MatrixXd& of) -> Eigen::MatrixXd {
+    return of - rigid * of_rigid.solve(heavy.transpose() * of);
+  };
+  Eigen::MatrixXd x =
+      without_rigid(Eigen::MatrixXd::NullaryExpr(k.rows(), columns, [&] { return rng.uniform(-1, 1); }));
+  Vector squared;  // ω²
+  Modes modes;
+  for (int pass = 0; pass < passes; ++pass) {
+    const Eigen::MatrixXd y = without_rigid(solver.solve(m.asDiagonal() * x));
+    const Eigen::GeneralizedSelfAdjointEigenSolver<Eigen::MatrixXd> eigen(y.transpose() * (k * y),
+                                                                          y.transpose() * m.asDiagonal() * y);
+    x = y * eigen.eigenvectors();
+    const Vector before = std::exchange(squared, eigen.eigenvalues());
+    modes.same_from.clear();
+    for (int c = 0; c < columns; ++c) {
+      const bool same = c > 0 && squared[c] < equally_soft * squared[c - 1];
+      if (c >= count && !same) break;
+      modes.same_from.push_back(same ? modes.same_from.back() : c);
+    }
+    const Eigen::Index counting = Eigen::Index(modes.same_from.size());
+    if (pass > 0 &&
+        ((squared - before).head(counting).array().abs() < stays * squared.head(counting).array()).all())
+      break;
+  }
+  modes.shapes = x.leftCols(Eigen::Index(modes.same_from.size()));
+  return modes;
 }
 
 // The material's answer at one fineness: the cage itself, or the cage cut in eight. Fields and loads are
@@ -399,18 +430,21 @@ class Level {
     whole_ = std::make_unique<Solver>(stiffness);
     return whole_->info() == Eigen::Success;
   }
-  // The compliance f·u, K u = f: how far a load moves the quadratic tets, as the work that it does. By
-  // elimination, or by preconditioned conjugate gradients: the residual r is answered by ½ D⁻¹ r, D the
-  // diagonal, and by the solution of what is coarser, brought down and up again. That is the level below,
-  // whose tets this one's are cut from, or else the cage. A residual of a thousandth is enough, since the
-  // error of f·u falls with its square.
+  // The compliance f·u: how far a load moves the quadratic tets, as the work that it does. A residual of a
+  // thousandth is enough, since the error of f·u falls with its square.
   double compliance(const Vector& load, double hold, const Solver& cage) const {
+    return load.dot(moved(load, hold, cage, 1e-3));
+  }
+  // u, K u = f. By elimination, or by preconditioned conjugate gradients until the residual is that share of
+  // the load: the residual r is answered by ½ D⁻¹ r, D the diagonal, and by the solution of what is coarser,
+  // brought down and up again. That is the level below, whose tets this one's are cut from, or else the cage.
+  Vector moved(const Vector& load, double hold, const Solver& cage, double residual) const {
     constexpr int most = 2000;
-    if (whole_) return load.dot(whole_->solve(load));
+    if (whole_) return whole_->solve(load);
     const Sparse& from = below_ ? from_below_ : from_coarse;
     const Solver& coarser = below_ ? *below_->whole_ : cage;
     const Vector diagonal = tets.diagonal();
-    const double enough = 1e-3 * load.norm();
+    const double enough = residual * load.norm();
     Vector u = Vector::Zero(load.size()), r = load, p;
     double rz = 0;
     for (int i = 0; i < most && r.norm() > enough; ++i) {
@@ -421,7 +455,7 @@ class Level {
       const double step = rz / p.dot(q);
       u += step * p, r -= step * q;
     }
-    return load.dot(u);
+    return u;
   }
 
  private:
@@ -465,6 +499,35 @@ class Balance {
   Eigen::MatrixXd of_rigid_;  // work of a motion against another's load
 };
 
+// Of what these fields (N × 3) span the material's own modes: G x = γ S x, Gᵢⱼ = fᵢ·uⱼ the compliances and
+// Sᵢⱼ the work of load i along field j. They are the same whichever combinations of them are given.
+void take_the_materials(std::span<Points> fields, const Level& level, const Balance& balance,
+                        const Freedoms& coarse, double hold, const Solver& cage) {
+  const Eigen::Index count = Eigen::Index(fields.size());
+  std::vector<Points> forces;
+  std::vector<Vector> loads;
+  for (const Points& field : fields) {
+    forces.push_back(balance(field));
+    loads.push_back(level.tets.load(level.to_mesh * forces.back()));
+  }
+  Eigen::MatrixXd gives(count, count), size(count, count);
+  for (Eigen::Index j = 0; j < count; ++j) {
+    const Vector moved = level.moved(loads[std::size_t(j)], hold, cage, 1e-6),
+                 along = coarse.from_nodes(forces[std::size_t(j)]);
+    for (Eigen::Index i = 0; i < count; ++i) {
+      gives(i, j) = loads[std::size_t(i)].dot(moved);
+      size(i, j) = (level.from_coarse.transpose() * loads[std::size_t(i)]).dot(along);
+    }
+  }
+  const Eigen::GeneralizedSelfAdjointEigenSolver<Eigen::MatrixXd> own(gives, size);
+  if (own.info() != Eigen::Success) return;
+  for (Eigen::Index k = 0; k < count; ++k) {
+    Points& field = fields[std::size_t(k)];
+    field.setZero();
+    for (Eigen::Index j = 0; j < count; ++j) field += own.eigenvectors()(j, k) * forces[std::size_t(j)];
+  }
+}
+
 }  // namespace
 
 // Solves for each load field on the elements and on the levels of the material. Compliances are divided by
@@ -482,15 +545,23 @@ double locking_share(const TetMesh& rest, const std::vector<bool>& fixed, const 
   const Solver solver(stiffness);
   if (solver.info() != Eigen::Success) return 1;
 
-  std::vector<Points> fields, rigid;  // forces a volume
+  std::vector<Points> fields, rigid;    // forces a volume
+  std::vector<std::size_t> group_ends;  // of fields that are equally soft
   if (hold == 0) {
     for (int axis = 0; axis < 3; ++axis) fields.push_back(Vec3::Unit(axis).transpose().replicate(nodes, 1));
   } else {
     rigid = rigid_motions(rest.positions);
     Vector mass(3 * nodes);
     for (int k = 0; k < 3 * nodes; ++k) mass[k] = node_mass[std::size_t(k / 3)];
-    const Eigen::MatrixXd soft = softest_modes(stiffness, solver, mass, rigid_modes + modes);
-    for (int k = rigid_modes; k < soft.cols(); ++k) fields.push_back(coarse.to_nodes(soft.col(k)));
+    Eigen::MatrixXd motions(coarse.count, Eigen::Index(rigid.size()));
+    for (std::size_t k = 0; k < rigid.size(); ++k) motions.col(Eigen::Index(k)) = coarse.from_nodes(rigid[k]);
+    const Modes soft = softest_modes(stiffness, solver, mass, motions, modes);
+    for (int k = 0; k < soft.shapes.cols(); ++k) {
+      fields.push_back(coarse.to_nodes(soft.shapes.col(k)));
+      if (k > 0 && soft.same_from[std::size_t(k)] == soft.same_from[std::size_t(k - 1)])
+        group_ends.pop_back();
+      group_ends.push_back(fields.size());
+    }
   }
 
   std::vector<Level> levels;
@@ -510,6 +581,13 @@ double locking_share(const TetMesh& rest, const std::vector<bool>& fixed, const 
 
   std::vector<Balance> balance;
   for (const Level& level : levels) balance.emplace_back(level, coarse, rigid);
+  std::size_t begin = 0;
+  for (const std::size_t end : group_ends) {
+    if (end - begin > 1)
+      take_the_materials(std::span(fields).subspan(begin, end - begin), levels[0], balance[0], coarse, hold,
+                         solver);
+    begin = end;
+  }
   struct Gives {
     double coarse = 0, reference = 0;
   };

@@ -25,6 +25,7 @@
 
 #include "core/threads.h"
 #include "fem/detail/locking.h"
+#include "fem/detail/make_body.h"
 #include "fem/detail/spring_weights.h"
 #include "fem/detail/tet_edges.h"
 #include "fem/detail/timestep.h"

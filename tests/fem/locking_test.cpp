@@ -7,6 +7,7 @@
 #include "core/error.h"
 
 #include "fem/reference.h"
+#include "fem/stiffness_share.h"
 #include "tests/fem/laws.h"
 #include "tests/fem/worlds.h"
 
@@ -136,6 +137,30 @@ TEST(Locking, AShareThatIsKnownIsTaken) {
   const World stiffer = build_world(alone(body));
   EXPECT_EQ(stiffer.bodies[0].stiffness_share, 4);
   EXPECT_LT(stiffer.dt_s, found.dt_s);
+}
+
+// A cube has many modes that are equally soft; which of them an eigensolver gives is up to rounding, and its
+// share is not. A third of a turn about a diagonal takes a cube to itself.
+TEST(Locking, WhereABodyStandsDoesNotChangeItsShare) {
+  for (const MaterialModel model : both_models)
+    for (const int cells : {2, 3}) {
+      Material material;
+      material.model = model;
+      material.mesh_independent = true;
+      const auto share_of = [&](TetMesh cage) {
+        return 512 * stiffness_share_of({"cube", std::move(cage), material, {}});
+      };
+      const TetMesh here = cube({0, 0, 0}, 0.6, cells);
+      const double share = share_of(here);
+      for (const Vec3& to : {Vec3(0.1, 0, 0), Vec3(0.6, 1, 1.3), Vec3(-1.0 / 3, 7.7, 0.01)}) {
+        TetMesh there = here, turned = here;
+        there.positions.rowwise() += to.transpose();
+        for (int axis = 0; axis < 3; ++axis)
+          turned.positions.col(axis) = here.positions.col((axis + 1) % 3).array() + to[axis];
+        EXPECT_NEAR(share_of(there), share, 1) << to.transpose();
+        EXPECT_NEAR(share_of(turned), share, 1) << to.transpose();
+      }
+    }
 }
 
 // The finer the mesh, the less there is to mend.
