@@ -82,11 +82,10 @@ std::string explain(const Plan& plan) {
     text += fmt::format(" {} rollouts diverged and {} ended in states that are not acceptable.",
                         statistics.diverged, statistics.rejected);
   if (statistics.refused > 0)
-    text += fmt::format(
-        " {} ways to {} were refused: on them surfaces would be seen to overlap, or to press one another "
-        "through air, by more than limber promises{}.",
-        statistics.refused, goal,
-        statistics.last_refusal.empty() ? "" : "; on the last, " + statistics.last_refusal);
+    text +=
+        fmt::format(" {} ways to {} were refused, each for a frame that breaks what limber promises of it{}.",
+                    statistics.refused, goal,
+                    statistics.last_refusal.empty() ? "" : "; on the last, " + statistics.last_refusal);
   return text;
 }
 

@@ -13,7 +13,6 @@ namespace limber::detail {
 namespace {
 
 // What limber promises on its own scenes, as a share of the robot's size.
-constexpr double largest_penetration = 0.04;
 
 // Promises where contact is on the surfaces that are seen, findings where it is between cages: there surfaces
 // follow the cages that touch, and may overlap or stand apart. Limits are shares of the longest edge of the
@@ -102,7 +101,7 @@ void check_shapes(const MotionFigures& figures, const fem::World& world, Promise
   if (!world.touches_on_surfaces())
     table.row(
         "penetration of cages is at most 4 % of the robot's size",
-        figures.deepest_penetration_m <= largest_penetration * figures.robot_size_m,
+        figures.deepest_penetration_m <= largest_cage_penetration_m(world),
         fmt::format("{:.4f} m, {:.2f} % ({})", figures.deepest_penetration_m,
                     100 * figures.deepest_penetration_m / figures.robot_size_m, figures.penetration_between));
   check_stretch(figures, world, table);

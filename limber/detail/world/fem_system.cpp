@@ -23,8 +23,8 @@ constexpr int preferred_lanes = 16;
 // Goes up where the laws of motion or of what a search refuses change: plans made before are of another
 // world.
 constexpr int edition = 4;
-// The same of contact on fine surfaces alone.
-constexpr int surface_edition = 2;
+// The same of contact on fine surfaces alone, and of contact between cages alone.
+constexpr int surface_edition = 2, cage_edition = 1;
 constexpr int widths[] = {1, 4, 8, 16};
 
 // Nothing where nothing happens by itself.
@@ -68,7 +68,10 @@ std::uint64_t hash_of_world(const fem::World& world) {
   const Vec3 gravity_m_s2 = world.bodies[std::size_t(world.robot)].gravity_m_s2;
   hasher.matrix(gravity_m_s2).value(world.dt_s).value(world.contact_dt_s).value(world.rest_speed_m_s);
   if (world.substeps > 1) hasher.text("substeps").value(world.substeps);
-  if (world.touches_on_surfaces()) hasher.text("surfaces").value(surface_edition);
+  if (world.touches_on_surfaces())
+    hasher.text("surfaces").value(surface_edition);
+  else
+    hasher.text("cages").value(cage_edition);
   for (const double offset : world.surfaces64.offset) hasher.value(offset);
   for (const double offset : world.surfaces64.own_offset) hasher.value(offset);
   if (!world.part_overlaps) hasher.text("overlaps are refused");
@@ -449,23 +452,32 @@ bool FemSystem::bears_contact(const State& state) const {
   return bears;
 }
 std::size_t FemSystem::first_refused(std::span<const State> frames) const {
-  if (!surfaces_ || !world_.touches_on_surfaces()) return frames.size();
+  if (!surfaces_) return frames.size();
   const SeenLimits limits;
+  const bool on_surfaces = world_.touches_on_surfaces();
+  const double deepest_m = largest_cage_penetration_m(world_);
   const std::size_t at_once = 8 * std::size_t(thread_count());
-  std::vector<SeenFrame> seen(frames.size());
-  const auto overlaps = [&](const SeenFrame& frame) {
-    return frame.overlap_m > limits.overlap * surface_size_m_ ||
-           frame.self_overlap_m > limits.self_overlap * surface_size_m_;
+  std::vector<SeenFrame> seen(on_surfaces ? frames.size() : 0);
+  std::vector<char> overlaps(frames.size());
+  const auto look_at = [&](std::size_t f) {
+    if (!on_surfaces) {
+      overlaps[f] = fem::deepest_penetration(world_, frames[f]).depth_m > deepest_m;
+      return;
+    }
+    seen[f] = surfaces_->at(frames[f]);
+    overlaps[f] = seen[f].overlap_m > limits.overlap * surface_size_m_ ||
+                  seen[f].self_overlap_m > limits.self_overlap * surface_size_m_;
   };
   for (std::size_t from = 0; from < frames.size(); from += at_once) {
     const std::size_t to = std::min(from + at_once, frames.size());
     parallel_for(int(to - from), [&](int i) {
       throw_if_stopped();
-      seen[from + std::size_t(i)] = surfaces_->at(frames[from + std::size_t(i)]);
+      look_at(from + std::size_t(i));
     });
     for (std::size_t f = from; f < to; ++f)
-      if (overlaps(seen[f])) return f;
+      if (overlaps[f]) return f;
   }
+  if (!on_surfaces) return frames.size();
   // Of one leg alone: what presses in a motion of several does so in its own leg, too.
   keep_what_presses(seen);
   const auto gapes = [&](const SeenFrame& frame) {
@@ -477,8 +489,16 @@ std::size_t FemSystem::first_refused(std::span<const State> frames) const {
 }
 std::string FemSystem::why_refused(const State& state) const {
   const SeenLimits limits;
-  const SeenFrame seen = surfaces_->at(state);
   const auto name = [&](int body) { return world_.bodies[std::size_t(body)].name; };
+  if (!world_.touches_on_surfaces()) {
+    const fem::Penetration deepest = fem::deepest_penetration(world_, state);
+    const double share = largest_cage_penetration * deepest.depth_m / largest_cage_penetration_m(world_);
+    return fmt::format("the cage of {} goes {:.2f} % of the robot's size into {}, beyond {:g} %",
+                       name(deepest.body), 100 * share,
+                       deepest.other < 0 ? "a wall" : "that of " + name(deepest.other),
+                       100 * largest_cage_penetration);
+  }
+  const SeenFrame seen = surfaces_->at(state);
   const auto percent = [&](double m) { return 100 * m / surface_size_m_; };
   if (seen.overlap_m > limits.overlap * surface_size_m_)
     return fmt::format("{} and {} overlap by {:.2f} % of the robot's size, beyond {:g} %",

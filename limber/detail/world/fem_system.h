@@ -41,8 +41,9 @@ class FemSystem final : public plan::System {
   explicit FemSystem(const fem::World& world, const GoalRules& = {},
                      std::optional<State> start = std::nullopt);
   // For searches: ways are refused on which surfaces are deeper in one another, or in themselves, or press
-  // one another through a wider gap, than SeenLimits has it, where contact is on them. The bodies must
-  // outlive it.
+  // one another through a wider gap, than SeenLimits has it, where contact is on them, and on which cages go
+  // deeper into one another or a wall than largest_cage_penetration_m where it is between those. The bodies
+  // must outlive it.
   FemSystem(const fem::World&, const std::vector<PreparedBody>&, const GoalRules&,
             std::optional<State> start = std::nullopt);
 

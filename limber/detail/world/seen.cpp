@@ -146,6 +146,11 @@ void keep_what_presses(std::vector<SeenFrame>& frames) {
                   [&](const SeenFrame::Gap& gap) { return !(gap.force_n > pressing_share * largest_n); });
 }
 
+double largest_cage_penetration_m(const fem::World& world) {
+  const TetMesh& cage = world.bodies[std::size_t(world.robot)].cage;
+  return largest_cage_penetration * bounding_box(cage.positions).size().maxCoeff();
+}
+
 std::vector<SeenFrame> measure_seen(const Surfaces& surfaces, const std::vector<State>& frames) {
   std::vector<SeenFrame> seen(frames.size());
   parallel_for(int(frames.size()), [&](int f) {

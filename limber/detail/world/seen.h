@@ -23,6 +23,11 @@ struct SeenLimits {
   double min_stretch = 0.5, largest_stretch = 2;
 };
 
+// What is promised where contact is between cages: how deep one goes into another or a wall, as a share of
+// the longest edge of the robot's cage's box at rest.
+constexpr double largest_cage_penetration = 0.04;
+double largest_cage_penetration_m(const fem::World&);
+
 struct SeenFrame {
   double overlap_m = 0;  // deepest of two surfaces, at least one of which moves
   int overlap_body = -1, overlap_other = -1;
