@@ -67,6 +67,9 @@ std::string what_is_wrong(const CLI::App& program, int argc, const char* const* 
   }
   std::vector<std::string> commands;
   for (const CLI::App* one : command->get_subcommands({})) commands.push_back(one->get_name());
+  const bool sets = std::any_of(argv, argv + argc, [](std::string_view word) { return word == "--set"; });
+  if (commands.empty() && sets && complaint.find('=') != complaint.npos)
+    return fmt::format("{}; each KEY=VALUE wants a --set of its own", complaint);
   if (commands.empty()) return fmt::format("{}; see {} --help", complaint, name);
   return fmt::format("{} needs a command, one of {}; see {} --help", name, fmt::join(commands, ", "), name);
 }

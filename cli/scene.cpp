@@ -40,6 +40,7 @@ void add_start(const StartFindings& start, const std::optional<fs::path>& still,
   json["dt_s"] = start.dt_s ? Json(*start.dt_s) : Json();
   for (const GoalTerm& term : start.goal)
     json["goal"].push_back({{"asked", term.asked}, {"found", term.found}, {"met", term.met}});
+  if (!start.asked_too.empty()) json["goal_asks_too"] = start.asked_too;
   if (!start.rigid_passage_json.empty())
     json["rigid_passage"] = parse_json(start.rigid_passage_json, "rigid_passage");
   Json& estimate = json["estimate"];
@@ -88,8 +89,10 @@ std::string text_of(const SceneFindings& found, const StartFindings& start,
   std::string text = line("time step", start.dt_s ? fmt::format("{:.3g} ms", 1e3 * *start.dt_s)
                                                   : "not known before cages are made; --work DIR makes them");
   for (const GoalTerm& term : start.goal)
-    text += line("goal", fmt::format("{}: {}{}{}", term.asked, start.prepared ? "" : "about ", term.found,
-                                     term.met ? ", met" : ""));
+    text += line("goal", fmt::format("{}: {}{}", term.asked, term.found, term.met ? ", met" : ""));
+  if (!start.asked_too.empty())
+    text += line("goal", fmt::format("{}: not known before bodies are prepared; --work DIR tells",
+                                     fmt::join(start.asked_too, ", ")));
   text += line("to prepare",
                start.prepared
                    ? "done"

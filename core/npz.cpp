@@ -535,6 +535,17 @@ NpzReader::~NpzReader() = default;
 const std::set<std::string>& NpzReader::arrays() const { return archive_->array_names_; }
 const std::set<std::string>& NpzReader::texts() const { return archive_->text_names_; }
 
+bool NpzReader::bare() const {
+  // Heads of an entry, in its place and in the directory, and the directory's own end; beyond 4 GiB those of
+  // zip64 come on top.
+  constexpr std::uint64_t local = 30, central = 46, end = 22, local64 = 20, central64 = 28, end64 = 76;
+  std::uint64_t least = end, more = end64;
+  for (const auto* entries : {&archive_->arrays_, &archive_->texts_})
+    for (const auto& [name, entry] : *entries)
+      least += local + central + 2 * entry.name.size() + entry.size, more += local64 + central64;
+  return archive_->bytes_ >= least && archive_->bytes_ - least <= (least >> 32 ? more : 0);
+}
+
 NpyArray NpzReader::head(const std::string& name) const {
   const Archive::Entry& entry = archive_->arrays_.at(name);
   return archive_->head(archive_->opened(entry).get(), entry).array;

@@ -130,6 +130,8 @@ class NpzReader {
   ~NpzReader();
   const std::set<std::string>& arrays() const;  // their names
   const std::set<std::string>& texts() const;
+  // Nothing is in the file but these, none of them packed: as write_npz() has it.
+  bool bare() const;
   NpyArray head(const std::string& array) const;  // without its elements
   void read(const std::string& array, const Take&) const;
   NpyArray array(const std::string& name) const;

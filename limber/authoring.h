@@ -84,7 +84,8 @@ struct TriedSearch {
 struct StartFindings {
   bool prepared = false;
   std::optional<double> dt_s;
-  std::vector<GoalTerm> goal;      // where it is not prepared, of the middles of surfaces
+  std::vector<GoalTerm> goal;          // where it is not prepared, of the middles of surfaces
+  std::vector<std::string> asked_too;  // keys of the goal that only prepared bodies can answer
   std::string rigid_passage_json;  // the text of a JSON object (docs/cli.md); empty where nothing was tried
   std::optional<TriedSearch> tried;
   double frames_a_second = 0;     // of the film, a second of motion

@@ -1133,6 +1133,10 @@ constexpr Key all_keys[] = {
   if (key.path == "goal" && node.array())
     complain(node.where,
              "there is one goal, the last; write [goal], and [[via]] for each that comes before it");
+  if (shown.ends_with(']') && !key.path.ends_with("]"))
+    complain(node.where, fmt::format("{} must be {}; its element {} is {}; write for example {}",
+                                     shown.substr(0, shown.rfind('[')), key.expected(),
+                                     shown.substr(shown.rfind('[')), node.type_name(), key.example()));
   complain(node.where, fmt::format("{} must be {}, not {}; write for example {}", shown, key.expected(),
                                    node.type_name(), key.example()));
 }

@@ -752,6 +752,11 @@ List of_what_nobody_reads() {
     });
   add_to_plan("a key twice", "has the key \"solved\" twice",
               [](Npz& npz) { npz.texts.at("meta.json").insert(1, "\n  \"solved\": false,"); });
+  list.push_back({"a comment of the archive", more, [](Mutant& m) {
+                    std::string bytes = read_file(m.folder / "plan.npz");
+                    bytes[bytes.size() - 2] = 4;
+                    write_file(m.folder / "plan.npz", bytes + "more");
+                  }});
   for (const bool before : {true, false})
     list.push_back({std::string("bytes ") + (before ? "before" : "after") + " the archive", "plan.npz",
                     [before](Mutant& m) {

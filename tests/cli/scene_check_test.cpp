@@ -126,6 +126,16 @@ TEST_F(SceneCheck, AGoalWithinARigidBodyIsTold) {
   EXPECT_FALSE(is_told("deformable", "center_of_mass_m = [2, 1, 0.45]\nradius_m = 0.19"));
 }
 
+TEST_F(SceneCheck, WhatElseAGoalAsksForIsTold) {
+  const auto goals = [&](const std::string& more) {
+    const std::string text = with(small_scene, "radius_m = 0.3", "radius_m = 0.3\n" + more);
+    return limber_program({"scene", "check", scene(text)}).out;
+  };
+  const std::string both = goals("above = \"block\"\nshape = { angle_deg = 9, turn_tolerance_deg = 5 }");
+  EXPECT_NE(both.find("goal.shape, goal.above: not known before"), std::string::npos) << both;
+  EXPECT_EQ(goals("").find("not known before bodies are prepared; --work DIR tells"), std::string::npos);
+}
+
 TEST_F(SceneCheck, ABoxBesideTheBodyThatItShouldHoldIsTold) {
   const auto warnings = [&](double from) {
     return limber_program({"scene", "check",

@@ -280,6 +280,9 @@ TEST_F(Program, AMistypedCommandOrOptionIsNamedWithWhatWasMeant) {
     EXPECT_NE(limber_program(as_json).json().at("error").get<std::string>().find(told), std::string::npos);
   }
   EXPECT_NE(limber_program({"plan", "x"}).err.find("--out is required"), std::string::npos);
+  EXPECT_NE(limber_program({"plan", "x", "-o", "y", "--set", "a.b=1", "c.d=2"})
+                .err.find("c.d=2; each KEY=VALUE wants a --set of its own"),
+            std::string::npos);
   // A value that cannot be: limber says so, and where to read on.
   for (const auto& [words, told] : std::vector<std::pair<std::vector<std::string>, std::string>>{
            {{"render", "x", "--bits", "12"}, "limber: --bits: 12 not in {8,16}; see limber render --help"},

@@ -92,6 +92,17 @@ TEST(Files, SameArraysGiveTheSameBytes) {
   EXPECT_EQ(read_file(folder / "a.npz"), read_file(folder / "b.npz"));
 }
 
+TEST(Files, WhatAnArchiveHoldsBesideItsEntriesIsSeen) {
+  const TemporaryFolder folder;
+  write_npz(folder / "a.npz", arrays());
+  EXPECT_TRUE(NpzReader(folder / "a.npz").bare());
+  std::string bytes = read_file(folder / "a.npz");
+  bytes[bytes.size() - 2] = 4;  // so long is the archive's comment
+  write_file(folder / "a.npz", bytes + "more");
+  EXPECT_EQ(read_npz(folder / "a.npz").text("meta.json"), arrays().text("meta.json"));
+  EXPECT_FALSE(NpzReader(folder / "a.npz").bare());
+}
+
 // A file that lost its end is never taken for a smaller file.
 TEST(Files, EveryTruncatedPrefixIsAnInputError) {
   const TemporaryFolder folder;

@@ -283,16 +283,23 @@ class Check {
             fmt::format("centre of mass within {:g} m of ({:g} {:g} {:g})", goal.radius_m,
                         goal.center_of_mass_m.x(), goal.center_of_mass_m.y(), goal.center_of_mass_m.z()),
         term.met = away <= goal.radius_m;
-      term.found = fmt::format("{:.3g} m from its middle", away);
+      term.found = fmt::format("about {:.3g} m from its middle", away);
       add_goal(which, {term});
       return term.met;
     };
     for (std::size_t v = 0; v < scene_.via.size(); ++v)
       look(fmt::format("via {}: ", v + 1), scene_.via[v].goal);
     const scenes::Goal& goal = scene_.goal;
-    const bool there = look("", goal), more = goal.shape || goal.above >= 0 || goal.below >= 0 ||
-                                              goal.clear_of >= 0 || goal.volume > 0 || !goal.through.empty();
-    if (there && !more && scene_.via.empty()) already_there();
+    const bool there = look("", goal);
+    std::vector<std::string>& more = found_.start->asked_too;
+    for (const auto& [key, asked] : {std::pair("shape", goal.shape.has_value()),
+                                     {"above", goal.above >= 0},
+                                     {"below", goal.below >= 0},
+                                     {"clear_of", goal.clear_of >= 0},
+                                     {"volume", goal.volume > 0},
+                                     {"through", !goal.through.empty()}})
+      if (asked) more.push_back(fmt::format("goal.{}", key));
+    if (there && more.empty() && scene_.via.empty()) already_there();
   }
 
   void already_there() {

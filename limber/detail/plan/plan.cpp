@@ -201,6 +201,18 @@ scenes::Scene read_scene(const PlanOptions& options) {
   return scene;
 }
 
+// Early enough to stop it.
+static void tell_what_is_replaced(const fs::path& folder) {
+  if (!fs::exists(folder / "plan.npz")) return;
+  try {
+    const PlanFolder there = read_plan_folder(folder);
+    log::info("{}: is replaced when this search ends: a {} of {}, seed {}", (folder / "plan.npz").string(),
+              there.plan.simulation ? "simulation" : "plan", there.scene.name, there.plan.settings.seed);
+  } catch (const InputError& error) {
+    log::info("{}", error.what());
+  }
+}
+
 KeptPlan plan(const PlanOptions& options) {
   const scenes::Scene scene = read_scene(options);
   require_other_folder(options.from, options.out);
@@ -264,6 +276,7 @@ Found make_better(const scenes::Scene& scene, const FemSystem& system, const Pla
 KeptPlan plan(const PlanOptions& options, const scenes::Scene& scene) {
   const std::optional<OtherMotion> other = read_other_motion(options.from, options.frame);
   make_folder(options.out);
+  if (!options.resume) tell_what_is_replaced(options.out);
   remove_abandoned(options.out);
   const std::vector<PreparedBody> bodies =
       prepare_bodies(scene, options.scene.data, options.out, options.scene.store, options.from);
