@@ -400,13 +400,13 @@ class Listener final : public Watcher {
 
 TEST_F(Library_slow, TwoPlansSideBySideAndOneIsStopped) {
   const Problem problem = small_problem();
-  const std::string whole = problem.solve({.seed = 5}).tree_hash();
+  const std::string whole = problem.solve({.seed = 6}).tree_hash();
   Listener patient, hasty(3);
   std::optional<Plan> one, other;
   {
-    std::jthread a([&] { one = problem.solve({.seed = 5}, {.watcher = &patient, .threads = 2}); });
+    std::jthread a([&] { one = problem.solve({.seed = 6}, {.watcher = &patient, .threads = 2}); });
     std::jthread b([&] {
-      other = problem.solve({.seed = 6, .iterations = 1000000}, {.watcher = &hasty, .threads = 1});
+      other = problem.solve({.seed = 7, .iterations = 1000000}, {.watcher = &hasty, .threads = 1});
     });
   }
   EXPECT_EQ(one->tree_hash(), whole);
@@ -414,8 +414,8 @@ TEST_F(Library_slow, TwoPlansSideBySideAndOneIsStopped) {
   EXPECT_THAT(other->explanation(), HasSubstr("It was stopped after"));
   EXPECT_FALSE(patient.stages.empty());
   // Nothing is left behind for the next call, nor for the command.
-  EXPECT_EQ(problem.solve({.seed = 5}).tree_hash(), whole);
-  EXPECT_EQ(limber_program({"plan", path("small.toml"), "-o", path("out"), "--seed", "5"}).code, 0);
+  EXPECT_EQ(problem.solve({.seed = 6}).tree_hash(), whole);
+  EXPECT_EQ(limber_program({"plan", path("small.toml"), "-o", path("out"), "--seed", "6"}).code, 0);
 }
 
 TEST_F(Library_slow, ASearchThatWasCutGoesOnAsIfItHadNotBeen) {

@@ -176,7 +176,9 @@ std::string odd_entry(const fs::path& folder, const PlanFolder& planned,
     if (!again.arrays.contains(name) || !holds(now, name, again.arrays.at(name))) return name + ".npy";
   for (const std::string& name : now.texts())
     if (!again.texts.contains(name) || again.texts.at(name) != now.text(name)) return name;
-  return now.bare() ? "" : "what lies between or behind its entries";  // what lacks was not read
+  return now.bare()
+             ? ""
+             : "the way its entries lie in it (packed, or more beside them)";  // what lacks was not read
 }
 
 PlanFolder read_plan_folder(const fs::path& folder) {
