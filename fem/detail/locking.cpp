@@ -27,6 +27,7 @@
 #include <cmath>
 #include <map>
 #include <memory>
+#include <numeric>
 #include <span>
 #include <utility>
 
@@ -345,17 +346,43 @@ Sparse stiffness_at_rest(const ElementLists& elements, const TetMesh& mesh, cons
   return matrix_of(entries, freedoms.count, freedoms.count);
 }
 
-// The six rigid motions at small turns, as fields (N × 3): along each axis, and about it through the
-// centre.
-std::vector<Points> rigid_motions(const Points& x) {
+// Of each node the least one that tets join it to.
+std::vector<int> piece_of_nodes(const TetMesh& mesh) {
+  std::vector<int> up(std::size_t(mesh.positions.rows()));
+  std::iota(up.begin(), up.end(), 0);
+  const auto top = [&](int n) {
+    while (up[std::size_t(n)] != n) n = up[std::size_t(n)] = up[std::size_t(up[std::size_t(n)])];
+    return n;
+  };
+  for (Eigen::Index t = 0; t < mesh.tets.rows(); ++t)
+    for (int i = 1; i < 4; ++i) {
+      const auto [least, other] = std::minmax({top(mesh.tets(t, 0)), top(mesh.tets(t, i))});
+      up[std::size_t(other)] = least;
+    }
+  for (int n = 0; n < int(up.size()); ++n) up[std::size_t(n)] = top(n);
+  return up;
+}
+
+// The six rigid motions at small turns of each piece of the body, as fields (N × 3): along each axis, and
+// about it through the piece's centre.
+std::vector<Points> rigid_motions(const TetMesh& mesh) {
+  const std::vector<int> piece = piece_of_nodes(mesh);
   std::vector<Points> motions;
-  const Eigen::RowVector3d center = x.colwise().mean();
-  for (int axis = 0; axis < 3; ++axis) {
-    const Vec3 along = Vec3::Unit(axis);
-    motions.push_back(along.transpose().replicate(x.rows(), 1));
-    Points turn(x.rows(), 3);
-    for (int n = 0; n < x.rows(); ++n) turn.row(n) = along.cross((x.row(n) - center).transpose()).transpose();
-    motions.push_back(turn);
+  for (int first = 0; first < int(piece.size()); ++first) {
+    if (piece[std::size_t(first)] != first) continue;
+    std::vector<int> nodes;
+    for (int n = first; n < int(piece.size()); ++n)
+      if (piece[std::size_t(n)] == first) nodes.push_back(n);
+    const Eigen::RowVector3d center = Points(mesh.positions(nodes, Eigen::all)).colwise().mean();
+    for (int axis = 0; axis < 3; ++axis) {
+      const Vec3 along = Vec3::Unit(axis);
+      Points shift = Points::Zero(mesh.positions.rows(), 3), turn = shift;
+      for (const int n : nodes) {
+        shift.row(n) = along.transpose();
+        turn.row(n) = along.cross((mesh.positions.row(n) - center).transpose()).transpose();
+      }
+      motions.insert(motions.end(), {shift, turn});
+    }
   }
   return motions;
 }
@@ -550,7 +577,7 @@ double locking_share(const TetMesh& rest, const std::vector<bool>& fixed, const 
   if (hold == 0) {
     for (int axis = 0; axis < 3; ++axis) fields.push_back(Vec3::Unit(axis).transpose().replicate(nodes, 1));
   } else {
-    rigid = rigid_motions(rest.positions);
+    rigid = rigid_motions(rest);
     Vector mass(3 * nodes);
     for (int k = 0; k < 3 * nodes; ++k) mass[k] = node_mass[std::size_t(k / 3)];
     Eigen::MatrixXd motions(coarse.count, Eigen::Index(rigid.size()));

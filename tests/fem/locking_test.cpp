@@ -163,6 +163,19 @@ TEST(Locking, WhereABodyStandsDoesNotChangeItsShare) {
     }
 }
 
+// Pieces that nothing joins move apart without any stiffness, and are none the softer for it.
+TEST(Locking, TwoPiecesHaveTheShareOfOne) {
+  Material material;
+  material.mesh_independent = true;
+  const TetMesh one = cube({0, 0, 0}, 0.6, 2);
+  const Eigen::Index nodes = one.positions.rows(), tets = one.tets.rows();
+  TetMesh two{Points(2 * nodes, 3), Tets(2 * tets, 4)};
+  two.positions << one.positions, one.positions.rowwise() + Eigen::RowVector3d(1, 0, 0.3);
+  two.tets << one.tets, (one.tets.array() + int(nodes)).matrix();
+  EXPECT_NEAR(512 * stiffness_share_of({"two", two, material, {}}),
+              512 * stiffness_share_of({"one", one, material, {}}), 1);
+}
+
 // The finer the mesh, the less there is to mend.
 TEST(Locking_slow, FineMeshesNeedLess) {
   for (const MaterialModel model : both_models) {
