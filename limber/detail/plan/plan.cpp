@@ -201,17 +201,20 @@ scenes::Scene read_scene(const PlanOptions& options) {
   return scene;
 }
 
+namespace {
+
 // Early enough to stop it.
-static void tell_what_is_replaced(const fs::path& folder) {
+void tell_what_is_replaced(const fs::path& folder) {
   if (!fs::exists(folder / "plan.npz")) return;
   try {
     const PlanFolder there = read_plan_folder(folder);
     log::info("{}: is replaced when this search ends: a {} of {}, seed {}", (folder / "plan.npz").string(),
               there.plan.simulation ? "simulation" : "plan", there.scene.name, there.plan.settings.seed);
-  } catch (const InputError& error) {
-    log::info("{}", error.what());
+  } catch (const InputError&) {  // it is no plan
   }
 }
+
+}  // namespace
 
 KeptPlan plan(const PlanOptions& options) {
   const scenes::Scene scene = read_scene(options);

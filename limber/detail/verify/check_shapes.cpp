@@ -12,8 +12,6 @@ namespace limber::detail {
 
 namespace {
 
-// What limber promises on its own scenes, as a share of the robot's size.
-
 // Promises where contact is on the surfaces that are seen, findings where it is between cages: there surfaces
 // follow the cages that touch, and may overlap or stand apart. Limits are shares of the longest edge of the
 // box of the robot's surface at rest (docs/seen.md).
