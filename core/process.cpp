@@ -27,6 +27,24 @@ fs::path program_file() {
   return fs::read_symlink("/proc/self/exe", none);
 }
 
+long long start_of_process(long long pid) {
+  try {
+    const std::string stat = read_file(fmt::format("/proc/{}/stat", pid));
+    std::size_t at = stat.rfind(')');  // the name may hold anything
+    if (at != stat.npos && stat.compare(at, 3, ") Z") == 0) return 0;
+    for (int field = 2; field < 22 && at != stat.npos; ++field) at = stat.find(' ', at + 1);
+    return at == stat.npos ? 0 : std::atoll(stat.c_str() + at);
+  } catch (const InputError&) {
+    return 0;
+  }
+}
+
+bool has_ended(long long pid) {
+  static const bool told = start_of_process(::getpid()) != 0;
+  if (::kill(pid_t(pid), 0) != 0) return errno == ESRCH;  // of another user /proc may not tell
+  return told && start_of_process(pid) == 0;
+}
+
 std::vector<char*> pointers_to(const std::vector<std::string>& words) {
   std::vector<char*> argv;
   for (const std::string& word : words) argv.push_back(const_cast<char*>(word.c_str()));

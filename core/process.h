@@ -15,6 +15,13 @@ bool is_in_path(const std::string& program);
 // The file of the program that runs, as other processes find it.
 fs::path program_file();
 
+// When the process began, in ticks since the machine did: a number is given again, this is not. 0: it has
+// ended, though nobody may have asked how yet (a zombie), or this system does not tell.
+long long start_of_process(long long pid);
+
+// False, too, where this system does not tell.
+bool has_ended(long long pid);
+
 // As execv takes it; they point into the words.
 std::vector<char*> pointers_to(const std::vector<std::string>& words);
 

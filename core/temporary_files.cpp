@@ -3,14 +3,13 @@
 #include <unistd.h>
 
 #include <atomic>
-#include <cerrno>
 #include <chrono>
-#include <csignal>
 #include <regex>
 #include <vector>
 
 #include "core/error.h"
 #include "core/hash.h"
+#include "core/process.h"
 
 namespace limber {
 
@@ -46,9 +45,8 @@ int remove_abandoned(const fs::path& folder) {
     std::smatch parts;
     if (!std::regex_match(name, parts, temporary) || !entry.is_regular_file(none)) continue;
     const auto written = entry.last_write_time(none);
-    const bool gone = ::kill(pid_t(std::stol(parts[2])), 0) != 0 && errno == ESRCH;
     if (parts[1] == place_of_processes()
-            ? gone
+            ? has_ended(std::stol(parts[2]))
             : written < fs::file_time_type::clock::now() - std::chrono::hours(24))
       abandoned.push_back(entry.path());
   }

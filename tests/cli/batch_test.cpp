@@ -7,11 +7,13 @@
 
 #include <chrono>
 #include <cmath>
+#include <fstream>
 #include <map>
 #include <numbers>
 #include <sstream>
 
 #include "core/random.h"
+#include "core/temporary_files.h"
 #include "tests/cli/program.h"
 #include "tests/places.h"
 
@@ -130,6 +132,15 @@ TEST_F(Batch_slow, OneThatFailsFailsAloneAndTheSecondTimeNothingIsDone) {
   EXPECT_NE(page.find("src=\"data:image/png"), std::string::npos);
 
   const auto before = result("out");
+  // As a process leaves it that was killed while another already looked at the folder.
+  const pid_t ended = ::fork();
+  if (ended == 0) {
+    std::ofstream(
+        temporary_name(fs::path(out()) / row.at("a.obj").at("folder").get<std::string>() / "report.json"));
+    ::_exit(0);
+  }
+  ::waitpid(ended, nullptr, 0);
+  ASSERT_NE(result("out"), before);
   const Ended second = prepare(models(), "out");
   EXPECT_EQ(second.code, exit_models_failed);
   EXPECT_EQ(second.json.at("up_to_date"), 2);

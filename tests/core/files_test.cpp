@@ -11,6 +11,7 @@
 #include "core/json.h"
 #include "core/mesh_files.h"
 #include "core/npz.h"
+#include "core/process.h"
 #include "core/random.h"
 #include "core/temporary_files.h"
 #include "tests/core/temporary_folder.h"
@@ -241,7 +242,13 @@ struct Writer {
     LIMBER_CHECK(::read(ready[0], &byte, 1) == 1, errno);
     ::close(ready[0]), ::close(ready[1]);
   }
-  void kill() const { ::kill(process, SIGKILL), ::waitpid(process, nullptr, 0); }
+  void kill() const { end(), ::waitpid(process, nullptr, 0); }
+  // Nobody asks how it ended, as where a container's first process does not.
+  void end() const {
+    ::kill(process, SIGKILL);
+    siginfo_t how;
+    ::waitid(P_PID, id_t(process), &how, WEXITED | WNOWAIT);
+  }
   pid_t process;
 };
 
@@ -259,6 +266,18 @@ TEST(File, TheFirstWriteBesideRemovesWhatKilledProcessesLeft) {
   ASSERT_EQ(files_in(folder.path()).size(), 1u);
   write_file(folder / "new.txt", "whole");
   EXPECT_EQ(files_in(folder.path()), std::vector<fs::path>{folder / "new.txt"});
+}
+
+TEST(File, AProcessThatNobodyBuriedHasEnded) {
+  const TemporaryFolder folder;
+  const Writer writer(folder / "0007.png");
+  EXPECT_FALSE(has_ended(writer.process));
+  EXPECT_EQ(remove_abandoned(folder.path()), 0);
+  writer.end();
+  EXPECT_TRUE(has_ended(writer.process));
+  EXPECT_EQ(remove_abandoned(folder.path()), 1);
+  writer.kill();
+  EXPECT_TRUE(has_ended(writer.process));
 }
 
 TEST(File, OnlyWhatKilledProcessesLeftIsRemoved) {

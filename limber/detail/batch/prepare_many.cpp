@@ -147,6 +147,7 @@ class Batch {
     }
     const fs::path folder = folder_of(out_, work.result);
     if (is_there(folder, input, file, said)) {
+      remove_abandoned(folder);
       store_->keep(work.body_key, folder);
       work.found = Outcome::up_to_date;
     } else if (!asks_for_more() && fetch(work, input, folder)) {

@@ -1,7 +1,6 @@
 #include "limber/detail/farm/lease.h"
 
 #include <fcntl.h>
-#include <signal.h>
 #include <unistd.h>
 
 #include <cerrno>
@@ -13,25 +12,12 @@
 #include "core/error.h"
 #include "core/json_fields.h"
 #include "core/json_text.h"
+#include "core/process.h"
 #include "core/temporary_files.h"
 
 namespace limber::detail {
 
 namespace {
-
-// When the process began, in ticks since the machine did: a number is given again, this is not. 0: it has
-// ended, or this system does not tell.
-long long start_of(long long pid) {
-  try {
-    const std::string stat = read_file(fmt::format("/proc/{}/stat", pid));
-    std::size_t at = stat.rfind(')');                                  // the name may hold anything
-    if (at != stat.npos && stat.compare(at, 3, ") Z") == 0) return 0;  // nobody has asked how it ended
-    for (int field = 2; field < 22 && at != stat.npos; ++field) at = stat.find(' ', at + 1);
-    return at == stat.npos ? 0 : std::atoll(stat.c_str() + at);
-  } catch (const InputError&) {
-    return 0;
-  }
-}
 
 // A lease's file.
 struct Owner {
@@ -68,8 +54,7 @@ std::string text_in(const fs::path& file) {
 // False, too, where that is not to be known from here.
 bool has_ended(const Owner& owner) {
   if (owner.place != place_of_processes() || owner.pid <= 0) return false;
-  if (::kill(pid_t(owner.pid), 0) != 0 && errno == ESRCH) return true;
-  return owner.began != 0 && start_of(owner.pid) != owner.began;
+  return limber::has_ended(owner.pid) || (owner.began != 0 && start_of_process(owner.pid) != owner.began);
 }
 
 // Nobody where it is damaged.
@@ -114,7 +99,7 @@ Lease::Lease(fs::path folder, std::string unit, int taken, std::string owner)
 // Opened and closed each time, so that other machines see it (NFS). One that is not there any more was taken
 // for lost.
 void Lease::write_beat() {
-  const Owner owner{owner_, place_of_processes(), ::getpid(), start_of(::getpid()),
+  const Owner owner{owner_, place_of_processes(), ::getpid(), start_of_process(::getpid()),
                     fmt::format("{:>9}", beat_++)};
   const std::string text = text_of(json_of_fields(owner)) + "\n";
   const int fd = ::open(file_.c_str(), O_WRONLY | O_CLOEXEC);
