@@ -58,7 +58,9 @@ struct Robustness {
   double max_force_n = 0;  // that the plan's controls may ask for
   bool settles = false;    // whether the robot is to come to rest
 };
-// Throws InputError where the folder holds no plan from its scene's start that reaches its goal.
+// What is replayed is kept in the folder's `robust`, so that one that was stopped goes on, and nothing is
+// replayed twice. Throws InputError where the folder holds no plan from its scene's start that reaches its
+// goal.
 LIMBER_API Robustness test_robustness(const RobustOptions&, const Context& = {});
 
 }  // namespace limber

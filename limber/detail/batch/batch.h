@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "core/json_fields.h"
+#include "core/json_lines.h"
 #include "limber/batch.h"
 #include "limber/detail/body/body_report.h"
 
@@ -42,8 +43,7 @@ class Journal {
   void add(const Attempt&);
 
  private:
-  void append(const std::string& text);
-  fs::path file_;
+  JsonLines file_;
   std::map<std::string, Attempt> attempts_;
 };
 

@@ -1,10 +1,4 @@
-#include <fcntl.h>
-#include <unistd.h>
-
 #include <algorithm>
-#include <cerrno>
-#include <cstring>
-#include <sstream>
 
 #include <fmt/ranges.h>
 
@@ -61,32 +55,28 @@ fs::path quarantine_file_of(const fs::path& batch, const BatchModel& model) {
   return batch / "failed" / (model.model.name + ".txt");
 }
 
-Journal::Journal(const fs::path& batch, const std::string& part) : file_(batch / "journal.jsonl") {
-  const fs::path parts = batch / "journal";
+Journal::Journal(const fs::path& batch, const std::string& part)
+    : file_(part.empty() ? batch / "journal.jsonl" : batch / "journal" / (part + ".jsonl")) {
+  const fs::path whole = batch / "journal.jsonl", parts = batch / "journal";
   const fs::path own = parts / (part + ".jsonl");
   std::vector<fs::path> files;
   std::error_code none;
   for (const auto& entry : fs::directory_iterator(parts, none))
     if (part.empty() || entry.path() == own) files.push_back(entry.path());
   std::sort(files.begin(), files.end());
-  if (fs::exists(file_)) files.insert(files.begin(), file_);
+  files.insert(files.begin(), whole);
   std::size_t count = 0;
-  for (const fs::path& file : files) {
-    std::istringstream lines(read_file(file));
-    for (std::string text; std::getline(lines, text); ++count) {
-      if (auto line = fields_or_nothing<Attempt>(Json::parse(text, nullptr, false)))
-        attempts_[line->name] = *std::move(line);
+  for (const fs::path& file : files)
+    for (const Json& json : JsonLines(file).read()) {
+      ++count;
+      if (auto line = fields_or_nothing<Attempt>(json)) attempts_[line->name] = *std::move(line);
     }
-  }
   if (!part.empty()) {
     make_folder(parts);
-    file_ = own;
-    // What a killed process left half written is a line of its own from now on.
-    if (fs::exists(file_) && !read_file(file_).ends_with('\n')) append("\n");
     return;
   }
   if (count > attempts_.size() || fs::is_directory(parts, none)) {
-    FileWriter writer(file_);
+    FileWriter writer(whole);
     for (const auto& [name, line] : attempts_) writer.append(text_of(json_of_fields(line)) + "\n");
     writer.commit();
   }
@@ -98,17 +88,8 @@ const Attempt* Journal::find(const std::string& name) const {
   return found == attempts_.end() ? nullptr : &found->second;
 }
 
-void Journal::append(const std::string& text) {
-  const int fd = ::open(file_.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0644);
-  const bool written = fd >= 0 && ::write(fd, text.data(), text.size()) == ssize_t(text.size());
-  const int error = errno;
-  if (fd >= 0) ::close(fd);
-  if (!written)
-    throw DiskError(fmt::format("{}: writing it failed: {}", file_.string(), std::strerror(error)));
-}
-
 void Journal::add(const Attempt& attempt) {
-  append(text_of(json_of_fields(attempt)) + "\n");
+  file_.append(json_of_fields(attempt));
   attempts_[attempt.name] = attempt;
 }
 

@@ -3,11 +3,15 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <mutex>
 
 #include "core/error.h"
+#include "core/log.h"
 #include "core/progress.h"
 #include "core/random.h"
+#include "core/threads.h"
 #include "limber/detail/plan/plan_folder.h"
+#include "limber/detail/verify/kept_replays.h"
 #include "limber/detail/verify/promises.h"
 #include "limber/detail/verify/verify_plan.h"
 #include "limber/detail/world/analysis.h"
@@ -105,8 +109,6 @@ struct Planned {
   const fem::World& world;
   plan::Guide guide;
 };
-
-enum class By { open_loop, following, replanning };
 
 // The perturbations [first, last) in one world, in lanes.
 std::vector<Fate> replay(const Planned& planned, const RobustOptions& options, By by,
@@ -212,6 +214,39 @@ Tally tally_of(std::vector<Fate> fates, const Vec3& planned_end) {
   return tally;
 }
 
+// What an earlier run did is not done again.
+void replay_all(const Planned& planned, const RobustOptions& options, std::vector<Replays>& parts) {
+  KeptReplays done(planned.folder, options);
+  done.look_up(parts);
+  std::vector<Replays*> left;
+  for (Replays& part : parts)
+    if (!part.is_done()) left.push_back(&part);
+  if (left.size() < parts.size())
+    log::info("{}: {} of {} are there already", options.folder.string(), parts.size() - left.size(),
+              parts.size());
+  std::mutex mutex;
+  std::int64_t count = 0;
+  Progress progress("replays", std::int64_t(left.size()));
+  try {
+    side_by_side(int(left.size()), [&](int i) {
+      throw_if_stopped();
+      Replays& part = *left[std::size_t(i)];
+      const scenes::Scene scene =
+          with_other_materials(planned.folder.scene, options.material_share,
+                               Rng(options.seed, first_world_stream + std::uint64_t(part.world)));
+      part.fates = replay(planned, options, part.by, scene, part.world, part.first, part.last);
+      done.add(part);
+      const std::lock_guard lock(mutex);
+      progress.update(++count, fmt::format("world {}, {}", part.world, words_for(part.by)));
+    });
+  } catch (const Interrupted&) {
+    if (done.keeps() && count > 0)
+      log::info("{}: what is replayed is kept; the same command goes on", options.folder.string());
+    throw;
+  }
+  done.put_in_order(parts);
+}
+
 }  // namespace
 
 Robustness robust(const RobustOptions& options) {
@@ -233,16 +268,17 @@ Robustness robust(const RobustOptions& options) {
   const Vec3 planned_end = system.robot_center(path.end);
 
   const int n = options.perturbations, worlds = std::min(n, options.worlds);
+  std::vector<By> ways{By::open_loop};
+  if (options.follow) ways.push_back(By::following);
+  if (options.replan_s > 0) ways.push_back(By::replanning);
+  std::vector<Replays> parts;
+  for (int w = 0; w < worlds; ++w)
+    for (const By by : ways) parts.push_back({by, w, w * n / worlds, (w + 1) * n / worlds});
+  replay_all(own, options, parts);
   const auto tally = [&](By by) {
     std::vector<Fate> fates;
-    for (int w = 0; w < worlds; ++w) {
-      throw_if_stopped();
-      const scenes::Scene scene = with_other_materials(
-          planned.scene, options.material_share, Rng(options.seed, first_world_stream + std::uint64_t(w)));
-      const std::vector<Fate> of_world =
-          replay(own, options, by, scene, w, w * n / worlds, (w + 1) * n / worlds);
-      fates.insert(fates.end(), of_world.begin(), of_world.end());
-    }
+    for (const Replays& part : parts)
+      if (part.by == by) fates.insert(fates.end(), part.fates.begin(), part.fates.end());
     return tally_of(std::move(fates), planned_end);
   };
   Robustness result{.open_loop = tally(By::open_loop),

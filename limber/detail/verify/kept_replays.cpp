@@ -1,0 +1,125 @@
+#include "limber/detail/verify/kept_replays.h"
+
+#include <algorithm>
+#include <set>
+
+#include "core/content_hash.h"
+#include "core/error.h"
+#include "core/hash.h"
+#include "core/json_fields.h"
+#include "core/json_text.h"
+#include "core/log.h"
+
+namespace limber::detail {
+
+namespace {
+
+struct KeptFate : Fate {
+  template <class Fields>
+  void fields(Fields& f) {
+    f("world", world), f("reaches", reaches), f("end", end), f("distance_m", distance_m);
+    f("speed_m_s", speed_m_s), f("duration_s", duration_s), f("end_center_m", end_center_m);
+    f("volume_change", volume_change), f("penetration_m", penetration_m), f("min_stretch", min_stretch);
+    f("largest_stretch", largest_stretch), f("overlap_m", overlap_m), f("self_overlap_m", self_overlap_m);
+    f("asked_n", asked_n), f("force_n", force_n), f("broken", broken), f("searches", searches);
+  }
+};
+
+struct KeptLine {
+  std::string by;
+  double look_s = 0;  // where it is planned anew: between looks
+  int world = 0;
+  std::vector<KeptFate> fates;
+  template <class Fields>
+  void fields(Fields& f) {
+    f("by", by), f.unless_usual("look_s", look_s, 0.0), f("world", world), f("fates", fates);
+  }
+};
+
+std::string first_of(const std::string& hash) { return hash.substr(0, 8); }
+
+std::string key_of(const PlanFolder& planned) {
+  return first_of(content_hash(fmt::format("{} {}", program_hash(), hex(planned.file_hash))));
+}
+
+std::string key_of(const RobustOptions& o) {
+  return first_of(content_hash(fmt::format("{} {} {} {} {} {}", o.perturbations, o.seed, o.material_share,
+                                           o.force_share, o.force_deg, std::min(o.perturbations, o.worlds))));
+}
+
+}  // namespace
+
+const char* words_for(By by) {
+  constexpr const char* words[] = {"open loop", "followed", "planned anew"};
+  return words[int(by)];
+}
+
+KeptReplays::KeptReplays(const PlanFolder& planned, const RobustOptions& options)
+    : look_s_(options.replan_s),
+      file_(options.folder / "robust" / fmt::format("{}-{}.jsonl", key_of(planned), key_of(options))),
+      lines_(file_) {
+  try {
+    make_folder(file_.parent_path());
+    std::vector<fs::path> others;
+    for (const auto& entry : fs::directory_iterator(file_.parent_path()))
+      if (entry.path().extension() == ".jsonl" &&
+          !entry.path().filename().string().starts_with(key_of(planned) + "-"))
+        others.push_back(entry.path());
+    for (const fs::path& file : others) fs::remove(file);
+  } catch (const std::exception& error) {
+    tell_not_kept(error);
+  }
+}
+
+void KeptReplays::look_up(std::vector<Replays>& all) const {
+  for (const Json& line : lines_.read()) {
+    const auto kept = fields_or_nothing<KeptLine>(line);
+    if (!kept) continue;
+    for (Replays& part : all)
+      if (kept->world == part.world && kept->by == words_for(part.by) &&
+          (part.by != By::replanning || kept->look_s == look_s_) &&
+          int(kept->fates.size()) == part.last - part.first)
+        part.fates.assign(kept->fates.begin(), kept->fates.end());
+  }
+}
+
+Json KeptReplays::line_of(const Replays& part) const {
+  KeptLine line{words_for(part.by), part.by == By::replanning ? look_s_ : 0, part.world, {}};
+  for (const Fate& fate : part.fates) line.fates.push_back({fate});
+  return json_of_fields(line);
+}
+
+void KeptReplays::add(const Replays& part) {
+  const std::lock_guard lock(mutex_);
+  if (!keeps_) return;
+  try {
+    lines_.append(line_of(part));
+  } catch (const DiskError& error) {
+    tell_not_kept(error);
+  }
+}
+
+void KeptReplays::put_in_order(const std::vector<Replays>& all) {
+  if (!keeps_) return;
+  std::set<std::string> others;  // of other ways
+  for (const Json& line : lines_.read()) others.insert(text_of(line) + "\n");
+  std::string text;
+  for (const Replays& part : all) {
+    const std::string line = text_of(line_of(part)) + "\n";
+    text += line, others.erase(line);
+  }
+  for (const std::string& line : others) text += line;
+  std::error_code none;
+  try {
+    if (!fs::exists(file_, none) || read_file(file_) != text) write_file(file_, text);
+  } catch (const DiskError& error) {
+    tell_not_kept(error);
+  }
+}
+
+void KeptReplays::tell_not_kept(const std::exception& error) {
+  keeps_ = false;
+  log::warn("what is replayed is not kept: {}", error.what());
+}
+
+}  // namespace limber::detail
