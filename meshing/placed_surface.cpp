@@ -23,6 +23,21 @@ double squared_distance(const Box& box, const Vec3& p) {
 
 }  // namespace
 
+std::vector<Box> boxes_of(const detail::TriangleBvh& tree, const Triangles& triangles, const Points& at) {
+  std::vector<Box> boxes(tree.nodes.size());
+  for (std::size_t n = boxes.size(); n-- > 0;) {
+    const auto& place = tree.nodes[n];
+    Box& box = boxes[n];
+    if (place.leaf()) {
+      const int* const last = triangles.data() + 3 * place.end;
+      for (const int* v = triangles.data() + 3 * place.begin; v != last; ++v) box.include(Vec3(at.row(*v)));
+    } else {
+      box.include(boxes[std::size_t(place.left)]), box.include(boxes[std::size_t(place.right)]);
+    }
+  }
+  return boxes;
+}
+
 SurfaceShape::SurfaceShape(const Points& rest, const Triangles& given)
     : triangles(given.rows(), 3),
       tree(detail::build_triangle_bvh(rest, given, leaf_size)),
@@ -89,11 +104,17 @@ SurfaceShape::SurfaceShape(const Points& rest, const Triangles& given)
 }
 
 PlacedSurface::PlacedSurface(const SurfaceShape& shape, Points positions)
-    : shape_(&shape), positions_(std::move(positions)), nodes_(shape.tree.nodes.size()) {
+    : shape_(&shape), positions_(std::move(positions)) {
   LIMBER_CHECK(int(positions_.rows()) == shape.vertices, positions_.rows(), shape.vertices);
-  for (std::size_t n = nodes_.size(); n-- > 0;) {
-    const auto& place = shape.tree.nodes[n];
-    Node& node = nodes_[n];
+  boxes_ = boxes_of(shape.tree, shape.triangles, positions_);
+}
+
+void PlacedSurface::make_dipoles() const {
+  dipoles_.resize(boxes_.size());
+  for (std::size_t n = dipoles_.size(); n-- > 0;) {
+    const auto& place = shape_->tree.nodes[n];
+    const Box& box = boxes_[n];
+    Dipole& node = dipoles_[n];
     const auto add = [&](const Vec3& center, const Vec3& area_vector, double area) {
       node.center += area * center;
       node.area_vector += area_vector;
@@ -102,31 +123,30 @@ PlacedSurface::PlacedSurface(const SurfaceShape& shape, Points positions)
     if (place.leaf()) {
       for (int t = place.begin; t < place.end; ++t) {
         const auto [a, b, c] = corners(t);
-        node.box.include(a), node.box.include(b), node.box.include(c);
         const Vec3 area_vector = 0.5 * (b - a).cross(c - a);
         add((a + b + c) / 3, area_vector, area_vector.norm());
       }
     } else {
       for (const int child : {place.left, place.right}) {
-        const Node& part = nodes_[std::size_t(child)];
-        node.box.include(part.box);
+        const Dipole& part = dipoles_[std::size_t(child)];
         add(part.center, part.area_vector, part.area);
       }
     }
-    node.center = node.area > 0 ? Vec3(node.center / node.area) : node.box.center();
-    node.squared_radius = (node.center - node.box.lower).cwiseMax(node.box.upper - node.center).squaredNorm();
+    node.center = node.area > 0 ? Vec3(node.center / node.area) : box.center();
+    node.squared_radius = (node.center - box.lower).cwiseMax(box.upper - node.center).squaredNorm();
   }
 }
 
 double PlacedSurface::winding(const Vec3& point) const {
-  if (nodes_.empty()) return 0;
+  if (boxes_.empty()) return 0;
+  std::call_once(dipoles_asked_, [&] { make_dipoles(); });
   int stack[max_depth];
   int count = 0;
   stack[count++] = 0;
   double sum = 0;
   while (count > 0) {
     const int n = stack[--count];
-    const Node& node = nodes_[std::size_t(n)];
+    const Dipole& node = dipoles_[std::size_t(n)];
     const auto& place = shape_->tree.nodes[std::size_t(n)];
     const Vec3 r = node.center - point;
     const double r2 = r.squaredNorm();
@@ -153,7 +173,7 @@ Vec3 PlacedSurface::closest_point(const Vec3& point, double above) const {
   int count = 0;
   double best = 1e300;
   Vec3 closest = point;
-  if (!nodes_.empty()) stack[count++] = {0, squared_distance(nodes_[0].box, point)};
+  if (!boxes_.empty()) stack[count++] = {0, squared_distance(boxes_[0], point)};
   while (count > 0) {
     const Pending top = stack[--count];
     if (top.squared >= best) continue;
@@ -165,8 +185,8 @@ Vec3 PlacedSurface::closest_point(const Vec3& point, double above) const {
       if (best <= above * above) break;
       continue;
     }
-    Pending one{place.left, squared_distance(nodes_[std::size_t(place.left)].box, point)},
-        other{place.right, squared_distance(nodes_[std::size_t(place.right)].box, point)};
+    Pending one{place.left, squared_distance(boxes_[std::size_t(place.left)], point)},
+        other{place.right, squared_distance(boxes_[std::size_t(place.right)], point)};
     if (one.squared < other.squared) std::swap(one, other);
     stack[count++] = one;
     stack[count++] = other;

@@ -3,11 +3,15 @@
 #pragma once
 
 #include <cstdint>
+#include <mutex>
 #include <vector>
 
 #include "meshing/detail/triangle_bvh.h"
 
 namespace limber::meshing {
+
+// The box of each node of the tree, where vertex v of the triangles is at row v.
+std::vector<Box> boxes_of(const detail::TriangleBvh&, const Triangles& in_order_of_leaves, const Points&);
 
 // What stays. Any triangle soup will do: open, doubled, passing through itself.
 struct SurfaceShape {
@@ -31,16 +35,10 @@ class PlacedSurface {
  public:
   PlacedSurface(const SurfaceShape&, Points positions);  // (V × 3) for the shape's vertices
 
-  struct Node {
-    Box box;
-    // Of the area vector ∫ n dA as a dipole: where it stands and how far its triangles reach from there.
-    Vec3 center = Vec3::Zero(), area_vector = Vec3::Zero();
-    double area = 0, squared_radius = 0;
-  };
   const SurfaceShape& shape() const { return *shape_; }
   const Points& positions() const { return positions_; }
-  const std::vector<Node>& nodes() const { return nodes_; }  // as in shape().tree
-  Box box() const { return nodes_.empty() ? Box{} : nodes_[0].box; }
+  const std::vector<Box>& boxes() const { return boxes_; }  // of the nodes of shape().tree
+  Box box() const { return boxes_.empty() ? Box{} : boxes_[0]; }
   Vec3 vertex(int v) const { return positions_.row(v); }
   std::array<Vec3, 3> corners(int triangle) const {
     const auto t = shape_->triangles.row(triangle);
@@ -58,9 +56,18 @@ class PlacedSurface {
   }
 
  private:
+  // Of a node's area vector ∫ n dA as a dipole: where it stands and how far its triangles reach from there.
+  struct Dipole {
+    Vec3 center = Vec3::Zero(), area_vector = Vec3::Zero();
+    double area = 0, squared_radius = 0;
+  };
+  void make_dipoles() const;
+
   const SurfaceShape* shape_;
   Points positions_;
-  std::vector<Node> nodes_;
+  std::vector<Box> boxes_;
+  mutable std::once_flag dipoles_asked_;
+  mutable std::vector<Dipole> dipoles_;  // made when the first winding number is asked for
 };
 
 }  // namespace limber::meshing

@@ -41,7 +41,7 @@ Box box_of(const Tri& t) { return {t[0].cwiseMin(t[1]).cwiseMin(t[2]), t[0].cwis
 template <class Rejects, class Leaves>
 void for_each_pair_of_leaves(const PlacedSurface& a, const PlacedSurface& b, const Rejects& rejects,
                              const Leaves& leaves) {
-  if (a.nodes().empty() || b.nodes().empty()) return;
+  if (a.boxes().empty() || b.boxes().empty()) return;
   const bool same = &a == &b;
   std::vector<std::pair<int, int>> pending{{0, 0}};
   while (!pending.empty()) {
@@ -217,13 +217,13 @@ SurfaceOverlap overlap(const PlacedSurface& a, const PlacedSurface& b) {
   std::vector<Crossing> of_a, of_b;
   std::vector<int> seeds_a = seeds_of(a, b), seeds_b = seeds_of(b, a);
   for_each_pair_of_leaves(
-      a, b, [&](int m, int n) { return !meet(a.nodes()[std::size_t(m)].box, b.nodes()[std::size_t(n)].box); },
+      a, b, [&](int m, int n) { return !meet(a.boxes()[std::size_t(m)], b.boxes()[std::size_t(n)]); },
       [&](int m, int n) {
         const auto &p = a.shape().tree.nodes[std::size_t(m)], &q = b.shape().tree.nodes[std::size_t(n)];
         for (int t = p.begin; t < p.end; ++t) {
           const Tri one = a.corners(t);
           const Box box = box_of(one);
-          if (!meet(box, b.nodes()[std::size_t(n)].box)) continue;
+          if (!meet(box, b.boxes()[std::size_t(n)])) continue;
           for (int u = q.begin; u < q.end; ++u) {
             const Tri other = b.corners(u);
             if (!meet(box, box_of(other))) continue;
@@ -252,8 +252,7 @@ SurfaceGap gap(const PlacedSurface& a, const PlacedSurface& b, double farthest_m
   for_each_pair_of_leaves(
       a, b,
       [&](int m, int n) {
-        return squared_gap(a.nodes()[std::size_t(m)].box, b.nodes()[std::size_t(n)].box) >=
-               nearest.squared_distance;
+        return squared_gap(a.boxes()[std::size_t(m)], b.boxes()[std::size_t(n)]) >= nearest.squared_distance;
       },
       [&](int m, int n) {
         const auto &p = a.shape().tree.nodes[std::size_t(m)], &q = b.shape().tree.nodes[std::size_t(n)];
@@ -270,7 +269,7 @@ SurfaceGap gap(const PlacedSurface& a, const PlacedSurface& b, double farthest_m
               detail::include_triangles(one, other, nearest);
           }
       });
-  if (a.nodes().empty() || b.nodes().empty()) return {farthest_m, Vec3::Zero()};
+  if (a.boxes().empty() || b.boxes().empty()) return {farthest_m, Vec3::Zero()};
   if (nearest.squared_distance == before)
     nearest.on_a = a.vertex(a.shape().triangles(0, 0)), nearest.on_b = b.vertex(b.shape().triangles(0, 0));
   const bool enclosed = b.winding(nearest.on_a) > 0.5 || a.winding(nearest.on_b) > 0.5;
@@ -297,7 +296,7 @@ Angle operator+(const Angle& a, const Angle& b) {  // π where it would be more
 // That holds the normals of a node's triangles. A piece of surface all of whose normals have a common
 // half-space hardly ever passes through itself (Volino and Magnenat-Thalmann 1994).
 struct Cone {
-  Vec3 axis;
+  Vec3 area_vector = Vec3::Zero(), axis = Vec3::Zero();
   Angle half_angle;
 };
 bool in_one_half(const Cone& a, const Cone& b) {
@@ -305,29 +304,45 @@ bool in_one_half(const Cone& a, const Cone& b) {
   return both.cos > -1 && a.axis.dot(b.axis) > -both.cos;
 }
 
-std::vector<Cone> cones_of(const PlacedSurface& surface) {
-  std::vector<Cone> cones(surface.nodes().size());
-  for (std::size_t n = cones.size(); n-- > 0;) {
-    const auto& place = surface.shape().tree.nodes[n];
-    Cone& cone = cones[n];
-    cone = {surface.nodes()[n].area_vector.normalized(), {}};
+// Made when they are asked for, with those below them.
+class Cones {
+ public:
+  explicit Cones(const PlacedSurface& surface)
+      : surface_(surface), cones_(surface.boxes().size()), known_(cones_.size(), 0) {}
+
+  const Cone& of(int node) {
+    Cone& cone = cones_[std::size_t(node)];
+    if (known_[std::size_t(node)]) return cone;
+    known_[std::size_t(node)] = 1;
+    const auto& place = surface_.shape().tree.nodes[std::size_t(node)];
     double least = 1;  // cosine
     if (place.leaf()) {
+      for (int t = place.begin; t < place.end; ++t) cone.area_vector += area_vector(t);
+      cone.axis = cone.area_vector.normalized();
       for (int t = place.begin; t < place.end; ++t) {
-        const Tri tri = surface.corners(t);
-        const Vec3 area = (tri[1] - tri[0]).cross(tri[2] - tri[0]);
+        const Vec3 area = area_vector(t);
         least = std::min(least, cone.axis.dot(area) / area.norm());
       }
     } else {
-      for (const int child : {place.left, place.right}) {
-        const Cone& part = cones[std::size_t(child)];
-        least = std::min(least, (Angle::of(cone.axis.dot(part.axis)) + part.half_angle).cos);
-      }
+      const Cone* const parts[] = {&of(place.left), &of(place.right)};
+      cone.area_vector = parts[0]->area_vector + parts[1]->area_vector;
+      cone.axis = cone.area_vector.normalized();
+      for (const Cone* part : parts)
+        least = std::min(least, (Angle::of(cone.axis.dot(part->axis)) + part->half_angle).cos);
     }
     cone.half_angle = least > -1 ? Angle::of(least) : Angle::straight();
+    return cone;
   }
-  return cones;
-}
+
+ private:
+  Vec3 area_vector(int triangle) const {
+    const Tri t = surface_.corners(triangle);
+    return 0.5 * (t[1] - t[0]).cross(t[2] - t[0]);
+  }
+  const PlacedSurface& surface_;
+  std::vector<Cone> cones_;
+  std::vector<char> known_;
+};
 
 // A surface and where it was at rest.
 class OwnSurface {
@@ -337,7 +352,7 @@ class OwnSurface {
 
   // Whether every vertex is so near to where some rigid motion takes it from rest that no two places meet
   // which were not near there. Of triangles it then holds, too, however the vertices were moved.
-  bool keeps_its_shape() const {
+  bool keeps_its_shape() {
     const Points &rest = rest_.positions(), &now = now_.positions();
     if (rest.rows() == 0) return true;
     const Eigen::RowVector3d rest_center = rest.colwise().mean(), center = now.colwise().mean();
@@ -351,23 +366,34 @@ class OwnSurface {
       turn = u * svd.matrixV().transpose();
     }
     const double most = 0.499 * near_m_;
-    for (Eigen::Index v = 0; v < rest.rows(); ++v)
-      if (!((now.row(v) - center - (rest.row(v) - rest_center) * turn).squaredNorm() <= most * most))
-        return false;
-    return true;
+    off_.resize(rest.rows(), 3);
+    double farthest = 0;  // squared
+    for (Eigen::Index v = 0; v < rest.rows(); ++v) {
+      off_.row(v) = now.row(v) - center - (rest.row(v) - rest_center) * turn;
+      farthest = std::max(farthest, off_.row(v).squaredNorm());
+    }
+    if (farthest <= most * most) return true;
+    if (farthest <= useful_offs * useful_offs * near_m_ * near_m_)
+      off_boxes_ = boxes_of(now_.shape().tree, now_.shape().triangles, off_);
+    return false;
   }
 
   std::vector<Crossing> crossings(std::vector<int>& corners) const {
     std::vector<Crossing> found;
-    const std::vector<Cone> cones = cones_of(now_);
+    Cones cones(now_);
+    const double near2 = near_m_ * near_m_;
     for_each_pair_of_leaves(
         now_, now_,
         [&](int m, int n) {
           const std::size_t i = std::size_t(m), k = std::size_t(n);
-          const Box &a = rest_.nodes()[i].box, &b = rest_.nodes()[k].box;
-          return !meet(now_.nodes()[i].box, now_.nodes()[k].box) ||
-                 (squared_gap(a, b) <= near_m_ * near_m_ &&
-                  (in_one_half(cones[i], cones[k]) || squared_reach(a, b) <= near_m_ * near_m_));
+          if (!meet(now_.boxes()[i], now_.boxes()[k])) return true;
+          const Box &a = rest_.boxes()[i], &b = rest_.boxes()[k];
+          const double gap2 = squared_gap(a, b);
+          if (!off_boxes_.empty() && squared_reach(off_boxes_[i], off_boxes_[k]) < std::max(near2, gap2))
+            return true;
+          if (gap2 > near2) return false;
+          return squared_reach(a, b) <= near2 ||
+                 (is_a_part(m) && is_a_part(n) && in_one_half(cones.of(m), cones.of(n)));
         },
         [&](int m, int n) {
           const auto &p = now_.shape().tree.nodes[std::size_t(m)],
@@ -401,12 +427,12 @@ class OwnSurface {
       const Pending top = stack.back();
       stack.pop_back();
       if (top.squared >= best ||
-          squared_reach(rest_.nodes()[std::size_t(top.node)].box, p_rest) <= near_m_ * near_m_)
+          squared_reach(rest_.boxes()[std::size_t(top.node)], p_rest) <= near_m_ * near_m_)
         continue;
       const auto& place = now_.shape().tree.nodes[std::size_t(top.node)];
       if (!place.leaf()) {
-        Pending one{place.left, squared_distance_outside(now_.nodes()[std::size_t(place.left)].box, p)},
-            other{place.right, squared_distance_outside(now_.nodes()[std::size_t(place.right)].box, p)};
+        Pending one{place.left, squared_distance_outside(now_.boxes()[std::size_t(place.left)], p)},
+            other{place.right, squared_distance_outside(now_.boxes()[std::size_t(place.right)], p)};
         if (one.squared < other.squared) std::swap(one, other);
         stack.push_back(one), stack.push_back(other);
         continue;
@@ -429,6 +455,14 @@ class OwnSurface {
   }
 
  private:
+  // What is larger hardly ever has its normals in one half, and would want the cones of all that is in it;
+  // where offs tell of most, those are hardly ever wanted.
+  bool is_a_part(int node) const {
+    const auto& place = now_.shape().tree.nodes[std::size_t(node)];
+    const Eigen::Index parts = off_boxes_.empty() ? 8 : 128;
+    return parts * (place.end - place.begin) <= now_.shape().triangles.rows();
+  }
+
   void note_pair(int t, int u, std::vector<Crossing>& found, std::vector<int>& corners) const {
     const auto one = now_.shape().triangles.row(t), other = now_.shape().triangles.row(u);
     for (const int v : one)
@@ -460,13 +494,18 @@ class OwnSurface {
 
   const PlacedSurface &now_, &rest_;
   double near_m_;
+  // How far each vertex is from where the rigid motion takes it. Two places whose offs differ by less than
+  // they were apart at rest do not meet. Boxes of the tree's nodes; none where they would tell nothing.
+  static constexpr double useful_offs = 8;  // times what is near
+  Points off_;
+  std::vector<Box> off_boxes_;
 };
 
 }  // namespace
 
 SurfaceOverlap self_overlap(const PlacedSurface& now, const PlacedSurface& at_rest) {
   LIMBER_CHECK(&now.shape() == &at_rest.shape());
-  const OwnSurface own(now, at_rest);
+  OwnSurface own(now, at_rest);
   if (own.keeps_its_shape()) return {};
   std::vector<int> seeds;
   const std::vector<Crossing> crossings = own.crossings(seeds);

@@ -243,12 +243,13 @@ TEST(SelfOverlap, OfAWoundBarIsWhatItsPitchLeavesOfItsWidth) {
               self_overlap(bar, wound(0.9)).depth_m, 1e-6);
 }
 
-// Two arms that stand a little farther apart than what counts as one place, each pushed by a little more than
-// half of it: hardly out of shape, and through one another.
-TEST(SelfOverlap, IsSeenOfBodiesThatNearlyKeepTheirShape) {
+// Two arms that stand a little or much farther apart than what counts as one place, each pushed by a little
+// more or less than half of it: hardly out of shape, and through one another or not.
+class SelfOverlapOfAHairpin : public testing::TestWithParam<double> {};
+TEST_P(SelfOverlapOfAHairpin, IsSeenHoweverNearlyItKeepsItsShape) {
   const SurfaceMesh bar = made_bar({4, 0.5, 0.5}, {80, 6, 6});
-  const double between = 1.05 * own_neighbourhood * 1.75;  // of the length of the hairpin
-  const auto folded = [&](const Vec3& p) {                 // a hairpin
+  const double between = GetParam() * own_neighbourhood * 1.75;  // of the length of the hairpin
+  const auto folded = [&](const Vec3& p) {                       // a hairpin
     const double radius = 0.5 * between + 0.5 - p.y();
     const double bend = std::numbers::pi * 0.25, s = p.x() - 2;
     if (std::abs(s) < bend) {
@@ -258,18 +259,19 @@ TEST(SelfOverlap, IsSeenOfBodiesThatNearlyKeepTheirShape) {
     return Vec3(-(std::abs(s) - bend), s < 0 ? -radius : radius, p.z());
   };
   const SurfaceMesh hairpin = mapped(bar, folded);
-  for (const double closed : {0.9, 1.2}) {
+  for (const double closed : {0.9, 0.995, 1.02, 1.2}) {
     const auto close = [&](const Vec3& p) {
       const double part = std::clamp(-p.x() / 0.6, 0.0, 1.0);
       return Vec3(p.x(), p.y() - (p.y() < 0 ? -1 : 1) * part * 0.5 * closed * between, p.z());
     };
     const double depth = self_overlap(hairpin, close).depth_m;
     if (closed < 1)
-      EXPECT_EQ(depth, 0);
+      EXPECT_EQ(depth, 0) << closed;
     else
-      EXPECT_NEAR(depth, 0.2 * between, 0.02 * between) << depth;
+      EXPECT_NEAR(depth, (closed - 1) * between, 0.1 * (closed - 1) * between) << closed;
   }
 }
+INSTANTIATE_TEST_SUITE_P(Gaps, SelfOverlapOfAHairpin, testing::Values(1.05, 2.0, 4.0, 8.0));
 
 // Coarse cells: where the bar passes through itself no vertex need be inside.
 TEST(SelfOverlap, IsFoundOnEdgesToo) {
