@@ -23,16 +23,32 @@ double squared_distance(const Box& box, const Vec3& p) {
 
 }  // namespace
 
-std::vector<Box> boxes_of(const detail::TriangleBvh& tree, const Triangles& triangles, const Points& at) {
-  std::vector<Box> boxes(tree.nodes.size());
+std::vector<OuterBox> boxes_of(const detail::TriangleBvh& tree, const Triangles& triangles,
+                               const Points& positions) {
+  using Four = OuterBox::Four;
+  std::vector<Four> at(std::size_t(positions.rows()));
+  for (std::size_t v = 0; v < at.size(); ++v) {
+    const double* const p = positions.data() + 3 * v;
+    at[v] = Four{float(p[0]), float(p[1]), float(p[2]), 0};
+  }
+  const auto lesser = [](const Four& a, const Four& b) { return a < b ? a : b; };
+  const auto greater = [](const Four& a, const Four& b) { return a > b ? a : b; };
+  // More than what rounding to single precision takes from a coordinate and from the sum here.
+  const auto rounding = [&](const Four& x) { return 4 * (1.0f / (1 << 24)) * greater(x, -x) + 1e-37f; };
+  std::vector<OuterBox> boxes(tree.nodes.size());
   for (std::size_t n = boxes.size(); n-- > 0;) {
     const auto& place = tree.nodes[n];
-    Box& box = boxes[n];
     if (place.leaf()) {
-      const int* const last = triangles.data() + 3 * place.end;
-      for (const int* v = triangles.data() + 3 * place.begin; v != last; ++v) box.include(Vec3(at.row(*v)));
+      const int *v = triangles.data() + 3 * place.begin, *const last = triangles.data() + 3 * place.end;
+      Four lower = at[std::size_t(*v)], upper = lower;
+      while (++v != last) {
+        const Four& p = at[std::size_t(*v)];
+        lower = lesser(lower, p), upper = greater(upper, p);
+      }
+      boxes[n] = {lower - rounding(lower), upper + rounding(upper)};
     } else {
-      box.include(boxes[std::size_t(place.left)]), box.include(boxes[std::size_t(place.right)]);
+      const OuterBox &left = boxes[std::size_t(place.left)], &right = boxes[std::size_t(place.right)];
+      boxes[n] = {lesser(left.lower, right.lower), greater(left.upper, right.upper)};
     }
   }
   return boxes;
@@ -107,13 +123,16 @@ PlacedSurface::PlacedSurface(const SurfaceShape& shape, Points positions)
     : shape_(&shape), positions_(std::move(positions)) {
   LIMBER_CHECK(int(positions_.rows()) == shape.vertices, positions_.rows(), shape.vertices);
   boxes_ = boxes_of(shape.tree, shape.triangles, positions_);
+  for (int v = 0; v < shape.vertices; ++v)
+    if (shape.triangle_from_vertex[std::size_t(v)] >= 0) box_.include(vertex(v));
 }
 
 void PlacedSurface::make_dipoles() const {
   dipoles_.resize(boxes_.size());
+  std::vector<Box> boxes(boxes_.size());
   for (std::size_t n = dipoles_.size(); n-- > 0;) {
     const auto& place = shape_->tree.nodes[n];
-    const Box& box = boxes_[n];
+    Box& box = boxes[n];
     Dipole& node = dipoles_[n];
     const auto add = [&](const Vec3& center, const Vec3& area_vector, double area) {
       node.center += area * center;
@@ -123,12 +142,14 @@ void PlacedSurface::make_dipoles() const {
     if (place.leaf()) {
       for (int t = place.begin; t < place.end; ++t) {
         const auto [a, b, c] = corners(t);
+        box.include(a), box.include(b), box.include(c);
         const Vec3 area_vector = 0.5 * (b - a).cross(c - a);
         add((a + b + c) / 3, area_vector, area_vector.norm());
       }
     } else {
       for (const int child : {place.left, place.right}) {
         const Dipole& part = dipoles_[std::size_t(child)];
+        box.include(boxes[std::size_t(child)]);
         add(part.center, part.area_vector, part.area);
       }
     }

@@ -10,8 +10,23 @@
 
 namespace limber::meshing {
 
-// The box of each node of the tree, where vertex v of the triangles is at row v.
-std::vector<Box> boxes_of(const detail::TriangleBvh&, const Triangles& in_order_of_leaves, const Points&);
+// A box in single precision that holds the one in double, and is larger by less than 1e-6 of its coordinates.
+struct OuterBox {
+  using Four = float __attribute__((vector_size(16)));
+  Four lower, upper;  // x, y, z and 0
+  operator Box() const {
+    return {{double(lower[0]), double(lower[1]), double(lower[2])},
+            {double(upper[0]), double(upper[1]), double(upper[2])}};
+  }
+};
+inline bool meet(const OuterBox& a, const OuterBox& b) {
+  using Two = long long __attribute__((vector_size(16)));
+  const Two apart = Two((a.lower > b.upper) | (b.lower > a.upper));
+  return (apart[0] | apart[1]) == 0;
+}
+// Of each node of the tree, where vertex v of the triangles is at row v.
+std::vector<OuterBox> boxes_of(const detail::TriangleBvh&, const Triangles& in_order_of_leaves,
+                               const Points&);
 
 // What stays. Any triangle soup will do: open, doubled, passing through itself.
 struct SurfaceShape {
@@ -37,8 +52,8 @@ class PlacedSurface {
 
   const SurfaceShape& shape() const { return *shape_; }
   const Points& positions() const { return positions_; }
-  const std::vector<Box>& boxes() const { return boxes_; }  // of the nodes of shape().tree
-  Box box() const { return boxes_.empty() ? Box{} : boxes_[0]; }
+  const std::vector<OuterBox>& boxes() const { return boxes_; }  // of the nodes of shape().tree
+  const Box& box() const { return box_; }                        // of the triangles; empty without any
   Vec3 vertex(int v) const { return positions_.row(v); }
   std::array<Vec3, 3> corners(int triangle) const {
     const auto t = shape_->triangles.row(triangle);
@@ -65,7 +80,8 @@ class PlacedSurface {
 
   const SurfaceShape* shape_;
   Points positions_;
-  std::vector<Box> boxes_;
+  std::vector<OuterBox> boxes_;
+  Box box_;
   mutable std::once_flag dipoles_asked_;
   mutable std::vector<Dipole> dipoles_;  // made when the first winding number is asked for
 };

@@ -387,7 +387,7 @@ class OwnSurface {
         [&](int m, int n) {
           const std::size_t i = std::size_t(m), k = std::size_t(n);
           if (!meet(now_.boxes()[i], now_.boxes()[k])) return true;
-          const Box &a = rest_.boxes()[i], &b = rest_.boxes()[k];
+          const Box a = rest_.boxes()[i], b = rest_.boxes()[k];
           const double gap2 = squared_gap(a, b);
           if (!off_boxes_.empty() && squared_reach(off_boxes_[i], off_boxes_[k]) < std::max(near2, gap2))
             return true;
@@ -498,7 +498,7 @@ class OwnSurface {
   // they were apart at rest do not meet. Boxes of the tree's nodes; none where they would tell nothing.
   static constexpr double useful_offs = 8;  // times what is near
   Points off_;
-  std::vector<Box> off_boxes_;
+  std::vector<OuterBox> off_boxes_;
 };
 
 }  // namespace

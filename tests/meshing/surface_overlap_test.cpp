@@ -114,6 +114,30 @@ TEST(PlacedSurface, WindingAndDistanceAreThoseOfTheWholeSumAndOfTheExactTree) {
 }
 
 // Unit balls whose poles are turned to one another: depth and gap are the centres' distance against 2.
+// Boxes in single precision hold every corner, however far from zero they are, and hardly more.
+TEST(PlacedSurface, BoxesHoldTheirTriangles) {
+  const SurfaceMesh torus = made_torus(0.3, 40, 16);
+  const SurfaceShape shape(torus.positions, torus.triangles);
+  for (const Vec3& shift : {Vec3(0, 0, 0), Vec3(0.7, -31.3, 1234.567), Vec3(1e-9, -1e6, 1e-30)}) {
+    const PlacedSurface placed(shape,
+                               mapped(torus.positions, [&](const Vec3& p) { return Vec3(p + shift); }));
+    const double most = 1e-6 * (1 + shift.cwiseAbs().maxCoeff());
+    for (std::size_t n = 0; n < placed.boxes().size(); ++n) {
+      const Box box = placed.boxes()[n];
+      Box exact;
+      for (int t = shape.tree.nodes[n].begin; t < shape.tree.nodes[n].end; ++t)
+        for (const Vec3& corner : placed.corners(t)) exact.include(corner);
+      ASSERT_TRUE((box.lower.array() <= exact.lower.array()).all() &&
+                  (box.upper.array() >= exact.upper.array()).all());
+      ASSERT_LT((exact.lower - box.lower).maxCoeff(), most);
+      ASSERT_LT((box.upper - exact.upper).maxCoeff(), most);
+      if (n > 0) continue;
+      EXPECT_EQ(placed.box().lower, exact.lower);
+      EXPECT_EQ(placed.box().upper, exact.upper);
+    }
+  }
+}
+
 TEST(SurfaceOverlap, OfTwoBallsIsWhatTheirCentresTell) {
   const SurfaceMesh ball = made_sphere(60);
   for (const double centres : {1.5, 1.9, 1.99, 2.01, 2.3}) {
