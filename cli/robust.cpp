@@ -62,7 +62,8 @@ std::string text_of(const Tally& tally, const RobustOptions& options, const Robu
         f.broken.empty() ? "kept" : fmt::format("{} broken", f.broken.size()));
   const Fate& worst = tally.worst;
   text += fmt::format(
-      "{} of {} {} in the goal (materials ± {:g} %, forces ± {:g} %, turned by up to {:g} degrees, "
+      "{} of {} {} in the goal (worlds {}, materials ± {:g} %, forces ± {:g} %, turned by up to {:g} "
+      "degrees, "
       "seed {})\n"
       "  end          {:.3f} m from the plan's (root mean square), at most {:.3f} m\n"
       "  volume       changes by at most {:.2f} %\n"
@@ -72,10 +73,11 @@ std::string text_of(const Tally& tally, const RobustOptions& options, const Robu
       "  force        asked for at most {:.4g} of {:.4g} N; what acted {:.4g} N\n"
       "  promises     all kept in {} of {}\n",
       tally.reached, tally.fates.size(), robust.settles ? "come to rest" : "end",
-      100 * options.material_share, 100 * options.force_share, options.force_deg, options.seed,
-      tally.spread_m, tally.farthest_m, 100 * worst.volume_change, worst.min_stretch, worst.largest_stretch,
-      worst.overlap_m, worst.self_overlap_m, worst.penetration_m, worst.asked_n, robust.max_force_n,
-      worst.force_n, tally.keep_all, tally.fates.size());
+      std::min(options.perturbations, options.worlds), 100 * options.material_share,
+      100 * options.force_share, options.force_deg, options.seed, tally.spread_m, tally.farthest_m,
+      100 * worst.volume_change, worst.min_stretch, worst.largest_stretch, worst.overlap_m,
+      worst.self_overlap_m, worst.penetration_m, worst.asked_n, robust.max_force_n, worst.force_n,
+      tally.keep_all, tally.fates.size());
   for (const auto& [promise, times] : tally.broken)
     text += fmt::format("    broken in {}: {}\n", times, promise);
   return text;
@@ -85,9 +87,13 @@ std::string text_of(const Tally& tally, const RobustOptions& options, const Robu
 
 Outcome robust(const RobustOptions& options) {
   const Robustness robust = test_robustness(options, at_terminal());
-  Json json{{"perturbations", options.perturbations},   {"seed", options.seed},
-            {"material_share", options.material_share}, {"force_share", options.force_share},
-            {"force_deg", options.force_deg},           {"max_force_n", robust.max_force_n}};
+  Json json{{"perturbations", options.perturbations},
+            {"worlds", std::min(options.perturbations, options.worlds)},
+            {"seed", options.seed},
+            {"material_share", options.material_share},
+            {"force_share", options.force_share},
+            {"force_deg", options.force_deg},
+            {"max_force_n", robust.max_force_n}};
   json.update(json_of(robust.open_loop));
   std::string text = text_of(robust.open_loop, options, robust);
   if (robust.followed || robust.replanned) text = "open loop\n" + text;

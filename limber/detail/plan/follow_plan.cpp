@@ -30,8 +30,8 @@ FollowedPlan::FollowedPlan(const fs::path& folder, const scenes::Scene& scene, c
   const PlanFolder planned = read_folder_from_the_start(folder, "--follow");
   if (!planned.plan.solved())
     throw InputError(fmt::format(
-        "{}: its plan does not reach the goal, so there is no path to follow; plan on with limber "
-        "plan --resume",
+        "{0}: its plan does not reach the goal, so there is no path to follow; plan on with limber "
+        "plan SCENE -o {0} --resume",
         folder.string()));
   const fem::World there = read_world_of(planned, folder).world;
   require_same_robot(folder, there, scene, world);

@@ -50,10 +50,10 @@ int same_node(const TetMesh& coarse, int node, const TetMesh& fine) {
 KeptPlan refine(const RefineOptions& options) {
   const PlanFolder planned = read_folder_from_the_start(options.folder, "limber refine");
   if (!planned.plan.solved())
-    throw InputError(
-        fmt::format("{}: its plan does not reach the goal, so there is no path to carry; plan on with limber "
-                    "plan --resume",
-                    options.folder.string()));
+    throw InputError(fmt::format(
+        "{0}: its plan does not reach the goal, so there is no path to carry; plan on with limber "
+        "plan SCENE -o {0} --resume",
+        options.folder.string()));
   if (fs::exists(options.out) && fs::equivalent(options.folder, options.out))
     throw InputError(
         fmt::format("{}: is the folder of the plan itself; name another with -o", options.out.string()));

@@ -1,6 +1,7 @@
 #include "limber/detail/verify/kept_replays.h"
 
 #include <algorithm>
+#include <regex>
 #include <set>
 
 #include "core/content_hash.h"
@@ -30,9 +31,16 @@ struct KeptLine {
   double look_s = 0;  // where it is planned anew: between looks
   int world = 0;
   std::vector<KeptFate> fates;
+  std::string hash = "";  // of the line without it, so that none is taken that was changed
   template <class Fields>
   void fields(Fields& f) {
     f("by", by), f.unless_usual("look_s", look_s, 0.0), f("world", world), f("fates", fates);
+    f.unless_usual("hash", hash, std::string());
+  }
+  std::string hash_of_content() const {
+    KeptLine content = *this;
+    content.hash.clear();
+    return hex(hash_of(std::string_view(text_of(json_of_fields(content)))));
   }
 };
 
@@ -58,23 +66,23 @@ KeptReplays::KeptReplays(const PlanFolder& planned, const RobustOptions& options
     : look_s_(options.replan_s),
       file_(options.folder / "robust" / fmt::format("{}-{}.jsonl", key_of(planned), key_of(options))),
       lines_(file_) {
-  try {
-    make_folder(file_.parent_path());
-    std::vector<fs::path> others;
-    for (const auto& entry : fs::directory_iterator(file_.parent_path()))
-      if (entry.path().extension() == ".jsonl" &&
-          !entry.path().filename().string().starts_with(key_of(planned) + "-"))
-        others.push_back(entry.path());
-    for (const fs::path& file : others) fs::remove(file);
-  } catch (const std::exception& error) {
-    tell_not_kept(error);
+  static const std::regex own("([0-9a-f]{8})-[0-9a-f]{8}\\.jsonl");
+  std::vector<fs::path> others;
+  std::error_code none;
+  for (const auto& entry : fs::directory_iterator(file_.parent_path(), none)) {
+    const std::string name = entry.path().filename().string();
+    std::smatch parts;
+    if (std::regex_match(name, parts, own) && parts[1] != key_of(planned)) others.push_back(entry.path());
   }
+  for (const fs::path& file : others) fs::remove(file, none);
 }
 
 void KeptReplays::look_up(std::vector<Replays>& all) const {
+  std::error_code none;
+  if (!fs::is_regular_file(file_, none)) return;  // whoever is to write it says what is wrong
   for (const Json& line : lines_.read()) {
     const auto kept = fields_or_nothing<KeptLine>(line);
-    if (!kept) continue;
+    if (!kept || kept->hash != kept->hash_of_content()) continue;
     for (Replays& part : all)
       if (kept->world == part.world && kept->by == words_for(part.by) &&
           (part.by != By::replanning || kept->look_s == look_s_) &&
@@ -86,6 +94,7 @@ void KeptReplays::look_up(std::vector<Replays>& all) const {
 Json KeptReplays::line_of(const Replays& part) const {
   KeptLine line{words_for(part.by), part.by == By::replanning ? look_s_ : 0, part.world, {}};
   for (const Fate& fate : part.fates) line.fates.push_back({fate});
+  line.hash = line.hash_of_content();
   return json_of_fields(line);
 }
 
@@ -93,26 +102,29 @@ void KeptReplays::add(const Replays& part) {
   const std::lock_guard lock(mutex_);
   if (!keeps_) return;
   try {
+    make_folder(file_.parent_path());
     lines_.append(line_of(part));
-  } catch (const DiskError& error) {
+  } catch (const std::exception& error) {
     tell_not_kept(error);
   }
 }
 
 void KeptReplays::put_in_order(const std::vector<Replays>& all) {
   if (!keeps_) return;
-  std::set<std::string> others;  // of other ways
-  for (const Json& line : lines_.read()) others.insert(text_of(line) + "\n");
-  std::string text;
-  for (const Replays& part : all) {
-    const std::string line = text_of(line_of(part)) + "\n";
-    text += line, others.erase(line);
-  }
-  for (const std::string& line : others) text += line;
-  std::error_code none;
   try {
-    if (!fs::exists(file_, none) || read_file(file_) != text) write_file(file_, text);
-  } catch (const DiskError& error) {
+    std::set<std::string> others;  // of other ways
+    for (const Json& line : lines_.read()) {
+      const auto kept = fields_or_nothing<KeptLine>(line);
+      if (kept && kept->hash == kept->hash_of_content()) others.insert(text_of(line) + "\n");
+    }
+    std::string text;
+    for (const Replays& part : all) {
+      const std::string line = text_of(line_of(part)) + "\n";
+      text += line, others.erase(line);
+    }
+    for (const std::string& line : others) text += line;
+    if (read_file(file_) != text) write_file(file_, text);
+  } catch (const std::exception& error) {
     tell_not_kept(error);
   }
 }

@@ -254,8 +254,8 @@ Robustness robust(const RobustOptions& options) {
   const PlanFolder planned = read_folder_from_the_start(options.folder, "limber robust");
   if (!planned.plan.solved())
     throw InputError(
-        fmt::format("{}: its plan does not reach the goal, so there is nothing to perturb; plan on with "
-                    "limber plan --resume",
+        fmt::format("{0}: its plan does not reach the goal, so there is nothing to perturb; plan on with "
+                    "limber plan SCENE -o {0} --resume",
                     options.folder.string()));
   if (options.replan_s > 0 && !planned.plan.settings.via.empty())
     throw InputError(fmt::format(

@@ -145,6 +145,10 @@ Verified verify(const VerifyOptions& options, std::optional<TrustedScene> truste
     check_body("body", body, folder, std::nullopt, options.remake, table);
     return {std::move(table), {}, {}};
   }
+  if (fs::exists(folder / "manifest.jsonl") && fs::is_directory(folder / "bodies"))
+    throw InputError(
+        fmt::format("{0}: holds many models that limber prepare made; name one of them, {0}/bodies/NAME",
+                    folder.string()));
   throw InputError(
       fmt::format("{}: holds neither plan.npz nor report.json; make them with limber run or limber prepare",
                   folder.string()));
