@@ -44,6 +44,15 @@ struct KeptLine {
   }
 };
 
+// Those that are whole.
+std::vector<KeptLine> lines_in(const JsonLines& file) {
+  std::vector<KeptLine> lines;
+  for (const Json& json : file.read())
+    if (auto line = fields_or_nothing<KeptLine>(json); line && line->hash == line->hash_of_content())
+      lines.push_back(*std::move(line));
+  return lines;
+}
+
 std::string first_of(const std::string& hash) { return hash.substr(0, 8); }
 
 std::string key_of(const PlanFolder& planned) {
@@ -80,15 +89,12 @@ KeptReplays::KeptReplays(const PlanFolder& planned, const RobustOptions& options
 void KeptReplays::look_up(std::vector<Replays>& all) const {
   std::error_code none;
   if (!fs::is_regular_file(file_, none)) return;  // whoever is to write it says what is wrong
-  for (const Json& line : lines_.read()) {
-    const auto kept = fields_or_nothing<KeptLine>(line);
-    if (!kept || kept->hash != kept->hash_of_content()) continue;
+  for (const KeptLine& line : lines_in(lines_))
     for (Replays& part : all)
-      if (kept->world == part.world && kept->by == words_for(part.by) &&
-          (part.by != By::replanning || kept->look_s == look_s_) &&
-          int(kept->fates.size()) == part.last - part.first)
-        part.fates.assign(kept->fates.begin(), kept->fates.end());
-  }
+      if (line.world == part.world && line.by == words_for(part.by) &&
+          (part.by != By::replanning || line.look_s == look_s_) &&
+          int(line.fates.size()) == part.last - part.first)
+        part.fates.assign(line.fates.begin(), line.fates.end());
 }
 
 Json KeptReplays::line_of(const Replays& part) const {
@@ -113,10 +119,7 @@ void KeptReplays::put_in_order(const std::vector<Replays>& all) {
   if (!keeps_) return;
   try {
     std::set<std::string> others;  // of other ways
-    for (const Json& line : lines_.read()) {
-      const auto kept = fields_or_nothing<KeptLine>(line);
-      if (kept && kept->hash == kept->hash_of_content()) others.insert(text_of(line) + "\n");
-    }
+    for (const KeptLine& line : lines_in(lines_)) others.insert(text_of(json_of_fields(line)) + "\n");
     std::string text;
     for (const Replays& part : all) {
       const std::string line = text_of(line_of(part)) + "\n";
