@@ -37,6 +37,7 @@ std::string text_of_body(const Json& body) {
                        v[2].get<double>());
   };
   std::string text = text_of_report(body);
+  if (!body.contains("shell_list")) return text + "  shells       none, for its scene asks for none\n";
   text +=
       "  shell        middle, m                     size, m                       tets  in "
       "preview-shells.png\n";

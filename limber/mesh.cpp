@@ -239,10 +239,11 @@ std::string Body::picture_png(const Context& context) const {
 Body detail::body_of(const detail::PreparedBody& prepared, const std::filesystem::path& folder) {
   auto impl = std::make_shared<Body::Impl>();
   impl->surface = mesh_of(prepared.surface);
-  for (ConvexShell shell : read_obj_shells(folder / "shells.obj")) {
-    shell.vertices.rowwise() += prepared.place_m.transpose();
-    impl->hulls.push_back(mesh_of(shell));
-  }
+  if (prepared.report.shells)
+    for (ConvexShell shell : read_obj_shells(folder / "shells.obj")) {
+      shell.vertices.rowwise() += prepared.place_m.transpose();
+      impl->hulls.push_back(mesh_of(shell));
+    }
   impl->cage = cage_of(prepared.cage, prepared.shell_from_tet);
   const detail::BodyReport& report = prepared.report;
   const detail::BodyReport::Cage& told = report.cage.value();

@@ -108,7 +108,7 @@ class LIMBER_API Body {
   // Of a folder that limber prepare, or save(), has written. Throws InputError.
   static Body load(const std::filesystem::path& folder);
   const Mesh& surface() const;
-  const std::vector<Mesh>& hulls() const;
+  const std::vector<Mesh>& hulls() const;  // none of a planned body whose scene asks for none
   const Cage& cage() const;
   const Certificate& certificate() const;
   const Binding& binding() const;

@@ -69,7 +69,7 @@ using Model = std::variant<FileModel, MadeModel, BoxModel, PlateModel, SphereMod
 struct CageSpec {
   int tets = 0;      // budget of the enclosing cage; 0 when cells or cell_m are given
   std::string mode;  // "lattice", "fast", "paper" or "conform": how that cage is made
-  int shells = 0;    // at most so many convex shells
+  int shells = 0;    // at most so many convex shells; 0: none, for nothing reads them
   // Boxes and plates without a hole: cut into nx × ny × nz cells of five tets each.
   Eigen::Vector3i cells = Eigen::Vector3i::Zero();
   double cell_m = 0;  // blocks: longest edge of a cell; 0: not given

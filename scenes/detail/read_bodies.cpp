@@ -257,6 +257,10 @@ BodySpec read_body(const Node& table, const Box& bounds) {
   body.cage = read_cage(child(table, "cage"), body.model, what);
   body.material = read_material(table, body.kind, body.role, what);
   body.parts = read_parts(list(table, "parts"), body, what);
+  const auto of_a_shell = [](const PartSpec& part) { return part.shell.has_value(); };
+  if (body.cage.shells == 0 &&
+      (body.cage.mode == "paper" || std::any_of(body.parts.begin(), body.parts.end(), of_a_shell)))
+    body.cage.shells = 32;
   body.fixed = read_fixed(child(table, "fixed"));
   if (body.kind == Kind::rigid && body.role != Role::obstacle &&
       (body.fixed.walls || !body.fixed.boxes_m.empty()))

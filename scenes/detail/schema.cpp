@@ -330,8 +330,11 @@ constexpr Key all_keys[] = {
      "with tets: how the cage is made (docs/cage.md)",
      "lattice, fast, paper, conform",
      ""},
-    {"bodies[].cage.shells", Type::integer, from_to(1, 1000), 0, "32",
-     "with tets: at most so many convex shells (docs/decomposition.md)", "", ""},
+    {"bodies[].cage.shells", Type::integer, from_to(0, 1000), 0, "0",
+     "at most so many convex shells (docs/decomposition.md), for hulls of exports and parts that name them; "
+     "no motion hangs on them. 0: none, but 32 where a part names one, and in mode paper, which makes the "
+     "cage of them",
+     "", ""},
 
     {"bodies[].material", Type::table, {}, 0, may_lack, "required, except for rigid obstacles", "", ""},
     {"bodies[].material.model",

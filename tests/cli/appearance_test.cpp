@@ -340,7 +340,7 @@ TEST_F(Painted_slow, VerifyNamesWhatIsNotTheModels) {
     made.erase("appearance");
     if (!body.appearance.empty()) made["appearance"] = facts_of_appearance(body.appearance);
     made["files"] = Json::object();
-    for (const std::string& name : files_of_body(body.appearance))
+    for (const std::string& name : files_of_body(body.report.input.settings, body.appearance))
       made["files"][name] = hex(hash_of(std::string_view(read_file(at / name))));
     change_report(made);
     write_json(at / "report.json", made);

@@ -15,6 +15,7 @@
 #include <sstream>
 
 #include "core/error.h"
+#include "core/hash.h"
 #include "core/json.h"
 #include "core/mesh_files.h"
 #include "core/progress.h"
@@ -215,6 +216,67 @@ TEST_F(Program_slow, PartsAreChosenByTheShellsThatInfoLists) {
       plan("out", {"bodies.block.parts=[{ box_m = [[0, 0, 0], [1, 1, 1]], density_kg_m3 = 5 }]"});
   EXPECT_EQ(empty.code, exit_bad_input);
   EXPECT_NE(empty.err.find("no tet of the cage has its middle in that box"), std::string::npos) << empty.err;
+}
+
+// No motion hangs on shells, so none are made where nothing reads them; whoever wants them is told how.
+TEST_F(Program_slow, BodiesOfAPlanHaveShellsWhereTheSceneReadsThem) {
+  const std::string file = scene(replaced("size_m = [0.4, 2, 0.9] } }\ncage = { cells = [2, 4, 2] }",
+                                          "size_m = [0.4, 1.6, 0.7] } }\ncage = { tets = 120 }"));
+  const auto plan = [&](const std::string& name, const std::string& set) {
+    std::vector<std::string> words{"plan",
+                                   file,
+                                   "-o",
+                                   out(name),
+                                   "--iterations",
+                                   "2",
+                                   "--json",
+                                   "--set",
+                                   "bodies.block.fixed=[]",
+                                   "--set",
+                                   "bodies.block.pose.position_m=[2, 1, 0.7]"};
+    if (!set.empty()) words.insert(words.end(), {"--set", set});
+    return limber_program(words);
+  };
+  const auto has_shells = [&](const std::string& name) {
+    return fs::exists(fs::path(out(name)) / "bodies" / "block" / "shells.obj");
+  };
+  const Result bare = plan("bare", "");
+  ASSERT_EQ(bare.code, exit_no_plan) << bare.err;
+  EXPECT_FALSE(has_shells("bare"));
+  const Result asked = plan("asked", "bodies.block.cage.shells=4");
+  EXPECT_TRUE(has_shells("asked"));
+  EXPECT_EQ(bare.json().at("tree_hash"), asked.json().at("tree_hash"));
+  plan("named", "bodies.block.parts=[{ shell = 0, youngs_modulus_pa = 2e4 }]");
+  EXPECT_TRUE(has_shells("named"));
+  plan("paper", "bodies.block.cage.mode=paper");
+  EXPECT_TRUE(has_shells("paper"));
+
+  const auto exported = [&](const std::string& name, const std::string& format) {
+    return limber_program({"export", out(name) + "/bodies/block", "--format", format});
+  };
+  EXPECT_EQ(exported("asked", "urdf").code, exit_done);
+  EXPECT_EQ(exported("bare", "vtu").code, exit_done);
+  const Result none = exported("bare", "urdf");
+  EXPECT_EQ(none.code, exit_bad_input);
+  EXPECT_NE(none.err.find("shells = 32"), std::string::npos) << none.err;
+  const Result info = limber_program({"info", out("bare") + "/bodies/block", "--json"});
+  EXPECT_EQ(info.code, exit_done) << info.err;
+  EXPECT_FALSE(info.json().contains("shell_list"));
+
+  // What verify says of such bodies, and of one whose tets name a shell all the same.
+  const Result verified = limber_program({"verify", out("bare") + "/bodies/block"});
+  EXPECT_EQ(verified.code, exit_done) << verified.out;
+  const fs::path folder = fs::path(out("bare")) / "bodies" / "block";
+  std::vector<int> shell_from_tet;
+  const TetMesh cage = read_msh(folder / "cage.msh", &shell_from_tet);
+  shell_from_tet.back() = 1;
+  write_msh(folder / "cage.msh", cage, shell_from_tet);
+  Json report = read_json(folder / "report.json");
+  report["files"]["cage.msh"] = hex(hash_of_file(folder / "cage.msh"));
+  write_json(folder / "report.json", report);
+  const Result forged = limber_program({"verify", folder.string()});
+  EXPECT_EQ(forged.code, exit_defect);
+  EXPECT_NE(forged.out.find("no tet of the cage is of a shell"), std::string::npos) << forged.out;
 }
 
 TEST_F(Program_slow, TheSameSeedGivesTheSameBytesForAnyThreadCount) {

@@ -139,7 +139,7 @@ role = "obstacle"
 contact = "surface"
 deformation = "linear"
 model = { box = { size_m = [0.4, 1, 0.5], bevel_m = 0.1, triangle_m = 0.2 } }
-cage = { cells = [2, 2, 2] }
+cage = { cells = [2, 2, 2], shells = 2 }
 material = { youngs_modulus_pa = 5e3, density_kg_m3 = 100 }
 pose = { position_m = [2, 1, 0.3] }
 [[bodies]]

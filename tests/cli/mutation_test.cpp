@@ -35,7 +35,7 @@ gravity_m_s2 = [0, 0, 0]
 name = "ball"
 role = "robot"
 model = { sphere = { diameter_m = 0.6, triangle_m = 0.06 } }
-cage = { tets = 48 }
+cage = { tets = 48, shells = 32 }
 material = { youngs_modulus_pa = 5e3, poisson_ratio = 0.45, density_kg_m3 = 100 }
 pose = { position_m = [0.6, 1, 1.3] }
 [[bodies]]

@@ -30,14 +30,14 @@ gravity_m_s2 = [0, 0, -1]
 name = "robot"
 role = "robot"
 model = { box = { size_m = [0.5, 0.5, 0.5], triangle_m = 0.25 } }
-cage = { cells = [1, 1, 1] }
+cage = { cells = [1, 1, 1], shells = 2 }
 material = { youngs_modulus_pa = 5e3, density_kg_m3 = 100 }
 pose = { position_m = [0.6, 1, 0.3] }
 [[bodies]]
 name = "block"
 role = "obstacle"
 model = { box = { size_m = [0.4, 1, 0.4], triangle_m = 0.2 } }
-cage = { cells = [1, 1, 1] }
+cage = { cells = [1, 1, 1], shells = 2 }
 material = { youngs_modulus_pa = 5e3, density_kg_m3 = 100 }
 pose = { position_m = [1.5, 1, 0.2] }
 fixed = "walls"

@@ -194,10 +194,8 @@ BodyReport prepare_body(const BodySource& source, const PrepareSettings& setting
   return report;
 }
 
-std::vector<std::string> files_of_body(const Appearance& a) {
-  std::vector<std::string> names(std::begin(body_files), std::end(body_files));
-  if (a.empty()) return names;
-  names.push_back(appearance_file);
+std::vector<std::string> files_of_body(const PrepareSettings& settings, const Appearance& a) {
+  std::vector<std::string> names = files_of(settings, !a.empty());
   for (std::size_t i = 0; i < a.images.size(); ++i) names.push_back(name_of_image_file(a, i));
   return names;
 }
@@ -217,7 +215,8 @@ PreparedBody read_body(const fs::path& folder) {
     };
     body.surface = ply_from(known("surface.ply"), folder / "surface.ply");
     body.cage = msh_from(known("cage.msh"), folder / "cage.msh", &body.shell_from_tet);
-    for (const char* name : {"shells.obj", "binding.npz", "contact.npz"}) known(name);
+    if (body.report.input.settings.has_shells()) known("shells.obj");
+    for (const char* name : {"binding.npz", "contact.npz"}) known(name);
     body.binding = ffd::read_binding(folder / "binding.npz", body.surface, body.cage);
     body.contact = read_contact_shape(folder / "contact.npz", body.surface, body.cage);
     if (body.report.files.contains(appearance_file)) {

@@ -123,7 +123,7 @@ Json facts_of_body(const SurfaceMesh&, const std::vector<ConvexShell>&, const Te
                    const ffd::Binding&, const ContactShape&, const meshing::Certificate&);
 Json facts_of_appearance(const Appearance&);  // a table within "appearance"; null where that is empty
 // The names of the body's files, report.json apart.
-std::vector<std::string> files_of_body(const Appearance&);
+std::vector<std::string> files_of_body(const PrepareSettings&, const Appearance&);
 
 // In the body's own frame. Throws InputError naming the file and the command that renews it when one is
 // missing, damaged, or of another body.

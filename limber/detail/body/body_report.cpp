@@ -88,8 +88,10 @@ Json facts_of_body(const SurfaceMesh& surface, const std::vector<ConvexShell>& s
                       {"volume_m3", volume(surface)},
                       {"lower_m", {box.lower.x(), box.lower.y(), box.lower.z()}},
                       {"upper_m", {box.upper.x(), box.upper.y(), box.upper.z()}}};
-  facts["shells"] = {{"count", shells.size()},
-                     {"in_float32", std::count_if(shells.begin(), shells.end(), meshing::holds_in_float32)}};
+  if (!shells.empty())
+    facts["shells"] = {
+        {"count", shells.size()},
+        {"in_float32", std::count_if(shells.begin(), shells.end(), meshing::holds_in_float32)}};
   facts["cage"] = {{"tets", cage.tets.rows()},
                    {"nodes", cage.positions.rows()},
                    {"volume_m3", volume(cage)},
@@ -127,14 +129,15 @@ Json facts_of_making(const MadeBody& made, const PrepareSettings& settings) {
   const meshing::Decomposition& d = made.decomposition;
   const bool in_cells = settings.tets == 0;
   Json facts;
-  facts["shells"] = {{"stopped_by", d.stopped_by},
-                     {"inflation", settings.inflate},
-                     {"sum_of_volumes_m3", d.sum_of_hull_volumes},
-                     {"mean_overshoot", d.mean_overshoot},
-                     {"max_overshoot", d.max_overshoot},
-                     {"vertices_uncovered", d.vertices_uncovered},
-                     {"triangles_uncovered", d.triangles_uncovered},
-                     {"neighbours", d.neighbours}};
+  if (!d.shells.empty())
+    facts["shells"] = {{"stopped_by", d.stopped_by},
+                       {"inflation", settings.inflate},
+                       {"sum_of_volumes_m3", d.sum_of_hull_volumes},
+                       {"mean_overshoot", d.mean_overshoot},
+                       {"max_overshoot", d.max_overshoot},
+                       {"vertices_uncovered", d.vertices_uncovered},
+                       {"triangles_uncovered", d.triangles_uncovered},
+                       {"neighbours", d.neighbours}};
   facts["cage"] = {{"mode", in_cells ? "cells" : settings.mode},
                    {"volume_ratio", made.cage.volume_ratio},
                    {"glued_share", made.cage.glued_share}};
@@ -166,7 +169,6 @@ Json report_of(const WholeBody& body, const BodySource& source, const PrepareSet
   if (!body.model.appearance.empty()) report["appearance"] = facts_of_appearance(body.model.appearance);
   const Json making = facts_of_making(body.made, settings);
   for (const auto& [table, figures] : making.items()) report[table].update(figures);
-  if (!settings.has_shells()) report.erase("shells");
   if (!settings.has_cage()) report.erase("cage"), report.erase("certificate");
   if (!settings.is_whole()) report.erase("binding"), report.erase("contact"), report.erase("appearance");
   return report;

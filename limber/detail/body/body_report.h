@@ -11,7 +11,7 @@
 namespace limber::detail {
 
 struct PrepareSettings {
-  int shells = 32;
+  int shells = 32;  // at most; 0: none are made
   double concavity = 0;
   double threshold = 0;  // as DecomposeOptions::threshold
   double inflate = 0;
@@ -30,7 +30,7 @@ struct PrepareSettings {
     f("tets", tets), f("mode", mode), f.unless_usual("only", only, {});
     f.unless_usual("corners", corners, 64), f.unless_usual("threshold", threshold, 0.);
   }
-  bool has_shells() const { return only != "cage" || mode == "paper"; }
+  bool has_shells() const { return shells > 0 && (only != "cage" || mode == "paper"); }
   bool has_cage() const { return only != "shells"; }
   bool is_whole() const { return only.empty(); }
 };

@@ -71,6 +71,11 @@ std::vector<std::string> export_body(const PreparedBody& whole_body, const std::
   const auto write_rigid = [&](const char* file, auto write) {
     weigh();
     if (shells.empty()) {
+      if (!whole_body.report.shells)
+        throw InputError(fmt::format(
+            "{}: has no convex shells to collide with, for its scene asks for none; write \"shells = 32\" "
+            "under the body's cage and plan again, or limber prepare the model",
+            body_folder.string()));
       shells = read_obj_shells(body_folder / "shells.obj");
       whole.hulls = mass_of_each(shells);
       for (const std::string& hull : write_hulls(whole_body, whole, shells, density_kg_m3, folder))

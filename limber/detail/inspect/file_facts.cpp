@@ -98,7 +98,7 @@ Json info_of_shells(const PreparedBody& body, const std::vector<ConvexShell>& sh
 Json info_of_body(const fs::path& folder) {
   const PreparedBody body = read_body(folder);
   Json json = body.report.json;
-  json["shell_list"] = info_of_shells(body, read_obj_shells(folder / "shells.obj"));
+  if (body.report.shells) json["shell_list"] = info_of_shells(body, read_obj_shells(folder / "shells.obj"));
   return json;
 }
 

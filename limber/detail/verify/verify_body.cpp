@@ -76,6 +76,12 @@ void check_cage(const std::string& name, const PreparedBody& body, const Prepare
 
 void check_shells(const std::string& name, const PreparedBody& body, const PrepareSettings& settings,
                   const std::vector<ConvexShell>& shells, Promises& table) {
+  if (!settings.has_shells()) {
+    const bool none_named = std::all_of(body.shell_from_tet.begin(), body.shell_from_tet.end(),
+                                        [](int shell) { return shell == 0; });
+    table.row(name + ": no tet of the cage is of a shell, for there are none", none_named, "");
+    return;
+  }
   const meshing::ShellCheck c = meshing::check_shells(shells, body.surface);
   table.row(name + ": shells are convex", c.not_convex == 0 && !shells.empty(),
             fmt::format("{} of {} are not", c.not_convex, shells.size()));
@@ -278,21 +284,23 @@ Json check_making(const std::string& name, const PreparedBody& body, const Prepa
                   const std::vector<ConvexShell>& shells, const std::optional<TetMesh>& made_cage,
                   bool shells_too, Promises& table) try {
   const double size = bounding_box(body.surface.positions).diagonal();
-  const BodyReport::Shells& said = body.report.shells.value();
   MadeBody made;
-  // Where cutting stopped before, only cutting tells that it did.
-  const bool are_as_many_as_asked =
-      !settings.exact && int(shells.size()) == settings.shells && said.stopped_by == "count";
-  if (shells_too || body.surface.triangles.rows() <= small_triangles || tells_of_bare_parts(said) ||
-      !are_as_many_as_asked) {
-    throw_if_stopped();
-    made.decomposition = make_shells(body.surface, settings);
-    table.row(name + ": shells made again from the surface: the same",
-              same_shells(shells, made.decomposition.shells, size), "");
-  } else {
-    made.decomposition =
-        decomposition_by_report(shells, settings, concavity_of(body.surface, settings), said);
-    table.measured(name + ": shells", "checked, but not made again; --remake does that");
+  if (settings.has_shells()) {
+    const BodyReport::Shells& said = body.report.shells.value();
+    // Where cutting stopped before, only cutting tells that it did.
+    const bool are_as_many_as_asked =
+        !settings.exact && int(shells.size()) == settings.shells && said.stopped_by == "count";
+    if (shells_too || body.surface.triangles.rows() <= small_triangles || tells_of_bare_parts(said) ||
+        !are_as_many_as_asked) {
+      throw_if_stopped();
+      made.decomposition = make_shells(body.surface, settings);
+      table.row(name + ": shells made again from the surface: the same",
+                same_shells(shells, made.decomposition.shells, size), "");
+    } else {
+      made.decomposition =
+          decomposition_by_report(shells, settings, concavity_of(body.surface, settings), said);
+      table.measured(name + ": shells", "checked, but not made again; --remake does that");
+    }
   }
 
   throw_if_stopped();
@@ -322,8 +330,8 @@ std::optional<PrepareSettings> settings_told_of(const PreparedBody& body) {
   const PrepareSettings& s = body.report.input.settings;
   const auto share = [](double x) { return x >= 0 && x <= 1; };
   const std::set<std::string> modes{"lattice", "fast", "paper", "conform"};
-  const bool good = s.shells >= 1 && s.shells <= 1000 && share(s.concavity) && share(s.threshold) &&
-                    share(s.inflate) && s.corners >= 8 && s.corners <= 10'000 &&
+  const bool good = s.shells >= (s.mode == "paper" ? 1 : 0) && s.shells <= 1000 && share(s.concavity) &&
+                    share(s.threshold) && share(s.inflate) && s.corners >= 8 && s.corners <= 10'000 &&
                     (s.tets == 0 || (s.tets >= 24 && s.tets <= 200'000)) && modes.contains(s.mode);
   return good ? std::optional(s) : std::nullopt;
 }
@@ -334,7 +342,8 @@ void check_body(const std::string& name, const PreparedBody& body, const fs::pat
                 const std::optional<TetMesh>& made_cage, bool remake, Promises& table) {
   const std::optional<PrepareSettings> told = settings_told_of(body);
   const PrepareSettings settings = told.value_or(PrepareSettings{});
-  const std::vector<ConvexShell> shells = read_obj_shells(folder / "shells.obj");
+  std::vector<ConvexShell> shells;
+  if (settings.has_shells()) shells = read_obj_shells(folder / "shells.obj");
   for (const ConvexShell& shell : shells) validate(shell, (folder / "shells.obj").string());
   const meshing::Certificate certificate = meshing::certify(body.surface, body.cage);
   check_cage(name, body, settings, certificate, table);
@@ -351,7 +360,7 @@ void check_body(const std::string& name, const PreparedBody& body, const fs::pat
   std::string wrong = first_wrong(facts, body.report.json);
   if (wrong.empty() && !making.is_null()) wrong = first_wrong(making, body.report.json);
   if (wrong.empty() && !making.is_null())
-    wrong = odd_key(body.report, facts, making, files_of_body(body.appearance).size());
+    wrong = odd_key(body.report, facts, making, files_of_body(settings, body.appearance).size());
   table.row(name + ": report.json tells of these files", wrong.empty(),
             wrong.empty() ? "" : wrong + " is another's");
 }

@@ -81,7 +81,7 @@ void set_ligaments(const scenes::Scene& scene, fem::WorldSpec& spec) {
 void set_parts(const scenes::BodySpec& body, const PreparedBody& prepared, double share, fem::BodySpec& out) {
   if (body.parts.empty()) return;
   const Tets& tets = prepared.cage.tets;
-  const int shells = prepared.report.shells.value().count;
+  const int shells = prepared.report.shells ? prepared.report.shells->count : 0;
   out.youngs_modulus_from_tet_pa.assign(std::size_t(tets.rows()), body.material.youngs_modulus_pa);
   out.density_from_tet_kg_m3.assign(std::size_t(tets.rows()), out.material.density_kg_m3);
   for (const scenes::PartSpec& part : body.parts) {
