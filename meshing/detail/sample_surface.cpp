@@ -10,6 +10,7 @@
 
 #include "core/threads.h"
 #include "meshing/detail/point_grid.h"
+#include "meshing/detail/spot_falls.h"
 #include "meshing/detail/surface_spots.h"
 
 namespace limber::meshing::detail {
@@ -18,7 +19,6 @@ namespace {
 
 constexpr double probes_a_disc = 1.5, candidates_a_disc = 5;  // a square of the least spacing
 constexpr int max_candidates = 400'000;
-constexpr double same_side = 0.2;  // cosine of normals, below which points are not of one side of a sheet
 const double crease_cosine = std::cos(std::numbers::pi / 6), corner_cosine = std::cos(std::numbers::pi / 6);
 
 std::vector<SurfaceSpot> first_of(const SurfaceSpots& sequence, int count) {
@@ -48,6 +48,7 @@ class SpacingMap {
       of.box.include(sorted.back().position), of.normals.include(sorted.back().normal);
     }
     spots_ = std::move(sorted);
+    blocks_ = SpotBlocks(spots_);
     for (const SurfaceSpot& s : spots_) fine_grid_.add(s.position);
     parallel_for_many(int(cells_.size()), [&](int c) { find_near(cells_[std::size_t(c)]); });
 
@@ -124,7 +125,7 @@ class SpacingMap {
 
     // Nothing so far away changes anything: no point falls by more than it is away.
     bool is_done_at(double distance_m) const {
-      return bend_ >= flat_ && 2 * map_.limits_.missed_m * distance_m >= min_squared_;
+      return falls_.bend_m >= flat_ && 2 * map_.limits_.missed_m * distance_m >= falls_.min_squared_m2;
     }
 
     void look_at(const Cell& cell) {
@@ -135,26 +136,20 @@ class SpacingMap {
                    nearest =
                        (1 - rounding) * ((at_.position - middle).cwiseAbs() - half).cwiseMax(0).squaredNorm();
       if (nearest > farthest_ ||
-          ((bend_ >= flat_ || max_fall < flat_) &&
-           max_fall * min_squared_ <= 2 * map_.limits_.missed_m * std::max(nearest, least_)))
+          ((falls_.bend_m >= flat_ || max_fall < flat_) &&
+           max_fall * falls_.min_squared_m2 <= 2 * map_.limits_.missed_m * std::max(nearest, least_)))
         return;
       const Vec3 most =
           (cell.normals.lower.cwiseProduct(at_.normal)).cwiseMax(cell.normals.upper.cwiseProduct(at_.normal));
       if (most.sum() <= same_side - rounding) return;  // all are of another side
-      for (int n = cell.begin; n < cell.end; ++n) {
-        const SurfaceSpot& other = map_.spots_[std::size_t(n)];
-        const Vec3 way = other.position - at_.position;
-        const double squared_distance = way.squaredNorm();
-        if (squared_distance > farthest_ || other.normal.dot(at_.normal) <= same_side) continue;
-        const double fall = -way.dot(at_.normal);
-        bend_ = std::max(bend_, std::abs(fall));
-        if (fall > 0 && squared_distance >= least_)
-          min_squared_ = std::min(min_squared_, squared_distance * 2 * map_.limits_.missed_m / fall);
-      }
+      // Spots beside them in a block change nothing that those of their own cells do not.
+      falls_ = map_.blocks_.falls_from(at_, cell.begin, cell.end, {farthest_, least_, map_.limits_.missed_m},
+                                       falls_);
     }
 
     double spacing_m() const {
-      return bend_ < flat_ ? map_.limits_.max_flat_m : std::max(map_.limits_.min_m, std::sqrt(min_squared_));
+      return falls_.bend_m < flat_ ? map_.limits_.max_flat_m
+                                   : std::max(map_.limits_.min_m, std::sqrt(falls_.min_squared_m2));
     }
 
    private:
@@ -162,7 +157,7 @@ class SpacingMap {
     const SurfaceSpot& at_;
     const double flat_ = 0.1 * map_.limits_.missed_m, least_ = map_.limits_.min_m * map_.limits_.min_m,
                  farthest_ = map_.limits_.max_flat_m * map_.limits_.max_flat_m;
-    double min_squared_ = map_.limits_.max_m * map_.limits_.max_m, bend_ = 0;
+    Falls falls_{map_.limits_.max_m * map_.limits_.max_m, 0};
   };
 
   double measured_in(const Cell& home, const SurfaceSpot& at) const {
@@ -186,6 +181,7 @@ class SpacingMap {
 
   SampleSpacing limits_;
   std::vector<SurfaceSpot> spots_;  // by the cells of grid_
+  SpotBlocks blocks_;               // the same
   std::vector<Cell> cells_;
   std::vector<double> spacing_;
   PointGrid grid_, fine_grid_;

@@ -12,6 +12,7 @@
 #include "ffd/binding_file.h"
 #include "limber/detail/plan/manifest.h"
 #include "limber/detail/plan/plan.h"
+#include "limber/detail/world/body_source.h"
 #include "limber/detail/world/fem_system.h"
 #include "limber/detail/world/scene_world.h"
 #include "meshing/cage.h"
@@ -70,7 +71,7 @@ std::string overlapping_scene() {
 name = "pebble"
 role = "free"
 model = { sphere = { diameter_m = 0.4, triangle_m = 0.06 } }
-cage = { tets = 48 }
+cage = { tets = 48, shells = 32 }
 material = { youngs_modulus_pa = 5e3, poisson_ratio = 0.45, density_kg_m3 = 100 }
 pose = { position_m = [2, 1.55, 0.74] }
 )");
@@ -84,6 +85,9 @@ struct Mutant {
       bodies.push_back(read_body(body_folder(at, body)));
       shells.push_back(read_obj_shells(body_folder(at, body) / "shells.obj"));
     }
+    if (has_goal_cage(planned.scene))
+      bodies[std::size_t(planned.scene.robot)].goal_shape_m =
+          read_msh(goal_cage_file(planned.scene, at)).positions;
   }
 
   // Where the scene puts them.
@@ -1012,7 +1016,7 @@ List of_a_parted_start() {
   begin_otherwise("the last node of the start", [](State& s) { s.positions.back() -= 1e-4f; });
   begin_otherwise("a speed at the start", [](State& s) { s.velocities[7] = 1e-3f; });
   list.push_back({"nothing parted", start, [](Mutant& m) {
-                    const State rest = fem::rest_state(build_world(m.planned.scene, m.bodies));
+                    const State rest = fem::rest_state(build_world(m.planned.scene, m.placed()));
                     change_state(m.planned.plan, 0, [&](State& s) { s = rest; });
                     m.planned.plan.trajectory.frames[0] = rest;
                     m.write_plan();
@@ -1279,7 +1283,7 @@ class FileMutations_slow : public Mutations_slow {
     const PreparedBody made = read_body(good() / "bodies" / "ball");
     std::string obj;
     for (const auto& p : made.surface.positions.rowwise())
-      obj += fmt::format("v {} {} {}\n", p.x() - 0.6, p.y() - 1, p.z() - 1.3);
+      obj += fmt::format("v {} {} {}\n", p.x(), p.y(), p.z());
     for (const auto& t : made.surface.triangles.rowwise())
       obj += fmt::format("f {} {} {}\n", t[0] + 1, t[1] + 1, t[2] + 1);
     write_file(folder / "ball.obj", obj);

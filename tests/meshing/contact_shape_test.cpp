@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include "meshing/contact_check.h"
+#include "meshing/detail/spot_falls.h"
 #include "tests/meshing/contact_shapes.h"
 
 namespace limber::meshing {
@@ -18,6 +19,38 @@ TEST(ContactShape, AHoleIsClosed) {
     if (p.head<2>().norm() > 0.95) continue;
     EXPECT_NEAR(made.shape.field.at(p), exact, 1.5 * cell + 0.03 * std::abs(exact)) << p.transpose();
   }
+}
+
+// Four at a time, with whatever instructions there are: to the bit what one after the other says, of any
+// range.
+TEST(ContactShape, FallsOfSpotsAreThoseOfOneAfterTheOther) {
+  Rng rng(7, 0);
+  std::vector<detail::SurfaceSpot> spots;
+  for (int i = 0; i < 203; ++i)
+    spots.push_back({point_of({Vec3::Constant(-1), Vec3::Constant(1)}, rng), rng.direction()});
+  const detail::SpotBlocks blocks(spots);
+  const detail::FallLimits limits{1.5, 0.05, 0.01};
+  int changed = 0;
+  for (int turn = 0; turn < 2000; ++turn) {
+    const detail::SurfaceSpot at{point_of({Vec3::Constant(-1), Vec3::Constant(1)}, rng), rng.direction()};
+    const int first = rng.below(203), end = first + 1 + rng.below(203 - first);
+    const detail::Falls before{rng.uniform(0, 0.1), rng.uniform(0, 1)},
+        found = blocks.falls_from(at, first, end, limits, before);
+    detail::Falls expected = before;
+    for (int n = first / 4 * 4; n < std::min((end + 3) / 4 * 4, 203); ++n) {
+      const Vec3 way = spots[std::size_t(n)].position - at.position;
+      const double squared = way.squaredNorm(), fall = -way.dot(at.normal);
+      if (squared > limits.farthest_m2 || spots[std::size_t(n)].normal.dot(at.normal) <= detail::same_side)
+        continue;
+      expected.bend_m = std::max(expected.bend_m, std::abs(fall));
+      if (fall > 0 && squared >= limits.least_m2)
+        expected.min_squared_m2 = std::min(expected.min_squared_m2, squared * 2 * limits.missed_m / fall);
+    }
+    EXPECT_EQ(found.min_squared_m2, expected.min_squared_m2) << turn;
+    EXPECT_EQ(found.bend_m, expected.bend_m) << turn;
+    changed += found.min_squared_m2 < before.min_squared_m2 && found.bend_m > before.bend_m;
+  }
+  EXPECT_GT(changed, 200);
 }
 
 // A cage that leaves most of the surface outside: no weight is wild, and each sample goes with the tet next
