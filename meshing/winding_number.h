@@ -29,16 +29,33 @@ class WindingNumber {
   // Moments of the area vector n dA about the area-weighted center, x counted from there.
   struct Expansion {
     Vec3 center = Vec3::Zero();
-    double radius_squared = 0;                         // of the ball about `center` that holds the group
-    Vec3 area_vector = Vec3::Zero();                   // ∫ n dA
-    Eigen::Matrix3d moment = Eigen::Matrix3d::Zero();  // ∫ x nᵀ dA
-    Vec3 contracted = Vec3::Zero();                    // ∫ (x·x) n + 2 (x·n) x dA
-    std::array<Eigen::Matrix3d, 3> second_moment = {   // ∫ x xᵀ n_k dA, one matrix a component k of n
-        Eigen::Matrix3d::Zero(), Eigen::Matrix3d::Zero(), Eigen::Matrix3d::Zero()};
+    double radius_squared = 0;             // of the ball about `center` that holds the group
+    Vec3 area_vector = Vec3::Zero();       // ∫ n dA
+    double trace = 0;                      // ∫ x·n dA
+    std::array<double, 6> quadratic = {};  // of r ↦ ∫ (x·r) (n·r) dA: by xx, xy, xz, yy, yz, zz of r
+    Vec3 contracted = Vec3::Zero();        // ∫ (x·x) n + 2 (x·n) x dA
+    std::array<double, 10> cubic = {};  // of r ↦ ∫ (x·r)² (n·r) dA: xxx, xxy, xxz, xyy, xyz, xzz, yyy, …
   };
+  // Two triangles side by side, corner by corner; the second may be a point, which is seen under no angle.
+  typedef double Two __attribute__((vector_size(16)));
+  struct Pair {
+    Two corners[3][3];
+  };
+  // The product of D + i N of triangles, N and D as in solid_angle_share(): its argument, and the turns that
+  // it has gone round more than that shows, are half of all their solid angles.
+  class Angles {
+   public:
+    void add(const Pair&, const Vec3& point);
+    double share() const;  // of a whole sphere
+
+   private:
+    Two re_ = {1, 1}, im_ = {0, 0}, turns_ = {0, 0};
+  };
+
   detail::TriangleBvh bvh_;
-  std::vector<Expansion> expansions_;         // one a node
-  std::vector<std::array<Vec3, 3>> corners_;  // in the order of the leaves
+  std::vector<Expansion> expansions_;  // one a node
+  std::vector<Pair> pairs_;            // in the order of the leaves, each of which begins a pair
+  std::vector<int> first_pair_;        // of each node that is a leaf
 };
 
 }  // namespace limber::meshing

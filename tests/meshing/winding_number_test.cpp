@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <numbers>
 
 #include "core/random.h"
 #include "tests/meshing/made_meshes.h"
@@ -58,6 +59,38 @@ TEST(WindingNumber, AgreesWithTheSumOfSolidAnglesOnASoup) {
     sum_of_errors += error;
   }
   EXPECT_LT(sum_of_errors / points, 2e-3);
+}
+
+// Of near triangles the angles are summed as the argument of a product, which goes round: eight on top of
+// each other are each seen under nearly half of all directions, with either sign; at corners and in planes
+// under none.
+TEST(WindingNumber, NearTrianglesCountWithAllTheirTurns) {
+  Rng rng(3, 0);
+  double most = 0;
+  for (int turn = 0; turn < 500; ++turn) {
+    const int count = (turn % 2 == 0 ? 1 : 4) + rng.below(turn % 2 == 0 ? 8 : 5);  // so none are far
+    SurfaceMesh stack{Points(3 * count, 3), Triangles(count, 3)};
+    for (int t = 0; t < count; ++t) {
+      const bool around = turn % 2 == 0;  // else anywhere
+      for (int k = 0; k < 3; ++k) {
+        const double at = 2 * std::numbers::pi * k / 3;
+        stack.positions.row(3 * t + k) =
+            around ? Vec3(std::cos(at), std::sin(at), 0.001 * rng.uniform()) : rng.direction();
+        stack.triangles(t, k) = 3 * t + k;
+      }
+      if (rng.below(4) == 0) stack.triangles.row(t).reverseInPlace();
+    }
+    const WindingNumber winding(stack.positions, stack.triangles);
+    for (int i = 0; i < 20; ++i) {
+      Vec3 point = turn % 2 == 0 ? Vec3(0.2 * rng.uniform(), 0.2 * rng.uniform(), rng.uniform(-0.02, 0.02))
+                                 : Vec3(0.4 * rng.direction());
+      if (i == 0) point = stack.positions.row(0);
+      const double expected = sum_of_solid_angles(stack, point);
+      most = std::max(most, std::abs(expected));
+      EXPECT_NEAR(winding.at(point), expected, 1e-12) << turn << " " << i;
+    }
+  }
+  EXPECT_GT(most, 3.5);
 }
 
 // Seen from the axis, the missing half is the cone of its rim: the share is 1 − (1 − cos)/2.
