@@ -243,9 +243,9 @@ Cage lattice_cage(const SurfaceMesh& surface, const CageOptions& options) {
   return cage;
 }
 
-Cage paper_cage(const std::vector<ConvexShell>& shells, double diagonal) {
+Cage paper_cage(const std::vector<ConvexShell>& shells, double diagonal, int max_tets) {
   require(!shells.empty(), "mode paper needs convex shells; decompose the model first");
-  detail::PaperCage paper = detail::paper_cage(shells, diagonal);
+  detail::PaperCage paper = detail::paper_cage(shells, diagonal, max_tets);
   require(paper.mesh.tets.rows() > 0, "no shell has a volume; decompose the model anew");
   Cage cage;
   cage.mesh = std::move(paper.mesh);
@@ -304,7 +304,8 @@ Cage build_cage(const SurfaceMesh& surface, const std::vector<ConvexShell>& shel
   check(options);
   validate(surface, "cage");
   require(bounding_box(surface.positions).diagonal() > 0, "all vertices of the model are one point");
-  Cage cage = options.mode == CageMode::paper ? paper_cage(shells, bounding_box(surface.positions).diagonal())
+  Cage cage = options.mode == CageMode::paper
+                  ? paper_cage(shells, bounding_box(surface.positions).diagonal(), options.tets)
               : options.mode == CageMode::conform ? conforming_cage(surface, options.tets)
                                                   : lattice_cage(surface, options);
   if (options.mode == CageMode::paper || options.mode == CageMode::conform) measure(surface, options, cage);

@@ -258,9 +258,11 @@ BodySpec read_body(const Node& table, const Box& bounds) {
   body.material = read_material(table, body.kind, body.role, what);
   body.parts = read_parts(list(table, "parts"), body, what);
   const auto of_a_shell = [](const PartSpec& part) { return part.shell.has_value(); };
-  if (body.cage.shells == 0 &&
-      (body.cage.mode == "paper" || std::any_of(body.parts.begin(), body.parts.end(), of_a_shell)))
-    body.cage.shells = 32;
+  constexpr int usual_shells = 32, tets_a_shell = 75;  // what a cage can show of a shell
+  if (body.cage.shells == 0 && body.cage.mode == "paper" && body.cage.tets > 0)
+    body.cage.shells = std::clamp(body.cage.tets / tets_a_shell, 1, usual_shells);
+  else if (body.cage.shells == 0 && std::any_of(body.parts.begin(), body.parts.end(), of_a_shell))
+    body.cage.shells = usual_shells;
   body.fixed = read_fixed(child(table, "fixed"));
   if (body.kind == Kind::rigid && body.role != Role::obstacle &&
       (body.fixed.walls || !body.fixed.boxes_m.empty()))

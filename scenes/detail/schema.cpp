@@ -333,7 +333,7 @@ constexpr Key all_keys[] = {
     {"bodies[].cage.shells", Type::integer, from_to(0, 1000), 0, "0",
      "at most so many convex shells (docs/decomposition.md), for hulls of exports and parts that name them; "
      "no motion hangs on them. 0: none, but 32 where a part names one, and in mode paper, which makes the "
-     "cage of them",
+     "cage of them, one for each 75 tets, at most 32",
      "", ""},
 
     {"bodies[].material", Type::table, {}, 0, may_lack, "required, except for rigid obstacles", "", ""},

@@ -248,7 +248,7 @@ TEST_F(Program_slow, BodiesOfAPlanHaveShellsWhereTheSceneReadsThem) {
   EXPECT_EQ(bare.json().at("tree_hash"), asked.json().at("tree_hash"));
   plan("named", "bodies.block.parts=[{ shell = 0, youngs_modulus_pa = 2e4 }]");
   EXPECT_TRUE(has_shells("named"));
-  plan("paper", "bodies.block.cage.mode=paper");
+  EXPECT_EQ(plan("paper", "bodies.block.cage.mode=paper").code, exit_no_plan);
   EXPECT_TRUE(has_shells("paper"));
 
   const auto exported = [&](const std::string& name, const std::string& format) {

@@ -2,7 +2,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
 #include <csignal>
+#include <map>
 
 #include "core/error.h"
 #include "core/hash.h"
@@ -51,6 +54,38 @@ TEST(PaperMode, ADecomposedModelIsOnePiece) {
   EXPECT_NEAR(cage.volume_ratio, volume(cage.mesh) / volume(ring), 1e-12);
   EXPECT_GT(cage.volume_ratio, 0.95);
   EXPECT_LT(cage.volume_ratio, 1.5);
+}
+
+// Where shells overlap, one of two tets is left out: no face has two on one side. None is flat, and there are
+// no more than are asked for, of fewer corners the fewer they are.
+TEST(PaperMode, TetsOfShellsFitTogether) {
+  const SurfaceMesh ring = made_ring(0.3, 48, 12);
+  const Decomposition parts = decompose(ring, {.max_shells = 6});
+  Eigen::Index nodes = 1'000'000;
+  for (const int most : {2000, 400, 100}) {
+    SCOPED_TRACE(most);
+    const Cage cage = build_cage(ring, parts.shells, {.mode = CageMode::paper, .tets = most});
+    validate(cage.mesh, "paper");
+    EXPECT_LE(cage.mesh.tets.rows(), most);
+    EXPECT_GT(cage.mesh.tets.rows(), most / 4);
+    EXPECT_LT(cage.mesh.positions.rows(), nodes);
+    nodes = cage.mesh.positions.rows();
+    std::map<std::array<int, 3>, std::vector<double>>
+        sides;  // of each face: volumes to the tets' fourth corners
+    for (const auto& tet : cage.mesh.tets.rowwise())
+      for (int k = 0; k < 4; ++k) {
+        std::array<int, 3> face{tet[(k + 1) % 4], tet[(k + 2) % 4], tet[(k + 3) % 4]};
+        std::sort(face.begin(), face.end());
+        const auto at = [&](int v) { return Vec3(cage.mesh.positions.row(v)); };
+        sides[face].push_back(signed_volume(at(face[0]), at(face[1]), at(face[2]), at(tet[k])));
+        const double area = 0.5 * (at(face[1]) - at(face[0])).cross(at(face[2]) - at(face[0])).norm();
+        EXPECT_GT(3 * std::abs(sides[face].back()) / area, 1e-3 * bounding_box(ring.positions).diagonal());
+      }
+    for (const auto& [face, volumes] : sides) {
+      ASSERT_LE(volumes.size(), 2u);
+      EXPECT_LT(volumes[0] * (volumes.size() == 2 ? volumes[1] : -volumes[0]), 0);
+    }
+  }
 }
 
 TEST(ConformMode, MeetsTheBudgetAndFollowsTheSurface) {
