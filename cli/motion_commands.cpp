@@ -41,7 +41,8 @@ void add_plan(CLI::App& command, PlanOptions& options) {
       ->type_name("N");
   command
       .add_option("--preset", options.preset,
-                  "paper: Algorithm 1 of Rodriguez, Lien and Amato 2006; fast: what we found to be better; "
+                  "paper: Algorithm 1 of Rodriguez, Lien and Amato 2006 but for what docs/table1.md names; "
+                  "fast: what we found to be better; "
                   "default: the scene's")
       ->check(CLI::IsMember({"paper", "fast"}));
   add_limits(command, options);

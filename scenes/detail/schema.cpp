@@ -687,8 +687,8 @@ constexpr Key all_keys[] = {
      {},
      0,
      "\"fast\"",
-     "fast: what we found to be better; paper: the search of Rodriguez, Lien and Amato (ICRA 2006), which "
-     "has bodies touch at their cages",
+     "fast: what we found to be better; paper: the search of Rodriguez, Lien and Amato (ICRA 2006) but for "
+     "what docs/table1.md names, with bodies that touch at their cages",
      "fast, paper",
      ""},
     {"planner.seed", Type::integer, from_to(0, 0x1p53 - 1), 0, "1", "of all random numbers", "", ""},

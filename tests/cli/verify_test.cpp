@@ -181,7 +181,7 @@ TEST_F(KeptStiffness, IsWhatIsFoundAndOnlyWhereItFits) {
   const auto expect_as_found = [&](const std::vector<std::string>& sets) {
     const scenes::Scene scene = scenes::read_scene_file(file_of_scene, sets);
     const std::vector<PreparedBody> bodies = prepare_bodies(scene, {}, out());
-    const fem::World world = build_world_in(out(), scene, bodies);
+    const fem::World world = build_world_in(out(), {}, scene, bodies);
     EXPECT_EQ(stiffness_shares_of(world), stiffness_shares_of(build_world(scene, bodies)));
     EXPECT_LT(world.bodies[0].stiffness_share, 0.95);
   };
@@ -213,6 +213,29 @@ TEST_F(KeptStiffness, IsWhatIsFoundAndOnlyWhereItFits) {
   keep_stiffness_shares(scenes::read_scene_file(file_of_scene, other), {0}, out());
   const Json alone = Json::parse(read_file(file()));
   EXPECT_EQ(both.at(alone.begin().key()), alone.begin().value());
+}
+
+// A store hands it on to other folders, and what is damaged there is written anew.
+TEST_F(KeptStiffness, IsHandedOnThroughAStore) {
+  const scenes::Scene scene = scenes::read_scene_file(this->scene());
+  const fs::path store = folder.path() / "store";
+  const auto share_in = [&](const std::string& name) {
+    const std::vector<PreparedBody> bodies = prepare_bodies(scene, {}, out(name), store);
+    return double(build_world_in(out(name), store, scene, bodies).bodies[0].stiffness_share);
+  };
+  const double found = share_in("one");
+  const fs::path kept = fs::path(out("one")) / "bodies" / "robot" / "stiffness.json";
+  const std::string key = Json::parse(read_file(kept)).begin().key();
+  const fs::path stored = store / "stiffness" / (key + ".json");
+  const std::string good = read_file(stored);
+  const double other = 0.5 * found;  // sealed as limber does, so that it shows where it came from
+  const Json sealed{{key, {{"share", other}, {"hash", content_hash(key + text_of(Json(other)))}}}};
+  write_json(stored, sealed);
+  EXPECT_EQ(share_in("two"), other);
+  EXPECT_EQ(share_in("one"), found);
+  std::ofstream(stored) << good.substr(0, 30);
+  EXPECT_EQ(share_in("three"), found);
+  EXPECT_EQ(read_file(stored), good);
 }
 
 TEST_F(KeptStiffness, ThatIsFalseIsSeenByVerify) {

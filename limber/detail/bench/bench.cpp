@@ -30,7 +30,7 @@ struct BenchRuns::Setup {
       : options(options_of(bench, scene_given, preset)),
         scene(read_scene(options)),
         bodies(prepare_bodies(scene, bench.data, bench.out / scene.name, bench.store)),
-        world(build_world_in(bench.out / scene.name, scene, bodies)),
+        world(build_world_in(bench.out / scene.name, bench.store, scene, bodies)),
         system(world, bodies, goal_rules_of(scene)) {}
   Setup(const Setup&) = delete;
 

@@ -355,7 +355,7 @@ class Worker {
     FemSystem system;
     Setup(const scenes::Scene& scene, const PlanOptions& options)
         : bodies(prepare_bodies(scene, options.scene.data, options.out, options.scene.store)),
-          world(build_world_in(options.out, scene, bodies)),
+          world(build_world_in(options.out, options.scene.store, scene, bodies)),
           system(world, bodies, goal_rules_of(scene)) {}
   };
   const Setup& setup() {

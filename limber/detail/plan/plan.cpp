@@ -283,7 +283,7 @@ KeptPlan plan(const PlanOptions& options, const scenes::Scene& scene) {
   remove_abandoned(options.out);
   const std::vector<PreparedBody> bodies =
       prepare_bodies(scene, options.scene.data, options.out, options.scene.store, options.from);
-  const fem::World world = build_world_in(options.out, scene, bodies);
+  const fem::World world = build_world_in(options.out, options.scene.store, scene, bodies);
   const Beginning beginning = beginning_of(other, options.out, scene, world);
   const FemSystem system(world, bodies, goal_rules_of(scene), beginning.start);
   const fs::path file = options.out / "plan.npz";
@@ -409,7 +409,8 @@ bool plan_is_up_to_date(const PlanOptions& options, const scenes::Scene& scene) 
         prepare_bodies(scene, options.scene.data, options.out, options.scene.store);
     const PlanFolder folder = read_searched_folder(options.out);
     if (begins_elsewhere(folder)) return false;
-    const fem::World world = build_world(scene, bodies, State(folder.plan.tree.states[0]).positions);
+    const fem::World world = build_world_in(options.out, options.scene.store, scene, bodies,
+                                            State(folder.plan.tree.states[0]).positions);
     plan::Settings settings = settings_of(scene, options);
     const auto searches = folder.told.portfolio.value_or(PortfolioTold{}).searches;
     if (options.portfolio > 1

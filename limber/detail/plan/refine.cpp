@@ -70,7 +70,7 @@ KeptPlan refine(const RefineOptions& options) {
   const std::vector<PreparedBody> bodies =
       prepare_bodies(scene, options.data, options.out, options.store, options.folder);
 
-  const fem::World world = build_world_in(options.out, scene, bodies);
+  const fem::World world = build_world_in(options.out, options.store, scene, bodies);
   const FemSystem coarse(coarse_world, goal_rules_of(planned.scene)),
       system(world, bodies, goal_rules_of(scene));
   plan::Reference reference = plan::reference_of(coarse, planned.plan.trajectory);

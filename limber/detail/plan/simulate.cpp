@@ -136,7 +136,7 @@ KeptPlan simulate(const SimulateOptions& options) {
   const std::vector<PreparedBody> bodies =
       prepare_bodies(scene, options.scene.data, options.out, options.scene.store,
                      options.from.empty() ? options.follow : options.from);
-  const fem::World world = build_world_in(options.out, scene, bodies);
+  const fem::World world = build_world_in(options.out, options.scene.store, scene, bodies);
   const Beginning beginning = beginning_of(other, options.out, scene, world);
   const FemSystem system(world, {}, beginning.start);
   std::optional<FollowedPlan> followed;

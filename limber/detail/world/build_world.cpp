@@ -350,12 +350,15 @@ fem::World build_world(const scenes::Scene& scene, const std::vector<PreparedBod
   return build_world_of(scene, prepared, spec);
 }
 
-fem::World build_world_in(const fs::path& work_folder, const scenes::Scene& scene,
-                          const std::vector<PreparedBody>& prepared) {
+fem::World build_world_in(const fs::path& work_folder, const fs::path& store, const scenes::Scene& scene,
+                          const std::vector<PreparedBody>& prepared,
+                          const std::vector<float>& start_positions) {
   fem::WorldSpec spec = spec_of_world(scene, prepared);
+  spec.start_positions = start_positions;
   std::vector<KeptShare> kept;
   for (std::size_t b = 0; b < spec.bodies.size(); ++b) {
-    kept.emplace_back(body_folder(work_folder, scene.bodies[b]), in_own_frame(spec.bodies[b], prepared[b]));
+    kept.emplace_back(body_folder(work_folder, scene.bodies[b]), in_own_frame(spec.bodies[b], prepared[b]),
+                      store);
     spec.bodies[b].stiffness_share = kept[b].share();
   }
   fem::World world = build_world_of(scene, prepared, spec);

@@ -16,12 +16,13 @@ bool has_stiffness_share(const fem::BodySpec&);
 std::string stiffness_key_of(const fem::BodySpec&);
 
 // stiffness.json of a body's folder: the shares that were found, each under a hash of all that it depends on,
-// the program too, and with one of itself. What is damaged is not there.
+// the program too, and with one of itself. What is damaged is not there. And in a store of bodies, where
+// there is one, a file of each share, by the same hash.
 class KeptShare {
  public:
-  KeptShare(const fs::path& body_folder, const fem::BodySpec& in_its_own_frame);
+  KeptShare(const fs::path& body_folder, const fem::BodySpec& in_its_own_frame, const fs::path& store = {});
   double share() const { return share_; }  // 0: not known
-  // Of fem::Body; does nothing where it is known, or of no use. Throws DiskError.
+  // Of fem::Body; does nothing where it is of no use. Throws DiskError.
   void keep(double found);
 
   struct Entry {
@@ -35,11 +36,11 @@ class KeptShare {
   };
 
  private:
-  fs::path file_;
+  fs::path file_, in_store_;
   std::string key_;
   InOrder<Entry> kept_;
   double share_ = 0;
-  bool is_of_use_;
+  bool is_of_use_, is_stored_ = false;
 };
 
 }  // namespace limber::detail

@@ -94,9 +94,10 @@ fem::World build_world(const scenes::Scene&, const std::vector<PreparedBody>&,
                        const std::map<std::string, double>& stiffness_shares = {});
 
 // The same, with shares that take seconds to find kept in the folders of the bodies, and taken from there
-// when all that they depend on is the same. Who judges a plan finds them himself.
-fem::World build_world_in(const fs::path& work_folder, const scenes::Scene&,
-                          const std::vector<PreparedBody>&);
+// when all that they depend on is the same, or from a store of bodies, "" for none. Who judges a plan finds
+// them himself.
+fem::World build_world_in(const fs::path& work_folder, const fs::path& store, const scenes::Scene&,
+                          const std::vector<PreparedBody>&, const std::vector<float>& start_positions = {});
 // Of some bodies, 0 ≤ body < bodies, that are prepared there.
 void keep_stiffness_shares(const scenes::Scene&, const std::vector<std::size_t>& bodies,
                            const fs::path& work_folder);
