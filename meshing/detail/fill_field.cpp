@@ -18,7 +18,6 @@ constexpr double near_cells = 1.2;  // within which distances are exact
 constexpr double largest_value = 32'000;
 constexpr double spots_a_cell = 4, max_spots = 2e6;  // a face of a cell; to fit the field to
 constexpr int fitting_steps = 4;
-constexpr double rounding = 1e-9;  // of a cell
 
 class Filler {
  public:
@@ -29,17 +28,7 @@ class Filler {
         nodes_(grid.nodes),
         step_{1, nodes_[0], std::ptrdiff_t(nodes_[0]) * nodes_[1]},
         distance_(std::size_t(step_[2]) * nodes_[2], 1e100),
-        nearest_(distance_.size(), -1) {
-    balls_.reserve(pieces_.size());
-    for (const SurfacePiece& piece : pieces_) {
-      Ball& ball = balls_.emplace_back();
-      const auto& [a, b, c] = piece.corners;
-      ball.middle = (a + b + c) / 3;
-      for (const Vec3& corner : piece.corners)
-        ball.radius_m = std::max(ball.radius_m, (corner - ball.middle).norm());
-      ball.radius_m += rounding * cell_;
-    }
-  }
+        nearest_(distance_.size(), -1) {}
 
   // Of the nodes round each piece.
   void measure_near() {
@@ -98,10 +87,9 @@ class Filler {
           const int y = down[1] ? nodes_[1] - 1 - j : j;
           std::ptrdiff_t node = z * step_[2] + y * step_[1] + (down[0] ? nodes_[0] - 1 : 0);
           for (int i = 0; i < nodes_[0]; ++i, node -= back[0]) {
-            const std::array<int, 3> at{down[0] ? nodes_[0] - 1 - i : i, y, z};
-            if (i > 0) hear(node, at, node + back[0], to_us[0]);
-            if (j > 0) hear(node, at, node + back[1], to_us[1]);
-            if (k > 0) hear(node, at, node + back[2], to_us[2]);
+            if (i > 0) hear(node, node + back[0], to_us[0]);
+            if (j > 0) hear(node, node + back[1], to_us[1]);
+            if (k > 0) hear(node, node + back[2], to_us[2]);
           }
         }
       }
@@ -294,21 +282,15 @@ class Filler {
         if (uncrossed(node, other)) visit(other);
       }
   }
-  // `node`, which is `at`, takes the piece of `other` where that is nearer than its own; `to_us` is the bit
-  // of that way. Most others' pieces are in a ball that is farther away.
-  void hear(std::ptrdiff_t node, const std::array<int, 3>& at, std::ptrdiff_t other, std::uint8_t to_us) {
+  // `node` takes the piece of `other` where that is nearer than its own; `to_us` is the bit of that way.
+  void hear(std::ptrdiff_t node, std::ptrdiff_t other, std::uint8_t to_us) {
     const std::size_t n = std::size_t(node), o = std::size_t(other);
     if (!(unsaid_[o] & to_us)) return;
     unsaid_[o] &= std::uint8_t(~to_us);
     const int piece = nearest_[o];
     if (fixed_[n] || piece == nearest_[n] || distance_[o] - cell_ >= distance_[n]) return;
-    const Vec3 p = position(at[0], at[1], at[2]);
-    if (std::size_t(piece) < balls_.size()) {
-      const Ball& ball = balls_[std::size_t(piece)];
-      const double reach = ball.radius_m + distance_[n];
-      if ((p - ball.middle).squaredNorm() > reach * reach) return;
-    }
-    const double distance = distance_to(piece, p);
+    const auto [i, j, k] = indices(n);
+    const double distance = distance_to(piece, position(i, j, k));
     if (distance < distance_[n]) distance_[n] = distance, nearest_[n] = piece, unsaid_[n] = to_all;
   }
   double distance_to(int piece, const Vec3& p) const {
@@ -330,13 +312,8 @@ class Filler {
   const std::array<std::ptrdiff_t, 3> step_;  // between neighbouring nodes
   std::vector<double> distance_;              // to the nearest piece seen
   std::vector<int> nearest_;                  // that piece, or of closing_ counted on; −1: none known yet
-  struct Ball {                               // round a piece
-    Vec3 middle;
-    double radius_m = 0;
-  };
-  std::vector<Ball> balls_;
-  std::vector<Vec3> closing_;  // points that close holes
-  std::vector<float> clear_;   // no piece, seen or not, is nearer; up to near_cells
+  std::vector<Vec3> closing_;                 // points that close holes
+  std::vector<float> clear_;                  // no piece, seen or not, is nearer; up to near_cells
   std::vector<char> fixed_;
   static constexpr std::uint8_t to_all = 0x3f;
   std::vector<std::uint8_t> unsaid_;  // has another piece since it was asked along +x, −x, +y, −y, +z, −z
