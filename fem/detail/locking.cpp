@@ -24,7 +24,9 @@
 #include <Eigen/Sparse>
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cmath>
+#include <deque>
 #include <map>
 #include <memory>
 #include <numeric>
@@ -394,6 +396,7 @@ std::vector<Points> rigid_motions(const TetMesh& mesh) {
 struct Modes {
   Eigen::MatrixXd shapes;      // as columns: those asked for, and those equally soft as the last of them
   std::vector<int> same_from;  // of each the first that is equally soft, from one to the next
+  bool stay = false;
 };
 Modes softest_modes(const Sparse& k, const Solver& solver, const Vector& m, const Eigen::MatrixXd& rigid,
                     int count) {
@@ -424,8 +427,10 @@ Modes softest_modes(const Sparse& k, const Solver& solver, const Vector& m, cons
     }
     const Eigen::Index counting = Eigen::Index(modes.same_from.size());
     if (pass > 0 &&
-        ((squared - before).head(counting).array().abs() < stays * squared.head(counting).array()).all())
+        ((squared - before).head(counting).array().abs() < stays * squared.head(counting).array()).all()) {
+      modes.stay = true;
       break;
+    }
   }
   modes.shapes = x.leftCols(Eigen::Index(modes.same_from.size()));
   return modes;
@@ -444,6 +449,8 @@ class Level {
       : to_mesh(interpolate),
         tets(mesh, fixed, of_tet),
         from_coarse(over_axes(tets.from_mesh() * to_mesh, tets.freedoms(), coarse)) {}
+
+  bool all_found() const { return all_found_; }  // of what moved() was asked so far
 
   // From now on conjugate gradients are shown the way by that level, whose tets this one's are cut from.
   void stand_on(const Level& below) {
@@ -482,10 +489,12 @@ class Level {
       const double step = rz / p.dot(q);
       u += step * p, r -= step * q;
     }
+    if (!(r.norm() <= enough)) all_found_ = false;
     return u;
   }
 
  private:
+  mutable std::atomic<bool> all_found_ = true;
   std::unique_ptr<Solver> whole_;
   const Level* below_ = nullptr;
   Sparse from_below_;  // what may move of that → of this
@@ -561,17 +570,19 @@ void take_the_materials(std::span<Points> fields, const Level& level, const Bala
 // the work of the load along its own field, so a field's size does not matter. `hold` is 0 where nodes are
 // held; to the K of a free body it adds a billionth of the diagonal, which gives it an inverse. Loads count
 // by the cube of how far they move the body, so the softest decide.
-double locking_share(const TetMesh& rest, const std::vector<bool>& fixed, const std::vector<Lame>& of_tet,
-                     const std::vector<double>& node_mass, const ElementLists& elements) {
+LockingShare locking_share(const TetMesh& rest, const std::vector<bool>& fixed,
+                           const std::vector<Lame>& of_tet, const std::vector<double>& node_mass,
+                           const ElementLists& elements) {
   const int tets = int(rest.tets.rows()), nodes = int(rest.positions.rows());
-  if (tets > max_tets) return 1;
+  if (tets > max_tets) return {};
   const Freedoms coarse(fixed);
   const double hold = coarse.count < 3 * nodes ? 0 : hold_free;
   Sparse stiffness = stiffness_at_rest(elements, rest, of_tet, coarse);
   stiffness += hold * Sparse(stiffness.diagonal().asDiagonal());
   const Solver solver(stiffness);
-  if (solver.info() != Eigen::Success) return 1;
+  if (solver.info() != Eigen::Success) return {1, false};
 
+  bool is_found = true;
   std::vector<Points> fields, rigid;    // forces a volume
   std::vector<std::size_t> group_ends;  // of fields that are equally soft
   if (hold == 0) {
@@ -583,6 +594,7 @@ double locking_share(const TetMesh& rest, const std::vector<bool>& fixed, const 
     Eigen::MatrixXd motions(coarse.count, Eigen::Index(rigid.size()));
     for (std::size_t k = 0; k < rigid.size(); ++k) motions.col(Eigen::Index(k)) = coarse.from_nodes(rigid[k]);
     const Modes soft = softest_modes(stiffness, solver, mass, motions, modes);
+    is_found = soft.stay;
     for (int k = 0; k < soft.shapes.cols(); ++k) {
       fields.push_back(coarse.to_nodes(soft.shapes.col(k)));
       if (k > 0 && soft.same_from[std::size_t(k)] == soft.same_from[std::size_t(k - 1)])
@@ -591,8 +603,7 @@ double locking_share(const TetMesh& rest, const std::vector<bool>& fixed, const 
     }
   }
 
-  std::vector<Level> levels;
-  levels.reserve(2);  // the second points to the first
+  std::deque<Level> levels;  // the second points to the first
   Sparse same(nodes, nodes);
   same.setIdentity();
   levels.emplace_back(rest, same, fixed, of_tet, coarse);
@@ -602,7 +613,7 @@ double locking_share(const TetMesh& rest, const std::vector<bool>& fixed, const 
     for (const Lame& lame : of_tet) of_part.insert(of_part.end(), 8, lame);
     levels.emplace_back(refined(rest, middles), interpolation(middles, nodes),
                         fixed_with_middles(fixed, middles), of_part, coarse);
-    if (!levels.front().eliminate(hold)) return 1;
+    if (!levels.front().eliminate(hold)) return {1, false};
     levels.back().stand_on(levels.front());
   }
 
@@ -640,10 +651,10 @@ double locking_share(const TetMesh& rest, const std::vector<bool>& fixed, const 
     sum.coarse += weight * one.coarse, sum.reference += weight * one.reference;
   }
   const double share = sum.coarse / sum.reference;
+  for (const Level& level : levels) is_found = is_found && level.all_found();
+  if (!std::isfinite(share)) return {1, false};
   // Rounded, so that no other rounding on the way shows.
-  return std::isfinite(share)
-             ? std::clamp(std::round(512 * share) / 512, min_stiffness_share, max_stiffness_share)
-             : 1;
+  return {std::clamp(std::round(512 * share) / 512, min_stiffness_share, max_stiffness_share), is_found};
 }
 
 }  // namespace limber::fem::detail

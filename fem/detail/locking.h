@@ -18,7 +18,12 @@ struct Lame {
 // material's answer is that of quadratic tets (up to 1,500 tets also with each cut in eight, and
 // extrapolated). Meshes of more than 20,000 tets are taken to be fine enough: 1. A multiple of 1/512. Method:
 // docs/dynamics.md.
-double locking_share(const TetMesh& rest, const std::vector<bool>& fixed, const std::vector<Lame>& of_tet,
-                     const std::vector<double>& node_mass, const ElementLists& elements);
+struct LockingShare {
+  double share = 1;
+  bool is_found = true;  // false: the solves did not get as near as they should, and it is a guess
+};
+LockingShare locking_share(const TetMesh& rest, const std::vector<bool>& fixed,
+                           const std::vector<Lame>& of_tet, const std::vector<double>& node_mass,
+                           const ElementLists& elements);
 
 }  // namespace limber::fem::detail

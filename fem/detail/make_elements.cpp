@@ -23,6 +23,7 @@
 
 #include <Eigen/LU>
 
+#include "core/log.h"
 #include "core/threads.h"
 #include "fem/detail/locking.h"
 #include "fem/detail/make_body.h"
@@ -170,8 +171,15 @@ void find_stiffness_shares(std::vector<Body>& bodies) {
     if (!body.moving || body.kind != BodyKind::deformable || !body.material.mesh_independent) return;
     std::vector<Lame> of_tet;
     for (int t = 0; t < body.cage.tets.rows(); ++t) of_tet.push_back(lame_of(body, t));
-    body.stiffness_share =
+    const LockingShare found =
         locking_share(body.cage, body.fixed, of_tet, body.node_mass_kg, make_elements(body));
+    body.stiffness_share = found.share;
+    if (!found.is_found)
+      log::warn(
+          "body {}: by how much its cage is too stiff is a guess, {:.3f} (docs/dynamics.md, \"One material, "
+          "any "
+          "mesh\"); moduli that differ less from tet to tet, or other tets, may help",
+          body.name, found.share);
   });
 }
 

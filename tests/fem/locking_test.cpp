@@ -5,7 +5,10 @@
 #include <functional>
 
 #include "core/error.h"
-
+#include "core/random.h"
+#include "fem/detail/locking.h"
+#include "fem/detail/make_body.h"
+#include "fem/detail/make_elements.h"
 #include "fem/reference.h"
 #include "fem/stiffness_share.h"
 #include "tests/fem/laws.h"
@@ -174,6 +177,26 @@ TEST(Locking, TwoPiecesHaveTheShareOfOne) {
   two.tets << one.tets, (one.tets.array() + int(nodes)).matrix();
   EXPECT_NEAR(512 * stiffness_share_of({"two", two, material, {}}),
               512 * stiffness_share_of({"one", one, material, {}}), 1);
+}
+
+// The solves say whether they came as near as they should: in a bar of one material they do, and they cannot
+// where what shows them the way is of another material than what they are to solve.
+TEST(Locking_slow, AGuessIsSaidToBeOne) {
+  Material material;
+  material.mesh_independent = true;
+  const BodySpec bar{"bar", grid({0, 0, 0}, {4, 1, 1}, 12, 6, 5), material, {}};
+  Body body = detail::make_body(bar);
+  body.stiffness_share = 1;
+  const auto is_found = [&](const std::vector<detail::Lame>& of_tet) {
+    return detail::locking_share(body.cage, body.fixed, of_tet, body.node_mass_kg,
+                                 detail::make_elements(body))
+        .is_found;
+  };
+  std::vector<detail::Lame> of_tet(std::size_t(body.cage.tets.rows()), {2e3, 2e3});
+  EXPECT_TRUE(is_found(of_tet));
+  Rng rng(5, 0);
+  for (detail::Lame& lame : of_tet) lame.mu = lame.lambda = std::pow(10, rng.uniform(-3, 12));
+  EXPECT_FALSE(is_found(of_tet));
 }
 
 // The finer the mesh, the less there is to mend.
