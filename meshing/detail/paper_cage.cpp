@@ -171,12 +171,14 @@ PaperCage paper_cage(const std::vector<ConvexShell>& shells, double diagonal, in
                   "enclosure are not "
                   "heeded",
                   made->tets().size(), max_tets));
-  cage.notes.push_back(fmt::format(
-      "mode paper: corners within {:.3g} of the diagonal of each other or of another shell are shared, which "
-      "leaves {} of {}; "
-      "{} of the {} pairs of shells that share corners share a face: elsewhere neighbours overlap or gape",
-      weld, nodes.size(), made->corners().rows(), pairs_that_share(owners_of_face).size(),
-      pairs_that_share(owners_of_node).size()));
+  if (shells.size() > 1)
+    cage.notes.push_back(fmt::format(
+        "mode paper: corners within {:.3g} of the diagonal of each other or of another shell are shared, "
+        "which "
+        "leaves {} of {}; "
+        "{} of the {} pairs of shells that share corners share a face: elsewhere neighbours overlap or gape",
+        weld, nodes.size(), made->corners().rows(), pairs_that_share(owners_of_face).size(),
+        pairs_that_share(owners_of_node).size()));
   if (made->thin() + made->in_the_way() > 0)
     cage.notes.push_back(fmt::format(
         "mode paper: left out are {} tets thinner than {} of that, and {} where a neighbour's are",

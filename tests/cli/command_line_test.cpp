@@ -22,8 +22,14 @@
 #include "limber/detail/body/body.h"
 #include "limber/detail/body/export.h"
 #include "limber/detail/body/preview.h"
+#include "limber/detail/plan/diagnosis.h"
+#include "limber/detail/plan/plan.h"
+#include "limber/detail/world/fem_system.h"
+#include "limber/detail/world/scene_world.h"
 #include "limber/exit_codes.h"
+#include "plan/search.h"
 #include "render/png_file.h"
+#include "scenes/scene.h"
 #include "tests/cli/program.h"
 #include "tests/places.h"
 
@@ -218,6 +224,23 @@ TEST_F(Program_slow, PartsAreChosenByTheShellsThatInfoLists) {
   EXPECT_NE(empty.err.find("no tet of the cage has its middle in that box"), std::string::npos) << empty.err;
 }
 
+// Why a search came to nothing may take minutes to find; a stop is heard there too.
+TEST_F(Program_slow, ADiagnosisHearsAStop) {
+  const scenes::Scene small =
+      scenes::read_scene_file(scene(), {"bodies.robot.max_volume_change=1e-6"});  // refuses most pushes
+  const std::vector<PreparedBody> bodies = prepare_bodies(small, {}, out());
+  const fem::World world = build_world(small, bodies);
+  const FemSystem system(world, bodies, goal_rules_of(small));
+  plan::Settings settings = settings_of(small, PlanOptions{});
+  settings.max_iterations = 1;
+  const plan::Plan nothing = plan::plan(system, settings);
+  ASSERT_FALSE(nothing.solved());
+  EXPECT_FALSE(diagnose(world, system, nothing).text.empty());
+  request_stop(SIGTERM);
+  EXPECT_THROW(diagnose(world, system, nothing), Interrupted);
+  request_stop(0);
+}
+
 // No motion hangs on shells, so none are made where nothing reads them; whoever wants them is told how.
 TEST_F(Program_slow, BodiesOfAPlanHaveShellsWhereTheSceneReadsThem) {
   const std::string file = scene(replaced("size_m = [0.4, 2, 0.9] } }\ncage = { cells = [2, 4, 2] }",
@@ -262,6 +285,25 @@ TEST_F(Program_slow, BodiesOfAPlanHaveShellsWhereTheSceneReadsThem) {
   const Result info = limber_program({"info", out("bare") + "/bodies/block", "--json"});
   EXPECT_EQ(info.code, exit_done) << info.err;
   EXPECT_FALSE(info.json().contains("shell_list"));
+
+  // Shells of elsewhere, and settings that limber does not take, are told.
+  const fs::path with_others = folder.path() / "others", odd = folder.path() / "odd";
+  fs::copy(out("bare") + "/bodies/block", with_others);
+  fs::copy_file(out("asked") + "/bodies/block/shells.obj", with_others / "shells.obj");
+  const Result others = limber_program({"verify", with_others.string()});
+  EXPECT_EQ(others.code, exit_defect);
+  EXPECT_NE(others.out.find("shells.obj is there"), std::string::npos) << others.out;
+  for (const char* from : {"bare", "asked"}) {
+    fs::remove_all(odd);
+    fs::copy(out(from) + "/bodies/block", odd);
+    Json told = read_json(odd / "report.json");
+    told["input"]["settings"]["shells"] = -1;
+    write_json(odd / "report.json", told);
+    const Result refused = limber_program({"verify", odd.string()});
+    EXPECT_EQ(refused.code, exit_defect) << from;
+    EXPECT_NE(refused.out.find("BROKEN  body: its settings are some that limber takes"), std::string::npos)
+        << from << refused.out << refused.err;
+  }
 
   // What verify says of such bodies, and of one whose tets name a shell all the same.
   const Result verified = limber_program({"verify", out("bare") + "/bodies/block"});

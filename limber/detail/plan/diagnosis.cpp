@@ -5,8 +5,10 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <utility>
 #include <vector>
 
+#include "core/progress.h"
 #include "fem/batch.h"
 #include "fem/observe.h"
 #include "plan/passage.h"
@@ -34,7 +36,8 @@ Block block_at(const fem::World& world, const State& state, const Vec3& way) {
 }
 
 // Why pushes come to nothing there, as many as push so, most first. They are fourteen, to the sides and the
-// corners of a box round the robot, with all the force that is allowed and of a middling length.
+// corners of a box round the robot, with all the force that is allowed and of a middling length. Where steps
+// are short they take minutes: each is run in pieces, between which a stop is heard.
 std::vector<std::pair<std::string, int>> refusals_at(const fem::World& world, const FemSystem& system,
                                                      const State& state, const plan::Settings& settings) {
   std::map<std::string, int> counted;
@@ -42,11 +45,22 @@ std::vector<std::pair<std::string, int>> refusals_at(const fem::World& world, co
   push.manipulation = Manipulation::body;
   push.steps =
       std::max(1, int(std::lround((settings.min_duration_s + settings.max_duration_s) / 2 / system.dt_s())));
+  const int piece_steps = std::max(1, int(std::lround(0.1 / system.dt_s())));
+  fem::Batch batch(world, 1);
   for (int k = 0; k < 27; ++k) {
     const Vec3 way(k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1);
     if (const double axes = way.cwiseAbs().sum(); axes != 1 && axes != 3) continue;
     push.force_n = (settings.max_force_n * way.normalized()).cast<float>();
-    const fem::Rollout rollout = fem::propagate(world, state, push);
+    fem::Rollout rollout{&state, push, state, {}};
+    State before;
+    for (int left = push.steps; left > 0 && rollout.outcome.status != fem::RunStatus::diverged;) {
+      throw_if_stopped();
+      before = std::move(rollout.end);
+      rollout = {&before, push, {}, {}};
+      rollout.control.steps = std::min(left, piece_steps);
+      left -= rollout.control.steps;
+      fem::propagate(batch, {&rollout, 1});
+    }
     if (rollout.outcome.status == fem::RunStatus::diverged)
       ++counted["it diverges"];
     else if (!rollout.clear)

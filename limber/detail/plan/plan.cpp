@@ -360,7 +360,12 @@ KeptPlan keep_plan(const fs::path& folder, const scenes::Scene& scene,
     plan.measured = false;
   }
   if (path_alone) leave_path_alone(plan, extra, folder);
-  return keep_measured_plan(folder, scene, bodies, world, system, plan, figures, extra);
+  try {
+    return keep_measured_plan(folder, scene, bodies, world, system, plan, figures, extra);
+  } catch (const Interrupted&) {  // while it was asked why nothing was found: before anything was written
+    plan.measured = false;
+    return keep_measured_plan(folder, scene, bodies, world, system, plan, figures, extra);
+  }
 }
 
 void leave_path_alone(plan::Plan& plan, const Json& extra, const fs::path& folder) {

@@ -75,11 +75,13 @@ void check_cage(const std::string& name, const PreparedBody& body, const Prepare
 }
 
 void check_shells(const std::string& name, const PreparedBody& body, const PrepareSettings& settings,
-                  const std::vector<ConvexShell>& shells, Promises& table) {
+                  const std::vector<ConvexShell>& shells, const fs::path& folder, Promises& table) {
   if (!settings.has_shells()) {
     const bool none_named = std::all_of(body.shell_from_tet.begin(), body.shell_from_tet.end(),
                                         [](int shell) { return shell == 0; });
-    table.row(name + ": no tet of the cage is of a shell, for there are none", none_named, "");
+    const bool none_here = !fs::exists(folder / "shells.obj");
+    table.row(name + ": no tet of the cage is of a shell, for there are none", none_named && none_here,
+              none_here ? "" : "shells.obj is there, and nothing that limber wrote");
     return;
   }
   const meshing::ShellCheck c = meshing::check_shells(shells, body.surface);
@@ -341,13 +343,14 @@ std::optional<PrepareSettings> settings_told_of(const PreparedBody& body) {
 void check_body(const std::string& name, const PreparedBody& body, const fs::path& folder,
                 const std::optional<TetMesh>& made_cage, bool remake, Promises& table) {
   const std::optional<PrepareSettings> told = settings_told_of(body);
-  const PrepareSettings settings = told.value_or(PrepareSettings{});
+  PrepareSettings settings = told.value_or(PrepareSettings{});
+  if (!body.report.shells) settings.shells = 0;
   std::vector<ConvexShell> shells;
   if (settings.has_shells()) shells = read_obj_shells(folder / "shells.obj");
   for (const ConvexShell& shell : shells) validate(shell, (folder / "shells.obj").string());
   const meshing::Certificate certificate = meshing::certify(body.surface, body.cage);
   check_cage(name, body, settings, certificate, table);
-  check_shells(name, body, settings, shells, table);
+  check_shells(name, body, settings, shells, folder, table);
   check_binding(name, body, table);
   check_contact(name, body, table);
   table.row(name + ": its settings are some that limber takes", told.has_value(), "");
