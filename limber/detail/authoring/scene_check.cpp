@@ -28,12 +28,12 @@ namespace limber::detail {
 
 namespace {
 
-// CPU s of a body, without and for each triangle: within a factor of 2 for nine of ten of 113 bodies that
-// were prepared on one machine, of 48 to 174,534 triangles.
+// CPU s of a body without shells, once and for each triangle: within a factor of 2 for eleven organs that
+// were prepared on one machine, of 8,326 to 174,534 triangles.
 struct PrepareCost {
   double once_s, a_triangle_s;
 };
-constexpr PrepareCost in_cells{0.5, 3e-5}, by_tets{1.5, 8e-5};
+constexpr PrepareCost in_cells{0.5, 3e-5}, by_tets{0.5, 5.5e-5};
 
 constexpr int tried_iterations = 64;
 constexpr double tried_s = 10;
