@@ -24,8 +24,8 @@ SpotBlocks::SpotBlocks(const std::vector<SurfaceSpot>& spots) : blocks_(spots.si
                off = fall < 0 ? -fall : fall, spacing = squared * 2 * limits.missed_m / fall;
     const auto counts = (squared <= limits.farthest_m2) &
                         (normal[0] * n[0] + normal[1] * n[1] + normal[2] * n[2] > same_side);
-    bends = counts & (off > bends) ? off : bends;
-    squares = counts & (fall > 0) & (squared >= limits.least_m2) & (spacing < squares) ? spacing : squares;
+    bends = (counts & (off > bends)) ? off : bends;
+    squares = (counts & (fall > 0) & (squared >= limits.least_m2) & (spacing < squares)) ? spacing : squares;
   }
   for (int k = 0; k < lanes; ++k) {
     so_far.min_squared_m2 = std::min(so_far.min_squared_m2, squares[k]);
