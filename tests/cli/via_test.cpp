@@ -63,7 +63,7 @@ TEST_F(ViaProgram_slow, TheLegThatFailsIsNamedAndTheFirstIsKept) {
   const std::string file =
       with_goals(out_and_back + "clear_of = \"block\"\nbelow = \"block\"\n");  // under the floor
   const std::vector<std::string> words{"plan",         file,  "-o",     out(), "--json",
-                                       "--iterations", "120", "--seed", "2"};
+                                       "--iterations", "120", "--seed", "4"};
   const Result planned = limber_program(words);
   ASSERT_EQ(planned.code, exit_no_plan) << planned.err;
   const Json plan = planned.json();
