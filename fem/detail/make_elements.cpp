@@ -176,9 +176,8 @@ void find_stiffness_shares(std::vector<Body>& bodies) {
     body.stiffness_share = found.share;
     if (!found.is_found)
       log::warn(
-          "body {}: by how much its cage is too stiff is a guess, {:.3f} (docs/dynamics.md, \"One material, "
-          "any "
-          "mesh\"); moduli that differ less from tet to tet, or other tets, may help",
+          "body {}: by how much its cage is too stiff is a guess, {:.3f}: its tets or their moduli are too "
+          "unlike (docs/dynamics.md, \"One material, any mesh\"); make a cage of other tets",
           body.name, found.share);
   });
 }
