@@ -167,18 +167,16 @@ PaperCage paper_cage(const std::vector<ConvexShell>& shells, double diagonal, in
   for (std::size_t v = 0; v < nodes.size(); ++v) cage.mesh.positions.row(Eigen::Index(v)) = nodes[v];
 
   cage.notes.push_back(
-      fmt::format("mode paper: {} tets as the shells give them (at most {} were asked for); dihedrals and "
-                  "enclosure are not "
-                  "heeded",
+      fmt::format("mode paper: {} tets as the shells give them, of at most {} that were asked for; dihedrals "
+                  "and enclosure are not heeded",
                   made->tets().size(), max_tets));
   if (shells.size() > 1)
-    cage.notes.push_back(fmt::format(
-        "mode paper: corners within {:.3g} of the diagonal of each other or of another shell are shared, "
-        "which "
-        "leaves {} of {}; "
-        "{} of the {} pairs of shells that share corners share a face: elsewhere neighbours overlap or gape",
-        weld, nodes.size(), made->corners().rows(), pairs_that_share(owners_of_face).size(),
-        pairs_that_share(owners_of_node).size()));
+    cage.notes.push_back(
+        fmt::format("mode paper: corners within {:.3g} of the diagonal of each other or of another shell are "
+                    "shared, which leaves {} of {}; {} of the {} pairs of shells that share corners share a "
+                    "face: elsewhere neighbours overlap or gape",
+                    weld, nodes.size(), made->corners().rows(), pairs_that_share(owners_of_face).size(),
+                    pairs_that_share(owners_of_node).size()));
   if (made->thin() + made->in_the_way() > 0)
     cage.notes.push_back(fmt::format(
         "mode paper: left out are {} tets thinner than {} of that, and {} where a neighbour's are",
