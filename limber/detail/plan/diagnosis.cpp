@@ -45,7 +45,7 @@ std::vector<std::pair<std::string, int>> refusals_at(const fem::World& world, co
   push.manipulation = Manipulation::body;
   push.steps =
       std::max(1, int(std::lround((settings.min_duration_s + settings.max_duration_s) / 2 / system.dt_s())));
-  const int piece_steps = std::max(1, int(std::lround(0.1 / system.dt_s())));
+  constexpr int piece_steps = 64;
   fem::Batch batch(world, 1);
   for (int k = 0; k < 27; ++k) {
     const Vec3 way(k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1);
