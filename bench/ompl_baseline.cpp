@@ -4,11 +4,15 @@
 //
 //   ompl_bench SCENE -o DIR [--seeds 1-30] [--time-limit S] [--only RRT,paper] [--json]
 //
+// A run leaves a record in DIR/runs as those of `limber bench` are, so the same command goes on where it was
+// stopped, and `limber bench --merge DIR… -o OUT` makes curves of all.
+//
 // OMPL asks for one rollout at a time, in pieces of `step_s`, after each of which the state is checked; so a
 // rollout is one lane (a Batch of one). What is drawn is what limber draws: the manipulation by its weight,
 // the magnitude, the duration. Where OMPL has a state to go to (RRT, EST, PDST) the push is towards its
 // centre of mass, as in limber; else (KPIECE1, SST) its direction is random. Goal: the centre of mass in the
-// ball, and coming to rest there, by limber's own test.
+// ball, and coming to rest there, by limber's own test. Where the goal moves with a body, OMPL's places are
+// those seen from it. What frames show beyond that a state is sound is not asked of OMPL's ways.
 #include <fmt/format.h>
 #include <ompl/base/ProblemDefinition.h>
 #include <ompl/base/goals/GoalSampleableRegion.h>
@@ -28,6 +32,7 @@
 
 #include "core/error.h"
 #include "core/hash.h"
+#include "core/json_text.h"
 #include "core/log.h"
 #include "core/progress.h"
 #include "core/threads.h"
@@ -63,7 +68,8 @@ class NodeSpace final : public ob::StateSpace {
  public:
   struct StateType : ob::State {
     limber::State state;
-    Vec3 center = Vec3::Zero();
+    Vec3 center = Vec3::Zero();  // of the robot, seen from a goal that moves
+    Vec3 shift = Vec3::Zero();   // by which the goal has moved
     bool good = true;
   };
   static StateType& of(ob::State* s) { return *static_cast<StateType*>(s); }
@@ -82,7 +88,7 @@ class NodeSpace final : public ob::StateSpace {
   void copyState(ob::State* to, const ob::State* from) const override {
     StateType& a = of(to);
     const StateType& b = of(from);
-    a.state = b.state, a.center = b.center, a.good = b.good;
+    a.state = b.state, a.center = b.center, a.shift = b.shift, a.good = b.good;
   }
   double distance(const ob::State* a, const ob::State* b) const override {
     return (of(a).center - of(b).center).norm();
@@ -92,7 +98,7 @@ class NodeSpace final : public ob::StateSpace {
   }
   void interpolate(const ob::State* a, const ob::State* b, double t, ob::State* s) const override {
     const Vec3 center = of(a).center + t * (of(b).center - of(a).center);
-    of(s).state = limber::State(), of(s).center = center, of(s).good = true;
+    of(s).state = limber::State(), of(s).center = center, of(s).shift.setZero(), of(s).good = true;
   }
   ob::State* allocState() const override { return new StateType; }
   void freeState(ob::State* s) const override { delete &of(s); }
@@ -123,7 +129,7 @@ class PlaceSampler final : public ob::StateSampler {
   template <class Coordinate>
   void set(ob::State* s, const Coordinate& coordinate) {
     auto& place = NodeSpace::of(s);
-    place.state = limber::State(), place.good = true;
+    place.state = limber::State(), place.shift.setZero(), place.good = true;
     for (int axis = 0; axis < 3; ++axis) place.center[axis] = coordinate(axis);
     space_->enforceBounds(s);
   }
@@ -182,12 +188,14 @@ class ControlSpace final : public oc::ControlSpace {
   const Problem& problem_;
 };
 
-// What limber draws for an expansion towards `point`, with OMPL's random numbers.
-plan::Sample draw_towards(const Problem& problem, ompl::RNG& rng, const Vec3& point) {
+// What limber draws for an expansion from `center` towards `point`, both seen from the goal, with OMPL's
+// random numbers.
+limber::Control draw_towards(const Problem& problem, ompl::RNG& rng, const Vec3& point, const Vec3& center,
+                             const Vec3& shift) {
   const plan::Settings& s = problem.settings;
   plan::Sample d;
-  d.point = point;
   d.towards_goal = (point - s.goal.center_of_mass_m).norm() < 1e-9;
+  d.point = d.towards_goal ? point : Vec3(point + shift);
   const double interpolation = d.towards_goal ? s.weights.interpolation : 0;
   const double pick = rng.uniform01() * (s.weights.body + s.weights.control_point + interpolation);
   d.manipulation = pick < s.weights.body                             ? Manipulation::body
@@ -196,7 +204,7 @@ plan::Sample draw_towards(const Problem& problem, ompl::RNG& rng, const Vec3& po
   d.force_n = s.max_force_n * rng.uniformReal(s.min_force_share, s.max_force_share);
   d.robot_node = problem.system.control_node(rng.uniformInt(0, problem.system.robot_nodes() - 1));
   d.steps = problem.steps;
-  return d;
+  return plan::control_of(d, s, center + shift, shift);
 }
 
 // For planners that have no state to go to: towards the goal as often as goal_bias says, else anywhere.
@@ -209,6 +217,7 @@ class UndirectedSampler final : public oc::ControlSampler {
     const plan::Settings& s = problem.settings;
     ++problem.controls;
     const Vec3 center = from ? NodeSpace::of(from).center : problem.system.sample_bounds().center();
+    const Vec3 shift = from ? NodeSpace::of(from).shift : Vec3::Zero();
     Vec3 point = s.goal.center_of_mass_m;
     if (rng_.uniform01() >= s.goal_bias) {
       Vec3 direction;
@@ -216,7 +225,7 @@ class UndirectedSampler final : public oc::ControlSampler {
       while (direction.norm() > 1 || direction.norm() < 1e-3);
       point = center + direction;
     }
-    ControlSpace::of(c) = plan::control_of(draw_towards(problem, rng_, point), s, center);
+    ControlSpace::of(c) = draw_towards(problem, rng_, point, center, shift);
   }
   void sampleNext(oc::Control* c, const oc::Control*) override { sample(c); }
   void sampleNext(oc::Control* c, const oc::Control*, const ob::State* from) override { sample(c, from); }
@@ -233,8 +242,8 @@ class TowardsSampler final : public oc::DirectedControlSampler {
   unsigned sampleTo(oc::Control* c, const ob::State* from, ob::State* to) override {
     const plan::Settings& s = problem_.settings;
     ++problem_.controls;
-    ControlSpace::of(c) = plan::control_of(draw_towards(problem_, rng_, NodeSpace::of(to).center), s,
-                                           NodeSpace::of(from).center);
+    const auto& at = NodeSpace::of(from);
+    ControlSpace::of(c) = draw_towards(problem_, rng_, NodeSpace::of(to).center, at.center, at.shift);
     const unsigned pieces = problem_.pieces(rng_.uniformReal(s.min_duration_s, s.max_duration_s));
     return si_->propagateWhileValid(from, c, int(pieces), to);
   }
@@ -261,7 +270,8 @@ class SoftPropagator final : public oc::StatePropagator {
     auto& result = NodeSpace::of(to);
     result.good = rollout.ok && problem_.system.acceptable(rollout.to);
     if (!result.good) return;
-    result.center = problem_.system.robot_center(rollout.to);
+    result.shift = problem_.system.goal_shift(rollout.to);
+    result.center = problem_.system.robot_center(rollout.to) - result.shift;
     result.state = std::move(rollout.to);
   }
   bool canPropagateBackward() const override { return false; }
@@ -301,25 +311,32 @@ class BallGoal final : public ob::GoalSampleableRegion {
 
 struct Run {
   bool solved = false;
-  std::int64_t iterations = 0;
-  double cpu_s = 0, wall_s = 0, motion_s = 0;
+  std::int64_t iterations = 0, nodes = 0;
+  double distance_m = 0, cpu_s = 0, wall_s = 0;
+  plan::Trajectory
+      motion;  // to the goal and the rest there; of one that is not solved limber's best, or the start
 };
 
 double wall_seconds() {
   return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
 }
 
-// The controls of OMPL's path, replayed by limber, must end where OMPL says.
-double replayed_motion_s(const Problem& problem, const oc::PathControl& path) {
-  std::vector<limber::Control> controls;
-  for (std::size_t i = 0; i < path.getControlCount(); ++i) {
-    controls.push_back(ControlSpace::of(path.getControl(unsigned(i))));
-    controls.back().steps = problem.steps * int(std::lround(path.getControlDuration(unsigned(i)) / step_s));
+// The controls of OMPL's path, replayed by limber, must lead through OMPL's states, and then to rest.
+plan::Trajectory replayed(const Problem& problem, const oc::PathControl& path) {
+  plan::Tree chain;
+  const auto add = [&](unsigned state, const limber::Control& control) {
+    const auto& at = NodeSpace::of(path.getState(state));
+    chain.add(at.state, chain.size() - 1, control, std::int64_t(state) - 1,
+              (at.center + at.shift).cast<float>());
+  };
+  add(0, limber::Control());
+  for (unsigned i = 0; i < unsigned(path.getControlCount()); ++i) {
+    limber::Control control = ControlSpace::of(path.getControl(i));
+    control.steps = problem.steps * int(std::lround(path.getControlDuration(i) / step_s));
+    add(i + 1, control);
   }
-  const plan::Trajectory replay = plan::simulate(problem.system, controls, 1);
-  const auto& end = NodeSpace::of(path.getState(unsigned(path.getStateCount() - 1)));
-  LIMBER_CHECK(hash_of(replay.end) == hash_of(end.state));
-  return double(replay.end.step) * problem.system.dt_s();
+  return plan::trajectory_to(problem.system, problem.settings, chain, chain.size() - 1,
+                             problem.settings.settle.max_duration_s > 0);
 }
 
 using MakePlanner = ob::PlannerPtr (*)(const oc::SpaceInformationPtr&);
@@ -342,7 +359,8 @@ Run run_ompl(const FemSystem& system, const plan::Settings& settings, MakePlanne
   const auto definition = std::make_shared<ob::ProblemDefinition>(si);
   ob::State* start = si->allocState();
   NodeSpace::of(start).state = system.start();
-  NodeSpace::of(start).center = system.robot_center(NodeSpace::of(start).state);
+  NodeSpace::of(start).shift = system.goal_shift(NodeSpace::of(start).state);
+  NodeSpace::of(start).center = system.robot_center(NodeSpace::of(start).state) - NodeSpace::of(start).shift;
   definition->addStartState(start);
   si->freeState(start);
   definition->setGoal(std::make_shared<BallGoal>(si, problem));
@@ -355,10 +373,21 @@ Run run_ompl(const FemSystem& system, const plan::Settings& settings, MakePlanne
     return problem.controls >= settings.max_iterations || wall_seconds() - wall >= time_limit_s ||
            stop_signal() != 0 || problem.reached;
   }));
-  Run run{definition->hasExactSolution(), problem.controls, cpu_seconds() - cpu, wall_seconds() - wall};
+  Run run{.solved = definition->hasExactSolution(),
+          .iterations = problem.controls,
+          .cpu_s = cpu_seconds() - cpu,
+          .wall_s = wall_seconds() - wall,
+          .motion = {}};
   throw_if_stopped();
-  if (run.solved)
-    run.motion_s = replayed_motion_s(problem, *definition->getSolutionPath()->as<oc::PathControl>());
+  ob::PlannerData nodes(si);
+  planner->getPlannerData(nodes);
+  run.nodes = nodes.numVertices();
+  if (run.solved) {
+    run.motion = replayed(problem, *definition->getSolutionPath()->as<oc::PathControl>());
+  } else {
+    run.distance_m = definition->getSolutionDifference();
+    run.motion = plan::simulate(system, {}, settings.frames_per_second);
+  }
   return run;
 }
 
@@ -366,8 +395,8 @@ Run run_limber(const FemSystem& system, const plan::Settings& settings) {
   const plan::Plan plan = plan::plan(system, settings);
   throw_if_stopped();
   const plan::Statistics& search = plan.statistics;
-  return {plan.solved(), search.iterations, search.cpu_s, search.wall_s,
-          double(plan.trajectory.end.step) * system.dt_s()};
+  return {plan.solved(), search.iterations, plan.tree.size(), plan.best_distance_m,
+          search.cpu_s,  search.wall_s,     plan.trajectory};
 }
 
 template <class Planner>
@@ -381,9 +410,9 @@ ob::PlannerPtr make_biased(const oc::SpaceInformationPtr& si) {
   return planner;
 }
 
-Json report_of(const std::string& name, const std::vector<Run>& runs) {
+Json report_of(const std::string& name, const std::vector<RunRecord>& runs) {
   std::vector<double> iterations, cpu, wall, motion;
-  for (const Run& run : runs) {
+  for (const RunRecord& run : runs) {
     iterations.push_back(double(run.iterations)), cpu.push_back(run.cpu_s), wall.push_back(run.wall_s);
     if (run.solved) motion.push_back(run.motion_s);
   }
@@ -397,10 +426,16 @@ Json report_of(const std::string& name, const std::vector<Run>& runs) {
           {"motion_s", spread(motion)}};
 }
 
-std::string text_of(const Json& q, int digits) {
+std::string spread_text(const Json& q, int digits) {
   if (q.is_null()) return "-";
   return fmt::format("{:.{}f} {:.{}f} {:.{}f}", q[0].get<double>(), digits, q[1].get<double>(), digits,
                      q[2].get<double>(), digits);
+}
+
+fs::path record_file(const fs::path& folder, const std::string& scene, std::string planner, int seed) {
+  std::erase(planner, ',');
+  std::replace(planner.begin(), planner.end(), ' ', '_');
+  return folder / "runs" / fmt::format("{}.{}.{}.json", scene, planner, seed);
 }
 
 int compare(int argc, char** argv) {
@@ -410,8 +445,10 @@ int compare(int argc, char** argv) {
   double time_limit_s = 120;
   bool json = false;
   std::vector<std::string> only;
+  std::vector<fs::path> data;
   program.add_option("SCENE", options.scene.scene)->required();
-  program.add_option("-o,--out", options.out, "folder of the prepared bodies")->required();
+  program.add_option("-o,--out", options.out, "folder of the prepared bodies and the records")->required();
+  program.add_option("--data", data, "folders of models, as of limber plan");
   program.add_option("--seeds", seeds)->capture_default_str();
   program.add_option("--time-limit", time_limit_s, "wall seconds of a run of OMPL")->capture_default_str();
   program.add_option("--iterations", options.iterations, "controls drawn in a run; default: the scene's");
@@ -434,11 +471,10 @@ int compare(int argc, char** argv) {
   };
   scenes::Scene scene;
   plan_settings("paper", 1, &scene);
-  const std::vector<PreparedBody> bodies = prepare_bodies(scene, {}, options.out);
+  const std::vector<PreparedBody> bodies = prepare_bodies(scene, data, options.out);
   const fem::World world = build_world(scene, bodies);
   const GoalRules rules = goal_rules_of(scene);
-  if (rules.body >= 0 || !scene.via.empty())
-    throw InputError("ompl_bench: OMPL knows no goal that moves and no goals on the way; take another scene");
+  if (!scene.via.empty()) throw InputError("ompl_bench: OMPL knows no goals on the way; take another scene");
   if (!rules.patches_m.empty() || !rules.through.empty() || rules.turn_tolerance_deg ||
       rules.shape_tolerance_m || rules.volume > 0 || rules.above >= 0 || rules.below >= 0 ||
       rules.clear_of >= 0 || scene.planner.max_pressure_pa > 0)
@@ -446,42 +482,58 @@ int compare(int argc, char** argv) {
         "ompl_bench: OMPL's planners are asked for a place of the robot's centre of mass, and pushed at any "
         "node; this scene asks for more (patches, a shape, holes, a volume, above, below or clear_of), so "
         "nothing could be compared; take another scene");
-  const FemSystem system(world);
+  const FemSystem system(world, bodies, rules);
 
   struct Row {
-    const char* name;
-    std::function<Run(int)> run;
+    std::string name;
+    const char* preset;
+    std::function<Run(plan::Settings)> run;
   };
-  const auto ours = [&](const char* preset, int in_flight) {
-    return [&, preset, in_flight](int seed) {
-      scenes::Scene own;
-      plan::Settings settings = plan_settings(preset, seed, &own);
+  const auto ours = [&](int in_flight) {
+    return [&, in_flight](plan::Settings settings) {
       settings.in_flight = in_flight;
       return run_limber(system, settings);
     };
   };
   const auto theirs = [&](MakePlanner make) {
-    return [&, make](int seed) {
-      scenes::Scene own;
-      return run_ompl(system, plan_settings("paper", seed, &own), make, time_limit_s);
-    };
+    return
+        [&, make](const plan::Settings& settings) { return run_ompl(system, settings, make, time_limit_s); };
   };
-  std::vector<Row> rows{
-      {"limber fast, 16 lanes", ours("fast", 0)},   {"limber paper, 16 lanes", ours("paper", 0)},
-      {"limber paper, one lane", ours("paper", 1)}, {"OMPL RRT", theirs(make_biased<oc::RRT>)},
-      {"OMPL EST", theirs(make_biased<oc::EST>)},   {"OMPL KPIECE1", theirs(make_biased<oc::KPIECE1>)},
-      {"OMPL PDST", theirs(make_biased<oc::PDST>)}, {"OMPL SST", theirs(make_biased<oc::SST>)}};
+  std::vector<Row> rows{{"limber fast, 16 lanes", "fast", ours(0)},
+                        {"limber paper, 16 lanes", "paper", ours(0)},
+                        {"limber paper, one lane", "paper", ours(1)},
+                        {"OMPL RRT", "paper", theirs(make_biased<oc::RRT>)},
+                        {"OMPL EST", "paper", theirs(make_biased<oc::EST>)},
+                        {"OMPL KPIECE1", "paper", theirs(make_biased<oc::KPIECE1>)},
+                        {"OMPL PDST", "paper", theirs(make_biased<oc::PDST>)},
+                        {"OMPL SST", "paper", theirs(make_biased<oc::SST>)}};
   std::erase_if(rows, [&](const Row& row) {
     return !only.empty() && std::none_of(only.begin(), only.end(), [&](const std::string& word) {
-      return std::string_view(row.name).find(word) != std::string_view::npos;
+      return row.name.find(word) != std::string::npos;
     });
   });
-  std::vector<std::vector<Run>> runs(rows.size());
+  std::vector<std::vector<RunRecord>> runs(rows.size());
   // Seed after seed, so that what else the machine does falls on all alike.
   for (const int seed : parse_seeds(seeds))
     for (std::size_t r = 0; r < rows.size(); ++r) {
-      runs[r].push_back(rows[r].run(seed));
-      log::info("seed {}: {}: {} after {} iterations, {:.2f} CPU s", seed, rows[r].name,
+      const Row& row = rows[r];
+      scenes::Scene own;
+      const plan::Settings settings = plan_settings(row.preset, seed, &own);
+      RunIdentity identity = identity_of_run(scene, system, settings);
+      identity.settings["planner"] = row.name, identity.settings["time_limit_s"] = time_limit_s;
+      const fs::path file = record_file(options.out, scene.name, row.name, seed);
+      if (!is_done(file, identity)) {
+        const Run run = row.run(settings);
+        Json record{{"scene", scene.name},          {"preset", row.name}, {"seed", seed},
+                    {"solved", run.solved},         {"nodes", run.nodes}, {"iterations", run.iterations},
+                    {"distance_m", run.distance_m}, {"cpu_s", run.cpu_s}, {"wall_s", run.wall_s}};
+        record.update(record_of_motion(world, bodies, system, run.motion));
+        record["identity"] = json_of_fields(identity);
+        make_folder(file.parent_path());
+        write_file(file, text_of(record) + "\n");
+      }
+      runs[r].push_back(run_record_of(read_json(file), file.string()));
+      log::info("seed {}: {}: {} after {} iterations, {:.2f} CPU s", seed, row.name,
                 runs[r].back().solved ? "solved" : "not solved", runs[r].back().iterations,
                 runs[r].back().cpu_s);
     }
@@ -494,8 +546,8 @@ int compare(int argc, char** argv) {
     report["planners"].push_back(row);
     text += fmt::format("{:24}{:>8}{:>18}{:>20}{:>18}\n", rows[r].name,
                         fmt::format("{}/{}", row.at("solved").get<int>(), row.at("runs").get<int>()),
-                        text_of(row.at("iterations"), 0), text_of(row.at("cpu_s"), 2),
-                        text_of(row.at("motion_s"), 1));
+                        spread_text(row.at("iterations"), 0), spread_text(row.at("cpu_s"), 2),
+                        spread_text(row.at("motion_s"), 1));
   }
   fmt::print("{}", json ? report.dump(2) + "\n" : text);
   return 0;

@@ -70,14 +70,36 @@ std::vector<double> round_ticks(double low, double high, int count) {
 
 namespace {
 
+// Powers of ten, and with few of them 2 and 5 times these, that cover low … high from outside.
+std::vector<double> log_ticks(double low, double high) {
+  LIMBER_CHECK(0 < low && low <= high && std::isfinite(high), low, high);
+  const double first = std::floor(std::log10(low)), last = std::floor(std::log10(high)) + 1;
+  const bool few = last - first <= 3;
+  std::vector<double> ticks;
+  for (double k = first; k <= last; ++k)
+    for (const double times : {1, 2, 5}) {
+      if (times != 1 && !few) continue;
+      const double tick = times * std::pow(10.0, k);
+      if (tick <= low) ticks.clear();
+      ticks.push_back(tick);
+      if (tick >= high && ticks.size() > 1) return ticks;
+    }
+  return ticks;
+}
+
 // Where things lie in a plot, in pixels.
 struct Layout {
   std::vector<double> x_ticks, y_ticks;
   double left, right, top, bottom;
-  double x_step() const { return x_ticks[1] - x_ticks[0]; }
+  bool log_x;
   double y_step() const { return y_ticks[1] - y_ticks[0]; }
+  std::string x_label(double tick) const {
+    return log_x ? fmt::format("{:g}", tick) : tick_label(tick, x_ticks[1] - x_ticks[0]);
+  }
   double px(double v) const {
-    return left + (v - x_ticks.front()) / (x_ticks.back() - x_ticks.front()) * (right - left);
+    const auto along = [&](double x) { return log_x ? std::log10(x) : x; };
+    const double low = along(x_ticks.front()), high = along(x_ticks.back());
+    return left + (along(v) - low) / (high - low) * (right - left);
   }
   double py(double v) const {
     return bottom - (v - y_ticks.front()) / (y_ticks.back() - y_ticks.front()) * (bottom - top);
@@ -99,8 +121,13 @@ Layout layout_of(const std::vector<Curve>& curves, const PlotLook& look) {
   const Range data = y;
   for (const double limit : look.limits)
     if (limit > data.low - near && limit < data.high + near) y.include(limit);
-  return {round_ticks(x.low, x.high, 8), round_ticks(y.low, y.high, 6),    74,
-          look.width_px - 24.0,          look.title.empty() ? 24.0 : 50.0, look.height_px - 92.0};
+  return {.x_ticks = look.log_x ? log_ticks(x.low, x.high) : round_ticks(x.low, x.high, 8),
+          .y_ticks = round_ticks(y.low, y.high, 6),
+          .left = 74,
+          .right = look.width_px - 24.0,
+          .top = look.title.empty() ? 24.0 : 50.0,
+          .bottom = look.height_px - 92.0,
+          .log_x = look.log_x};
 }
 
 // Soft-edged, over what is there.
@@ -178,7 +205,7 @@ std::string plot_svg(const std::vector<Curve>& curves, const PlotLook& look) {
   }
   for (const double tick : at.x_ticks) {
     line(at.px(tick), bottom, at.px(tick), bottom + 5, "stroke=\"#999\"");
-    text(at.px(tick), bottom + 20, "middle", "", tick_label(tick, at.x_step()));
+    text(at.px(tick), bottom + 20, "middle", "", at.x_label(tick));
   }
   line(left, bottom, right, bottom, "stroke=\"#999\"");
   line(left, top, left, bottom, "stroke=\"#999\"");
@@ -233,7 +260,7 @@ Image8 plot_image(const std::vector<Curve>& curves, const PlotLook& look) {
   }
   for (const double tick : at.x_ticks) {
     draw_line(image, at.px(tick), at.bottom, at.px(tick), at.bottom + 5, 1, axis);
-    text(at.px(tick), at.bottom + 20, 0.5, tick_label(tick, at.x_step()), letter);
+    text(at.px(tick), at.bottom + 20, 0.5, at.x_label(tick), letter);
   }
   draw_line(image, at.left, at.bottom, at.right, at.bottom, 1, axis);
   draw_line(image, at.left, at.top, at.left, at.bottom, 1, axis);

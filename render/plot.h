@@ -19,6 +19,7 @@ struct PlotLook {
   int width_px = 900, height_px = 480;
   std::vector<double> limits = {};  // dashed lines at these y, as −10 and 10 per cent; they widen the y axis
                                     // only when near the data
+  bool log_x = false;  // x by its logarithm; all x > 0
 };
 // A whole SVG document; valid XML, no external fonts or styles. Same input, same bytes. Its data-left and
 // data-right are the pixels where x is data-low and data-high.

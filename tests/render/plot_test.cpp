@@ -54,6 +54,28 @@ TEST(Plot, PointsLieWhereTheAxesSay) {
       data("left") + (5 - data("low")) / (data("high") - data("low")) * (data("right") - data("left")), 0.01);
 }
 
+// By its logarithm x is as far from 2 x everywhere, also where that is a line at the ends of all.
+TEST(Plot, EqualRatiosAreEquallyFarApart) {
+  Rng rng(43, 0);
+  for (int trial = 0; trial < 200; ++trial) {
+    const double x = std::exp(rng.uniform(-9, 9)), times = std::exp(rng.uniform(0.01, 4));
+    const std::string svg = plot_svg({{"line", {1, 0, 0}, {x, x * times, x * times * times}, {0, 1, 2}}},
+                                     {.x_label = "x", .y_label = "y", .log_x = true});
+    std::smatch m;
+    ASSERT_TRUE(std::regex_search(
+        svg, m, std::regex("<path d=\"M([0-9.]+) [0-9.]+L([0-9.]+) [0-9.]+L([0-9.]+) [0-9.]+\"")));
+    const auto number = [&](std::size_t i) { return std::stod(m[i]); };
+    const auto data = [&](const char* name) {
+      return std::stod(svg.substr(svg.find("data-" + std::string(name) + "=\"") + 7 + std::strlen(name)));
+    };
+    EXPECT_NEAR(number(2) - number(1), number(3) - number(2), 0.03) << x << " " << times;
+    EXPECT_LE(data("low"), x);
+    EXPECT_GE(data("high"), x * times * times);
+    EXPECT_NEAR((number(2) - number(1)) / (data("right") - data("left")),
+                std::log(times) / std::log(data("high") / data("low")), 1e-4);
+  }
+}
+
 // The same curve, as pixels: each of its points is of its colour, where the SVG has it, and the rest of the
 // page has none of it.
 TEST(Plot, PixelsLieWhereTheSvgHasTheCurve) {

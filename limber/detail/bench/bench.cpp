@@ -54,16 +54,6 @@ struct BenchRuns::Setup {
 
 namespace {
 
-RunIdentity identity_of_run(const BenchRuns::Setup& setup, const plan::Settings& settings,
-                            const std::string& program) {
-  Hasher scene;
-  scene.text(setup.scene.text);
-  for (const std::string& set : setup.scene.sets) scene.text(set);
-  Json shaping = plan::json_of(settings);
-  shaping.erase("in_flight");
-  return {version, program, hex(scene.digest()), hex(setup.system.hash()), shaping};
-}
-
 InOrder<VolumeFigures> volume_figures(const fem::World& world, const MotionFigures& figures) {
   InOrder<VolumeFigures> bodies;
   for (std::size_t b = 0; b < world.bodies.size(); ++b) {
@@ -82,11 +72,11 @@ InOrder<VolumeFigures> volume_figures(const fem::World& world, const MotionFigur
 }
 
 // Every tenth of a second, to the millimetre: enough to see which way the robot went.
-Json robot_path(const BenchRuns::Setup& setup, const plan::Trajectory& path) {
+Json robot_path(const FemSystem& system, const plan::Trajectory& path) {
   Json places = Json::array();
   const double millimetre = 1000;
   for (double f = 0; f < double(path.frames.size()); f += std::max(1.0, path.frames_per_second / 10)) {
-    const Vec3 place = setup.system.robot_center(path.frames[std::size_t(f)]);
+    const Vec3 place = system.robot_center(path.frames[std::size_t(f)]);
     Json& list = places.emplace_back(Json::array());
     for (const double x : place) list.push_back(std::round(millimetre * x) / millimetre);
   }
@@ -94,28 +84,15 @@ Json robot_path(const BenchRuns::Setup& setup, const plan::Trajectory& path) {
 }
 
 Json record_of(const BenchRuns::Setup& setup, const plan::Plan& plan, const RunIdentity& identity) {
-  const MotionFigures figures =
-      measure_motion(setup.world, setup.bodies, plan.trajectory, setup.system.surfaces());
   std::string explanation = plan::explain(plan);
   if (!plan.solved()) explanation += " " + diagnose(setup.world, setup.system, plan).text;
-  char host[256] = "unknown";
-  ::gethostname(host, sizeof host - 1);
   Json record{{"scene", setup.scene.name},         {"preset", setup.scene.planner.preset},
               {"seed", plan.settings.seed},        {"solved", plan.solved()},
               {"explanation", explanation},        {"nodes", plan.tree.size()},
               {"distance_m", plan.best_distance_m}};
   record.update(plan::json_of(plan.statistics));
-  record.update(
-      {{"motion_s", double(plan.trajectory.end.step) * setup.world.dt_s},
-       {"robot_path_m", robot_path(setup, plan.trajectory)},
-       {"volume", json_of_fields(volume_figures(setup.world, figures))},
-       {"deepest_penetration_percent", 100 * figures.deepest_penetration_m / figures.robot_size_m}});
-  record.update(json_of(figures));
-  record.update({{"tree_hash", hex(plan::hash_of(plan.tree))},
-                 {"trajectory_hash", hex(plan::hash_of(plan.trajectory))},
-                 {"threads", thread_count()},
-                 {"host", host},
-                 {"identity", json_of_fields(identity)}});
+  record.update(record_of_motion(setup.world, setup.bodies, setup.system, plan.trajectory));
+  record.update({{"tree_hash", hex(plan::hash_of(plan.tree))}, {"identity", json_of_fields(identity)}});
   return record;
 }
 
@@ -126,20 +103,6 @@ struct IdentityTold {
     f("identity", identity);
   }
 };
-
-// Whether the run is done; throws InputError when the file is of another run.
-bool is_done(const fs::path& file, const RunIdentity& identity) {
-  if (!fs::exists(file)) return false;
-  const RunIdentity there =
-      read_fields<IdentityTold>(read_json(file), file.string(), "it is no record of limber bench: remove it")
-          .identity;
-  if (json_of_fields(there) == json_of_fields(identity)) return true;
-  std::string what = "other settings";
-  if (there.program != identity.program) what = "another build of limber";
-  if (there.scene_hash != identity.scene_hash) what = "another text of the scene, or other --set";
-  throw InputError(fmt::format("{}: was made with {}; take another folder with -o, or remove {}",
-                               file.string(), what, file.parent_path().string()));
-}
 
 std::string date_now() {
   const std::time_t now = std::chrono::system_clock::to_time_t(std::chrono::system_clock::now());
@@ -166,6 +129,44 @@ std::vector<fs::path> write_ompl_logs(const RunRecords& records, const fs::path&
 }
 
 }  // namespace
+
+Json record_of_motion(const fem::World& world, const std::vector<PreparedBody>& bodies,
+                      const FemSystem& system, const plan::Trajectory& motion) {
+  const MotionFigures figures = measure_motion(world, bodies, motion, system.surfaces());
+  char host[256] = "unknown";
+  ::gethostname(host, sizeof host - 1);
+  Json record{{"motion_s", double(motion.end.step) * world.dt_s},
+              {"robot_path_m", robot_path(system, motion)},
+              {"volume", json_of_fields(volume_figures(world, figures))},
+              {"deepest_penetration_percent", 100 * figures.deepest_penetration_m / figures.robot_size_m}};
+  record.update(json_of(figures));
+  record.update(
+      {{"trajectory_hash", hex(plan::hash_of(motion))}, {"threads", thread_count()}, {"host", host}});
+  return record;
+}
+
+RunIdentity identity_of_run(const scenes::Scene& scene, const FemSystem& system,
+                            const plan::Settings& settings) {
+  Hasher text;
+  text.text(scene.text);
+  for (const std::string& set : scene.sets) text.text(set);
+  Json shaping = plan::json_of(settings);
+  shaping.erase("in_flight");
+  return {version, program_hash(), hex(text.digest()), hex(system.hash()), shaping};
+}
+
+bool is_done(const fs::path& file, const RunIdentity& identity) {
+  if (!fs::exists(file)) return false;
+  const RunIdentity there =
+      read_fields<IdentityTold>(read_json(file), file.string(), "it is no record of limber bench: remove it")
+          .identity;
+  if (json_of_fields(there) == json_of_fields(identity)) return true;
+  std::string what = "other settings";
+  if (there.program != identity.program) what = "another build of limber";
+  if (there.scene_hash != identity.scene_hash) what = "another text of the scene, or other --set";
+  throw InputError(fmt::format("{}: was made with {}; take another folder with -o, or remove {}",
+                               file.string(), what, file.parent_path().string()));
+}
 
 BenchRuns::BenchRuns(BenchOptions options) : options_(std::move(options)) {
   if (options_.scenes.empty()) throw InputError("bench: name one scene at least, or folders with --merge");
@@ -206,8 +207,7 @@ std::string BenchRuns::run(std::size_t run) {
   const std::string& preset = setup.scene.planner.preset;
   const std::string label = fmt::format("{}.{}.{}", setup.scene.name, preset, settings.seed);
   const fs::path file = options_.out / "runs" / (label + ".json");
-  const RunIdentity identity =
-      identity_of_run(setup, settings, program_hash());  // two builds make no one benchmark
+  const RunIdentity identity = identity_of_run(setup.scene, setup.system, settings);
   if (is_done(file, identity)) return label;
   try {
     const plan::Plan plan = plan::plan(setup.system, settings);

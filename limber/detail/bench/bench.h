@@ -12,6 +12,9 @@
 #include "core/file.h"
 #include "core/json_fields.h"
 #include "limber/bench.h"
+#include "limber/detail/world/fem_system.h"
+#include "plan/trajectory.h"
+#include "scenes/scene.h"
 
 namespace limber::detail {
 
@@ -68,6 +71,17 @@ struct RunRecord {
 };
 // Throws InputError naming the key that is missing or of another kind.
 RunRecord run_record_of(Json, const std::string& file);
+
+// Of a record of RunRecord's keys what a motion is and shows over all its frames, from motion_s to
+// trajectory_hash, and which machine measured it.
+Json record_of_motion(const fem::World&, const std::vector<PreparedBody>&, const FemSystem&,
+                      const plan::Trajectory&);
+
+// What all records of a scene's text have in common.
+RunIdentity identity_of_run(const scenes::Scene&, const FemSystem&, const plan::Settings&);
+
+// Whether the record is there, of the same run; throws InputError where it is of another.
+bool is_done(const fs::path& record, const RunIdentity&);
 
 // Ordered by scene, preset and seed, each of these once.
 using RunRecords = std::vector<RunRecord>;

@@ -11,7 +11,9 @@ namespace limber::detail {
 namespace {
 
 // Of the presets in their order, and again from the first.
-const Vec3 colors[] = {{0.12, 0.40, 0.66}, {0.79, 0.33, 0.10}, {0.18, 0.52, 0.28}, {0.55, 0.24, 0.60}};
+const Vec3 colors[] = {{0.12, 0.40, 0.66}, {0.79, 0.33, 0.10}, {0.18, 0.52, 0.28}, {0.55, 0.24, 0.60},
+                       {0.85, 0.65, 0.13}, {0.30, 0.70, 0.75}, {0.45, 0.30, 0.20}, {0.90, 0.45, 0.65},
+                       {0.45, 0.45, 0.45}, {0.55, 0.75, 0.20}};
 
 using Group = std::vector<const RunRecord*>;
 using Figure = double (*)(const RunRecord&);
@@ -19,12 +21,12 @@ using Figure = double (*)(const RunRecord&);
 // The share of all runs that were solved with so much of a figure, in per cent: a stair of the solved ones'
 // values.
 render::Curve share_solved(const std::string& name, const Vec3& color, const Group& runs, Figure figure,
-                           double until) {
+                           double from, double until) {
   std::vector<double> values;
   for (const RunRecord* run : runs)
-    if (run->solved) values.push_back(figure(*run));
+    if (run->solved) values.push_back(std::max(figure(*run), from));
   std::sort(values.begin(), values.end());
-  render::Curve curve{name, color, {0}, {0}};
+  render::Curve curve{name, color, {from}, {0}};
   double share = 0;
   const auto add = [&](double x, double y) { curve.x.push_back(x), curve.y.push_back(y); };
   for (const double value : values) {
@@ -37,15 +39,22 @@ render::Curve share_solved(const std::string& name, const Vec3& color, const Gro
 }
 
 std::string plot_of(const std::map<std::string, Group>& presets, Figure figure, const char* words) {
-  double until = 0;
+  double from = 1e300, until = 0;  // by its logarithm: some runs take a hundred times as long as others
   for (const auto& [name, runs] : presets)
-    for (const RunRecord* run : runs) until = std::max(until, figure(*run));
+    for (const RunRecord* run : runs) {
+      const double value = std::max(figure(*run), 1e-3);
+      from = std::min(from, value), until = std::max(until, value);
+    }
   std::vector<render::Curve> curves;
   for (const auto& [name, runs] : presets)
-    curves.push_back(share_solved(name, colors[curves.size() % std::size(colors)], runs, figure, until));
-  return render::plot_svg(
-      curves,
-      {.x_label = words, .y_label = "solved (%)", .width_px = 560, .height_px = 320, .limits = {100}});
+    curves.push_back(
+        share_solved(name, colors[curves.size() % std::size(colors)], runs, figure, from, until));
+  return render::plot_svg(curves, {.x_label = words,
+                                   .y_label = "solved (%)",
+                                   .width_px = 560,
+                                   .height_px = 320,
+                                   .limits = {100},
+                                   .log_x = true});
 }
 
 std::string number(std::optional<double> value, int digits) {
