@@ -152,23 +152,21 @@ Push push_of(const Control& c) {
           .pressure_pa = c.pressure_pa};
 }
 
-std::vector<detail::PreparedBody> prepare_bodies(const Scene::Impl& scene,
-                                                 const std::filesystem::path& folder) {
+detail::BodiesAndWorld prepare_world(const Scene::Impl& scene, const std::filesystem::path& folder) {
   make_folder(folder);
   const FolderLock lock(folder, FolderLock::alone);
-  return detail::prepare_bodies(scene.scene, scene.data, folder);
+  std::vector<detail::PreparedBody> bodies = detail::prepare_bodies(scene.scene, scene.data, folder);
+  fem::World world = detail::build_world_in(folder, {}, scene.scene, bodies);
+  return {std::move(bodies), std::move(world)};
 }
 
 }  // namespace
 
 Problem::Impl::Impl(const Scene& of, const std::filesystem::path& work_folder,
-                    std::vector<detail::PreparedBody> (*prepare)(const Scene::Impl&,
-                                                                 const std::filesystem::path&),
-                    const std::vector<float>& start_positions)
+                    const std::function<detail::BodiesAndWorld(const std::filesystem::path&)>& make)
     : scene(of),
       folder(work_folder),
-      prepared(prepare(of.impl(), folder.path())),
-      world(detail::build_world(of.impl().scene, prepared, start_positions)),
+      made(make(folder.path())),
       system(world),
       state_numbers(3 * std::size_t(world.moving_nodes)) {
   for (std::size_t b = 0; b < prepared.size(); ++b)
@@ -177,16 +175,11 @@ Problem::Impl::Impl(const Scene& of, const std::filesystem::path& work_folder,
 }
 
 Problem::Impl::Impl(const Scene& of, const std::filesystem::path& work_folder)
-    : Impl(of, work_folder, prepare_bodies, {}) {}
+    : Impl(of, work_folder, [&](const std::filesystem::path& in) { return prepare_world(of.impl(), in); }) {}
 
 Problem::Impl::Impl(const detail::PlanFolder& planned, const std::filesystem::path& of_plan)
-    : Impl(
-          Scene(std::make_shared<Scene::Impl>(Scene::Impl{planned.scene, {}})), of_plan,
-          [](const Scene::Impl& of, const std::filesystem::path& in) {
-            return detail::read_bodies(of.scene, in);
-          },
-          detail::begins_elsewhere(planned) ? std::vector<float>{}
-                                            : State(planned.plan.tree.states[0]).positions) {}
+    : Impl(Scene(std::make_shared<Scene::Impl>(Scene::Impl{planned.scene, {}})), of_plan,
+           [&](const std::filesystem::path& in) { return detail::read_world_of(planned, in); }) {}
 
 Problem::Problem(const Scene& scene, const std::filesystem::path& work_folder, const Context& context)
     : impl_(working_for(context, [&] { return std::make_shared<const Impl>(scene, work_folder); })) {}
@@ -367,7 +360,6 @@ Plan Plan::load(const std::filesystem::path& folder) {
   return working_for({}, [&] {
     detail::PlanFolder planned = detail::read_plan_folder(folder);
     const auto problem = std::make_shared<const Problem::Impl>(planned, folder);
-    detail::read_bodies_of(planned, folder);  // complains of those that are others
     auto impl = std::make_shared<Plan::Impl>(Problem(problem), std::move(planned.plan));
     impl->summary = std::move(planned.summary);
     return Plan(std::move(impl));

@@ -241,6 +241,24 @@ TEST_F(Program_slow, ADiagnosisHearsAStop) {
   request_stop(0);
 }
 
+// A goal in the air in which nothing holds the robot: it is told how far from it the robot is in the end.
+// That is how far it fell to the floor, on which it stands a little pressed.
+TEST_F(Program_slow, ADiagnosisTellsWhereTheRobotComesToRest) {
+  const scenes::Scene falling = scenes::read_scene_file(
+      scene(), {"world.gravity_m_s2=[0, 0, -5]", "goal.center_of_mass_m=[0.6, 1, 1.3]", "goal.radius_m=0.05",
+                "bodies.robot.velocity_m_s=[0, 0, -0.5]", "planner.max_force_n=1"});
+  const std::vector<PreparedBody> bodies = prepare_bodies(falling, {}, out());
+  const fem::World world = build_world(falling, bodies);
+  const FemSystem system(world, bodies, goal_rules_of(falling));
+  plan::Settings settings = settings_of(falling, PlanOptions{});
+  settings.max_iterations = 1;
+  const plan::Plan plan = plan::plan(system, settings);
+  ASSERT_FALSE(plan.solved());
+  const Diagnosis told = diagnose(world, system, plan);
+  EXPECT_NEAR(told.json.at("rest").at("distance_m").get<double>(), 1.3 - 0.3, 0.05);
+  EXPECT_NE(told.text.find("What holds it there is too weak"), told.text.npos) << told.text;
+}
+
 // No motion hangs on shells, so none are made where nothing reads them; whoever wants them is told how.
 TEST_F(Program_slow, BodiesOfAPlanHaveShellsWhereTheSceneReadsThem) {
   const std::string file = scene(replaced("size_m = [0.4, 2, 0.9] } }\ncage = { cells = [2, 4, 2] }",

@@ -70,7 +70,7 @@ class ExportMotion : public Program {
 struct Truth {
   explicit Truth(const fs::path& work_folder)
       : planned(read_plan_folder(work_folder)),
-        bodies(read_bodies_of(planned, work_folder)),
+        bodies(read_world_of(planned, work_folder).bodies),
         world(build_world(planned.scene, bodies)) {}
   Points surface(int b, int frame) const {
     const PreparedBody& body = bodies[std::size_t(b)];

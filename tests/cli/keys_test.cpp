@@ -522,7 +522,7 @@ TEST_F(Keys_slow, ChangeWhatTheyShapeAndNothingElse) {
   const std::string file = scene(stage);
   ASSERT_EQ(limber_program({"plan", file, "-o", out(), "--iterations", "3", "-q"}).code, exit_no_plan);
   const PlanFolder planned = read_plan_folder(out());
-  std::vector<PreparedBody> prepared = read_bodies_of(planned, out());
+  std::vector<PreparedBody> prepared = read_world_of(planned, out()).bodies;
   Appearance& of_cart = prepared[2].appearance;  // as if its model had a color of its own
   of_cart.material_from_triangle.assign(std::size_t(prepared[2].surface.triangles.rows()), 0);
   of_cart.materials = {{.name = "green", .color = Vec3(0, 1, 0)}};

@@ -80,7 +80,7 @@ pose = { position_m = [2, 1.55, 0.74] }
 // A work folder in memory, to be changed and written so that it fits together again.
 struct Mutant {
   explicit Mutant(const fs::path& at) : folder(at), planned(read_plan_folder(at)) {
-    read_bodies_of(planned, at);  // they fit
+    read_world_of(planned, at);  // they fit
     for (const scenes::BodySpec& body : planned.scene.bodies) {
       bodies.push_back(read_body(body_folder(at, body)));
       shells.push_back(read_obj_shells(body_folder(at, body) / "shells.obj"));

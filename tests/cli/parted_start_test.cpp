@@ -58,7 +58,7 @@ TEST_F(PartedStart_slow, IsPartedToldAndVerified) {
 
   // All begins there: the tree, the path, the first frame, the goal test, the search's map.
   const PlanFolder planned_folder = read_plan_folder(out());
-  const std::vector<PreparedBody> bodies = read_bodies_of(planned_folder, out());
+  const std::vector<PreparedBody> bodies = read_world_of(planned_folder, out()).bodies;
   const fem::World world = build_world(planned_folder.scene, bodies),
                    known = world_of(planned_folder, bodies);
   const FemSystem system(world, goal_rules_of(planned_folder.scene)),

@@ -33,7 +33,7 @@ class Report : public Program {
 TEST_F(Report, PackedMotionUnpacksToTheSurfacesOfAllFrames) {
   plan();
   const PlanFolder planned = read_plan_folder(out());
-  std::vector<PreparedBody> bodies = read_bodies_of(planned, out());
+  std::vector<PreparedBody> bodies = read_world_of(planned, out()).bodies;
   const fem::World world = build_world(planned.scene, bodies);
   bodies[0].deformation = scenes::Deformation::linear;
   bodies[1].deformation = scenes::Deformation::phong;
@@ -118,7 +118,7 @@ TEST_F(Report, TheViewerMovesSurfacesAsFilmsDo) {
             0);
   const std::string points = read_file(fs::path(out()) / "points");
   const PlanFolder planned = read_plan_folder(out());
-  const std::vector<PreparedBody> bodies = read_bodies_of(planned, out());
+  const std::vector<PreparedBody> bodies = read_world_of(planned, out()).bodies;
   const fem::World world = build_world(planned.scene, bodies);
   EXPECT_EQ(bodies[1].deformation, scenes::Deformation::phong);
   const double level = world.bounds_m.diagonal() / 65535;

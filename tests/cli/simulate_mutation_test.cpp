@@ -57,7 +57,7 @@ keyframes = [{ at_s = 0.1 }, { at_s = 0.6, position_m = [1.9, 1, 0.4], angle_deg
 // A simulation's folder in memory, to be changed and written so that it fits together again.
 struct Mutant {
   explicit Mutant(const fs::path& at)
-      : folder(at), planned(read_plan_folder(at)), bodies(read_bodies_of(planned, at)) {}
+      : folder(at), planned(read_plan_folder(at)), bodies(read_world_of(planned, at).bodies) {}
 
   void write() {
     const fem::World world = build_world(planned.scene, bodies);

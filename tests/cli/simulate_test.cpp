@@ -73,7 +73,7 @@ class Simulate_slow : public Program {
   }
   Moved moved(const std::string& name) const {
     PlanFolder planned = read_plan_folder(out(name));
-    std::vector<PreparedBody> bodies = read_bodies_of(planned, out(name));
+    std::vector<PreparedBody> bodies = read_world_of(planned, out(name)).bodies;
     fem::World world = world_of(planned, bodies);
     return {std::move(planned), std::move(bodies), std::move(world)};
   }
@@ -298,7 +298,7 @@ TEST_F(Simulate_slow, BodiesAreCopiedFromTheMotionThatItBeginsAs) {
 TEST_F(Simulate_slow, VerifyNamesWhatWasChanged) {
   simulate(thrown, "out", {"--duration", "1.3", "--control", file("lift.toml", lifting)});
   const PlanFolder good = read_plan_folder(out());
-  const std::vector<PreparedBody> bodies = read_bodies_of(good, out());
+  const std::vector<PreparedBody> bodies = read_world_of(good, out()).bodies;
   const auto verified = [&](auto change) {
     PlanFolder other = good;
     change(other);

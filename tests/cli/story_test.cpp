@@ -51,7 +51,7 @@ class Story_slow : public Program {
     const Result simulated = limber_program({"simulate", scene(falling), "-o", out(), "--duration", "3"});
     ASSERT_EQ(simulated.code, exit_done) << simulated.err;
     planned = read_plan_folder(out());
-    bodies = read_bodies_of(planned, out());
+    bodies = read_world_of(planned, out()).bodies;
   }
   struct Film {
     Json json;

@@ -124,7 +124,7 @@ TEST_F(Verify, APlanThatIsNotSolvedBreaksJustWhatItLacks) {
 TEST_F(Verify, ASurfaceBeyondAWallIsMeasured) {
   ASSERT_EQ(limber_program({"plan", scene(), "-o", out(), "--iterations", "0"}).code, exit_no_plan);
   const PlanFolder planned = read_plan_folder(out());
-  const std::vector<PreparedBody> bodies = read_bodies_of(planned, out());
+  const std::vector<PreparedBody> bodies = read_world_of(planned, out()).bodies;
   const fem::World world = world_of(planned, bodies);
   const Surfaces surfaces(world, bodies);
   State state = planned.plan.trajectory.frames[0];

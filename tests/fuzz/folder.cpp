@@ -212,7 +212,7 @@ void meet_changed_folder(std::string_view bytes) {
   } else if (command == 6) {
     test_robustness({.folder = work, .perturbations = 1}, at_terminal());
   } else {
-    const std::vector<detail::PreparedBody> bodies = detail::read_bodies_of(planned, work);
+    const std::vector<detail::PreparedBody> bodies = detail::read_world_of(planned, work).bodies;
     const fem::World world = detail::build_world(planned.scene, bodies);
     const detail::FemSystem system(world, detail::goal_rules_of(planned.scene));
     const detail::MotionFigures figures = detail::measure_motion(world, bodies, planned.plan.trajectory);

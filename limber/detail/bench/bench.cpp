@@ -259,6 +259,8 @@ Benchmark bench(const BenchOptions& options) {
     benchmark.records = options.out / "runs.jsonl", benchmark.page = options.out / "bench.html";
     write_file(*benchmark.records, lines);
     write_file(*benchmark.page, page_of_bench(records, benchmark.report));
+    make_folder(options.out / "curves");
+    for (const auto& [name, svg] : curves_of_bench(records)) write_file(options.out / "curves" / name, svg);
   }
   if (options.ompl_log) benchmark.ompl_logs = write_ompl_logs(records, *options.ompl_log);
   return benchmark;

@@ -121,8 +121,10 @@ Quartiles quartiles(std::vector<double> values);
 // A group for each scene and preset.
 BenchReport report_of(const RunRecords&);
 
-// One page in HTML: the tables, and for each scene the share of its runs that are solved over iterations and
-// over CPU time.
+// For each scene two plots in SVG, the share of its runs that are solved over iterations and over CPU time,
+// by names of files, as "windows.cpu_s.svg".
+std::map<std::string, std::string> curves_of_bench(const RunRecords&);
+// One page in HTML: the tables, and these curves.
 std::string page_of_bench(const RunRecords&, const BenchReport&);
 
 Expected expected_iterations(const std::vector<const RunRecord*>& of_one_group);

@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <map>
+#include <set>
 
 #include "core/version.h"
 #include "limber/detail/bench/bench.h"
@@ -68,9 +69,23 @@ std::string middle(const std::optional<Quartiles>& q, int digits) {
 
 }  // namespace
 
-std::string page_of_bench(const RunRecords& records, const BenchReport& report) {
+std::map<std::string, std::string> curves_of_bench(const RunRecords& records) {
   std::map<std::string, std::map<std::string, Group>> scenes;
   for (const RunRecord& record : records) scenes[record.scene][record.preset].push_back(&record);
+  std::map<std::string, std::string> curves;
+  for (const auto& [scene, presets] : scenes) {
+    curves[scene + ".iterations.svg"] = plot_of(
+        presets, [](const RunRecord& run) { return double(run.iterations); }, "iterations");
+    curves[scene + ".cpu_s.svg"] = plot_of(
+        presets, [](const RunRecord& run) { return run.cpu_s; }, "CPU s of the search");
+  }
+  return curves;
+}
+
+std::string page_of_bench(const RunRecords& records, const BenchReport& report) {
+  std::set<std::string> scenes;
+  for (const RunRecord& record : records) scenes.insert(record.scene);
+  const std::map<std::string, std::string> curves = curves_of_bench(records);
 
   Page page;
   page.begin("limber bench", "limber bench",
@@ -94,13 +109,10 @@ std::string page_of_bench(const RunRecords& records, const BenchReport& report) 
       "(the best such number for these runs, in hindsight); and of the quickest of eight (limber plan "
       "--portfolio 8), each of which goes that far and up to twice as far.</p>\n");
   page.table({"scene", "preset", "one search", "given up after", "takes", "quickest of 8"}, estimates);
-  for (const auto& [scene, presets] : scenes) {
+  for (const std::string& scene : scenes) {
     page.add("<h2>{}</h2>\n<div class=\"plots\">\n", escaped(scene));
-    const Figure iterations = [](const RunRecord&run) { return double(run.iterations); },
-                 cpu_s = [](const RunRecord&run) { return run.cpu_s; };
-    for (const auto& [figure, words] :
-         {std::pair(iterations, "iterations"), std::pair(cpu_s, "CPU s of the search")})
-      page.add("<figure class=\"card\">{}</figure>\n", inlined(plot_of(presets, figure, words)));
+    for (const char* figure : {".iterations.svg", ".cpu_s.svg"})
+      page.add("<figure class=\"card\">{}</figure>\n", inlined(curves.at(scene + figure)));
     page.add("</div>\n");
   }
   page.add("<p class=\"note\">Made by limber {}.</p>\n</main>\n</body>\n</html>\n", version);

@@ -287,9 +287,7 @@ namespace {
 
 // The same plan under a scene that differs in what it looks like alone.
 void film_otherwise(const fs::path& folder, const PlanFolder& planned, const scenes::Scene& scene) {
-  const std::vector<PreparedBody> bodies = read_bodies_of(planned, folder);
-  const fem::World world =
-      build_world_in(folder, {}, scene, bodies, State(planned.plan.tree.states[0]).positions);
+  const auto [bodies, world] = read_world_of(planned, folder);
   const MotionFigures figures = measure_motion(world, planned.plan.trajectory);
   for (const auto& [name, bytes] : pictures_of(scene, world, planned.plan, figures))
     write_file(folder / name, bytes);

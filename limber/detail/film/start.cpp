@@ -74,7 +74,7 @@ Start prepared_start(const scenes::Scene& scene, const fs::path& work_folder) {
               {},
               true,
               true};
-  start.world = build_world(scene, start.bodies);
+  start.world = build_world_in(work_folder, {}, scene, start.bodies);
   return start;
 }
 

@@ -1,6 +1,7 @@
 // What Scene, Problem and Plan of the interface hold.
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <mutex>
 #include <vector>
@@ -20,9 +21,10 @@ struct [[gnu::visibility("hidden")]] Scene::Impl {
 struct [[gnu::visibility("hidden")]] Problem::Impl {
   Scene scene;
   detail::WorkFolder folder;
-  std::vector<detail::PreparedBody> prepared;
-  std::vector<Body> bodies;
-  fem::World world;
+  detail::BodiesAndWorld made;
+  const std::vector<detail::PreparedBody>& prepared = made.bodies;
+  const fem::World& world = made.world;
+  std::vector<Body> bodies = {};
   detail::FemSystem system;   // without a goal: what rollouts need
   std::size_t state_numbers;  // of positions, and of velocities
 
@@ -37,8 +39,7 @@ struct [[gnu::visibility("hidden")]] Problem::Impl {
 
  private:
   Impl(const Scene&, const std::filesystem::path& work_folder,
-       std::vector<detail::PreparedBody> (*prepare)(const Scene::Impl&, const std::filesystem::path&),
-       const std::vector<float>& start_positions);
+       const std::function<detail::BodiesAndWorld(const std::filesystem::path&)>& make);
 };
 
 struct [[gnu::visibility("hidden")]] Plan::Impl {

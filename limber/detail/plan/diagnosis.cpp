@@ -11,6 +11,7 @@
 #include "core/progress.h"
 #include "fem/batch.h"
 #include "fem/observe.h"
+#include "plan/control_rollout.h"
 #include "plan/passage.h"
 
 namespace limber::detail {
@@ -74,12 +75,51 @@ std::vector<std::pair<std::string, int>> refusals_at(const fem::World& world, co
   return sorted;
 }
 
+// A node in the goal that solves nothing: what becomes of the robot there once it is drawn to the goal, to
+// come to rest. Throws Interrupted.
+void tell_rest(const FemSystem& system, const plan::Settings& settings, const State& state, Diagnosis& d) {
+  plan::ControlRollout settle;
+  settle.from = state;
+  plan::run(system, settings, {&settle, 1}, {.stoppable = true});
+  const Vec3 away =
+      system.robot_center(settle.end) - system.goal_shift(settle.end) - settings.goal.center_of_mass_m;
+  const double speed = system.mean_speed(settle.end), after_s = settle.settle_steps * system.dt_s();
+  d.json["rest"] = {{"after_s", after_s}, {"distance_m", away.norm()}, {"mean_speed_m_s", speed}};
+  if (settle.result == plan::ControlRollout::rests_in_goal) {
+    d.text += " It would come to rest there, but what frames of the way show is refused.";
+  } else if (settle.result == plan::ControlRollout::ends_elsewhere &&
+             !holds(settings.goal, system.robot_center(settle.end) - system.goal_shift(settle.end))) {
+    d.text += fmt::format(
+        " What holds it there is too weak: drawn to the goal it is {:.3g} m from its middle after {:.3g} s, "
+        "at "
+        "({:.4g} {:.4g} {:.4g}) m, with {:.2g} m/s; try a goal where something bears it, or a larger one.",
+        away.norm(), after_s, system.robot_center(settle.end).x(), system.robot_center(settle.end).y(),
+        system.robot_center(settle.end).z(), speed);
+  } else if (settle.result == plan::ControlRollout::ends_elsewhere &&
+             speed >= settings.settle.mean_speed_m_s) {
+    d.text += fmt::format(
+        " Drawn to the goal it still moves with {:.2g} m/s after {:.3g} s (settle_speed_m_s is {:.2g}); try "
+        "a "
+        "longer settle_time_s.",
+        speed, after_s, settings.settle.mean_speed_m_s);
+  } else if (settle.result == plan::ControlRollout::ends_elsewhere) {
+    d.text += " It comes to rest in the goal's place, but not turned, shaped or placed as the goal asks.";
+  } else {
+    const std::string why = system.why_not_acceptable(settle.end);
+    d.text += fmt::format(" On its way to rest, after {:.3g} s, {}.", after_s,
+                          settle.result == plan::ControlRollout::diverged ? "the dynamics diverge"
+                          : why.empty() ? "two bodies overlap by more than they may"
+                                        : why);
+  }
+}
+
 }  // namespace
 
 Diagnosis diagnose(const fem::World& world, const FemSystem& system, const plan::Plan& plan) {
   Diagnosis d;
   const State state = plan.tree.states[std::size_t(plan.best_node)];
-  const plan::Goal goal = plan::settings_of_leg(plan.settings, plan.leg()).goal;
+  const plan::Settings settings = plan::settings_of_leg(plan.settings, plan.leg());
+  const plan::Goal& goal = settings.goal;
   const Vec3 shift = system.on_leg(plan.leg()).goal_shift(state);
   const Vec3 to_goal = goal.center_of_mass_m + shift - system.robot_center(state);
   const Block block = block_at(world, state, to_goal.normalized());
@@ -94,6 +134,9 @@ Diagnosis diagnose(const fem::World& world, const FemSystem& system, const plan:
         "There {} pushes the robot back from the goal with {:.3g} N; the largest force allowed is {:.3g} N.",
         name, block.force_n, plan.settings.max_force_n);
   }
+
+  if (settings.settle.max_duration_s > 0 && holds(goal, system.robot_center(state) - shift))
+    tell_rest(dynamic_cast<const FemSystem&>(system.on_leg(plan.leg())), settings, state, d);
 
   const plan::Statistics& statistics = plan.statistics;
   if (2 * statistics.rejected > statistics.iterations) {

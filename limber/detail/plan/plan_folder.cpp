@@ -289,8 +289,4 @@ BodiesAndWorld read_world_of(const PlanFolder& planned, const fs::path& folder) 
   return {std::move(bodies), std::move(world)};
 }
 
-std::vector<PreparedBody> read_bodies_of(const PlanFolder& planned, const fs::path& folder) {
-  return read_world_of(planned, folder).bodies;
-}
-
 }  // namespace limber::detail

@@ -86,7 +86,5 @@ struct BodiesAndWorld {
   fem::World world;
 };
 BodiesAndWorld read_world_of(const PlanFolder&, const fs::path& folder);
-// The bodies alone.
-std::vector<PreparedBody> read_bodies_of(const PlanFolder&, const fs::path& folder);
 
 }  // namespace limber::detail

@@ -448,8 +448,9 @@ WrittenReport report(const fs::path& folder, const std::optional<fs::path>& file
     throw InputError(fmt::format("{}: there is no folder {}; make it first", file->string(),
                                  file->parent_path().string()));
   const PlanFolder planned = read_plan_folder(folder);
-  const std::vector<PreparedBody> bodies = read_bodies_of(planned, folder);
-  const fem::World world = build_world(planned.scene, bodies);
+  const std::vector<PreparedBody> bodies = read_caged_bodies_of(planned, folder);
+  const fem::World world = build_world(planned.scene, bodies);  // as who judges finds it
+  require_of_world(planned.plan, world, folder);
   const FemSystem system = system_of(planned, world, bodies);
   MotionFigures figures;
   const Verified verified = verify_plan(folder, planned, bodies, world, figures);

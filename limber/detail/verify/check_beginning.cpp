@@ -61,7 +61,7 @@ void check_beginning(const fs::path& folder, const PlanFolder& planned, const fe
   std::string why;
   try {
     const PlanFolder there = read_plan_folder(other);
-    read_bodies_of(there, other);
+    read_world_of(there, other);
     if (hex(plan::hash_of(there.plan.trajectory)) == from.trajectory_hash) {
       table.row(promise, starts_from(other, there, frame, planned.scene, world, start),
                 fmt::format("{}, of which limber verify tells apart", name));
