@@ -43,6 +43,11 @@ CageSpec read_cage(const Node& table, const Model& model, const std::string& bod
     cage.tets = integer(table, "tets");
     return cage;
   }
+  if (cage.mode != "lattice")
+    complain(*table.find("mode"),
+             fmt::format("{}.cage.mode is how a cage of so many tets is made, and this one is made of cells; "
+                         "leave mode out, or write tets = 300 instead of cells",
+                         body));
   if (cell_m) {
     cage.cell_m = number(table, "cell_m");
     check_cell_size(*cell_m, cage.cell_m, model, body);

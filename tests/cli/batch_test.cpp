@@ -224,6 +224,18 @@ TEST_F(Batch_slow, AnEntryThatWasChangedIsMadeAnew) {
   expect_same("one", "two");
 }
 
+// A file lies wherever an entry would: nothing can be kept, and nothing else is different.
+TEST_F(Batch_slow, AStoreThatCannotBeWrittenIsDoneWithout) {
+  ball("a.obj", 0);
+  ASSERT_EQ(prepare(models(), "one", {"--only", "cage"}).code, exit_done);
+  make_folder(folder / "store");
+  for (int i = 0; i < 256; ++i) write_file(folder / "store" / fmt::format("{:02x}", i), "");
+  const Ended ended = prepare(models(), "two", {"--only", "cage", "--store", out("store")});
+  EXPECT_EQ(ended.code, exit_done) << ended.json;
+  EXPECT_EQ(ended.json.at("made"), 1);
+  expect_same("one", "two");
+}
+
 TEST_F(Batch_slow, OnlyAPartIsMadeAndSaidSo) {
   const std::string model = ball("a.obj", 0);
   ASSERT_EQ(run({"prepare", model, "-o", out("body"), "--tets", "60"}).code, exit_done);

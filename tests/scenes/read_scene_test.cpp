@@ -214,6 +214,8 @@ TEST(ReadScene, ComplainsWithLineAndColumn) {
       {"size_m = [1, 1, 1], bevel_m = 0.1", "size_m = [1, 1e-9, 1e-9], triangle_m = 1e-8", "1e-8",
        "triangles"},
       {"tets = 200", "cells = [1, 1, 1]", "[1, 1, 1] }\nmaterial", "needs a box"},
+      {"cells = [3, 3, 3]", "cells = [3, 3, 3], mode = \"paper\"", "\"paper\"", "leave mode out"},
+      {"cells = [3, 3, 3]", "cells = [3, 3, 3], mode = \"lattice\"", "\"lattice\"", "no complaint"},
       {"size_m = [1, 1, 1]", "size_m = [1, 0, 1]", "0, 1], bevel", "bodies.robot.model.box.size_m[1] is 0"},
       {"bevel_m = 0.1", "bevel_m = 0.6", "0.6", "it must be ≤ 0.5"},
       {"bevel_m = 0.1", "triangle_m = 1e-5", "1e-5", "triangles"},

@@ -70,7 +70,7 @@ void BodyStore::keep(const std::string& key, const fs::path& folder) const {
   keep(key, folder, read_body_report(folder));
 }
 
-void BodyStore::keep(const std::string& key, const fs::path& folder, const BodyReport& report) const {
+void BodyStore::keep(const std::string& key, const fs::path& folder, const BodyReport& report) const try {
   const fs::path to = entry(key);
   const bool there = has(key);
   if (!there) {
@@ -87,6 +87,8 @@ void BodyStore::keep(const std::string& key, const fs::path& folder, const BodyR
   kept["model"] = "";
   take_costs_out(kept);
   write_json(to / "report.json", kept);
+} catch (const DiskError& error) {
+  log::warn("the store keeps nothing of {}: {}", folder.string(), error.what());
 }
 
 }  // namespace limber::detail

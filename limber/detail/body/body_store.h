@@ -26,7 +26,7 @@ class BodyStore {
   // damaged one. `folder` is there, and nobody else writes into it.
   std::optional<BodyReport> fetch(const std::string& key, const Json& input, const std::string& model,
                                   const fs::path& folder) const;
-  // Keeps the body in `folder`, and its picture where there is one.
+  // Keeps the body in `folder`, and its picture where there is one; warns where the store cannot be written.
   void keep(const std::string& key, const fs::path& folder) const;
   void keep(const std::string& key, const fs::path& folder, const BodyReport&) const;  // its report, read
 

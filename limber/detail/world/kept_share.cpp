@@ -4,6 +4,7 @@
 #include "core/error.h"
 #include "core/hash.h"
 #include "core/json_text.h"
+#include "core/log.h"
 
 namespace limber::detail {
 
@@ -78,8 +79,12 @@ void KeptShare::keep(double found) {
   }
   if (in_store_.empty() || is_stored_) return;
   is_stored_ = true;
-  make_folder(in_store_.parent_path());
-  write_json(in_store_, json_of_fields(Entries{{key_, entry_of(key_, found)}}));
+  try {
+    make_folder(in_store_.parent_path());
+    write_json(in_store_, json_of_fields(Entries{{key_, entry_of(key_, found)}}));
+  } catch (const DiskError& error) {
+    log::warn("the store keeps no share of stiffness: {}", error.what());
+  }
 }
 
 }  // namespace limber::detail
