@@ -446,17 +446,21 @@ int compare(int argc, char** argv) {
   bool json = false;
   std::vector<std::string> only;
   std::vector<fs::path> data;
-  program.add_option("SCENE", options.scene.scene)->required();
+  program.add_option("SCENE", options.scene.scene, "a scene file, or a shipped scene's name")->required();
   program.add_option("-o,--out", options.out, "folder of the prepared bodies and the records")->required();
   program.add_option("--data", data, "folders of models, as of limber plan");
   program.add_option("--seeds", seeds)->capture_default_str();
   program.add_option("--time-limit", time_limit_s, "wall seconds of a run of OMPL")->capture_default_str();
   program.add_option("--iterations", options.iterations, "controls drawn in a run; default: the scene's");
-  program.add_option("--set", options.scene.sets)->allow_extra_args(false);
+  program.add_option("--set", options.scene.sets, "KEY=VALUE, as of limber plan")->allow_extra_args(false);
   program.add_option("--only", only, "planners whose name has one of these words; default: all")
       ->delimiter(',');
-  program.add_flag("--json", json);
+  program.add_flag("--json", json, "the table as one JSON document");
   CLI11_PARSE(program, argc, argv);
+  if (!(time_limit_s > 0))
+    throw InputError(fmt::format("ompl_bench: --time-limit {} is no time", time_limit_s));
+  if (options.iterations && *options.iterations < 1)
+    throw InputError(fmt::format("ompl_bench: --iterations {}; one control at least", *options.iterations));
   log::set_up(0);
   set_progress_enabled(false);
   install_stop_signals();
@@ -512,9 +516,14 @@ int compare(int argc, char** argv) {
       return row.name.find(word) != std::string::npos;
     });
   });
+  if (rows.empty())
+    throw InputError(
+        "ompl_bench: --only names none of the planners; write one of fast, paper, RRT, EST, KPIECE1, "
+        "PDST, SST");
   std::vector<std::vector<RunRecord>> runs(rows.size());
   // Seed after seed, so that what else the machine does falls on all alike.
-  for (const int seed : parse_seeds(seeds))
+  for (const int seed : parse_seeds(seeds)) {
+    if (seed < 1) throw InputError("ompl_bench: OMPL has no seed 0; begin with 1");
     for (std::size_t r = 0; r < rows.size(); ++r) {
       const Row& row = rows[r];
       scenes::Scene own;
@@ -537,6 +546,7 @@ int compare(int argc, char** argv) {
                 runs[r].back().solved ? "solved" : "not solved", runs[r].back().iterations,
                 runs[r].back().cpu_s);
     }
+  }
 
   Json report{{"scene", scene.name}, {"seeds", seeds}, {"planners", Json::array()}};
   std::string text = fmt::format("{}, one thread\n{:24}{:>8}{:>18}{:>20}{:>18}\n", scene.name, "planner",
@@ -558,6 +568,9 @@ int compare(int argc, char** argv) {
 
 int main(int argc, char** argv) try {
   return limber::detail::compare(argc, argv);
+} catch (const limber::InputError& error) {
+  limber::log::warn("{}", error.what());
+  return 2;
 } catch (const std::exception& error) {
   limber::log::warn("{}", error.what());
   return 1;

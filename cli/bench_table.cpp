@@ -43,24 +43,26 @@ std::string text_of_benchmark(const BenchReport& report) {
   for (const int limit : volume_limits_percent) volumes[0].push_back(fmt::format("≤ {} %", limit));
   std::string notes;
   for (const BenchGroup& g : report.groups) {
+    const auto of_solved = [&](const char* format, double value) {
+      return g.solved ? fmt::format(fmt::runtime(format), value) : "-";
+    };
     runs.push_back(
         {g.scene, g.preset, fmt::format("{}/{}", g.solved, g.runs), text_of_quartiles(g.iterations, 0),
          text_of_quartiles(g.cpu_s, 2), text_of_quartiles(g.wall_s, 2), text_of_quartiles(g.motion_s, 1),
-         fmt::format("{:.2f}", g.largest_penetration_percent),
-         fmt::format("{:.2f}", g.largest_overlap_percent),
-         fmt::format("{:.2f}", g.largest_self_overlap_percent),
+         of_solved("{:.2f}", g.largest_penetration_percent), of_solved("{:.2f}", g.largest_overlap_percent),
+         of_solved("{:.2f}", g.largest_self_overlap_percent),
          g.median_gap_percent ? fmt::format("{:.2f} {:.2f}", *g.median_gap_percent, g.largest_gap_percent)
                               : "-",
-         fmt::format("{:.2f} {:.2f}", g.min_stretch, g.largest_stretch), fmt::format("{}", g.inverted_tets),
-         fmt::format("{:.1f}", g.largest_force_n)});
+         g.solved ? fmt::format("{:.2f} {:.2f}", g.min_stretch, g.largest_stretch) : "-",
+         of_solved("{:.0f}", double(g.inverted_tets)), of_solved("{:.1f}", g.largest_force_n)});
     for (const auto& [name, body] : g.volume) {
       volumes.push_back({g.scene, g.preset, name, fmt::format("{:.2f}", body.largest_percent)});
       for (const std::int64_t within : body.within)
         volumes.back().push_back(fmt::format("{:.2f}", 100 * double(within) / double(body.frames)));
     }
     if (!g.unsolved_seeds.empty())
-      notes += fmt::format("{}, {}: not solved with seeds {}\n", g.scene, g.preset,
-                           fmt::join(g.unsolved_seeds, ", "));
+      notes += fmt::format("{}, {}: not solved with seed{} {}\n", g.scene, g.preset,
+                           g.unsolved_seeds.size() == 1 ? "" : "s", fmt::join(g.unsolved_seeds, ", "));
     if (g.programs.size() > 1)
       notes +=
           fmt::format("{}, {}: the runs are of {} different builds of limber; their times do not compare\n",

@@ -142,13 +142,24 @@ class Runner {
 
   // Rest is looked for every 0.05 s. Where no settle is asked for, being in the goal is enough.
   void settle_on() {
-    const bool rests = system_.mean_speed(state_) < settings_.settle.mean_speed_m_s,
+    const bool rests = system_.mean_speed(state_) < settings_.settle.mean_speed_m_s && stays(),
                holds = system_.goal_holds(state_);
     if ((rests && holds) || course_.settle_steps >= settle_limit_)
       return end((rests || settings_.settle.max_duration_s == 0) && holds && in_goal()
                      ? ControlRollout::rests_in_goal
                      : ControlRollout::ends_elsewhere);
     steps_left_ = std::min(steps_of(settle_check_s, system_.dt_s()), settle_limit_ - course_.settle_steps);
+  }
+
+  // At the world's start nothing has moved yet, whatever pulls: left to itself it must be slow after such a
+  // while too.
+  bool stays() const {
+    if (state_.step > 0 || settings_.settle.max_duration_s == 0) return true;
+    Rollout alone;
+    alone.from = &state_;
+    alone.control.steps = steps_of(settle_check_s, system_.dt_s());
+    system_.make_propagator()->propagate({&alone, 1});
+    return alone.ok && system_.mean_speed(alone.to) < settings_.settle.mean_speed_m_s;
   }
 
   void take_due_frames() {

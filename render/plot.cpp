@@ -115,6 +115,7 @@ Layout layout_of(const std::vector<Curve>& curves, const PlotLook& look) {
     for (const double v : curve.x) x.include(v);
     for (const double v : curve.y) y.include(v);
   }
+  if (look.y_from_to) y.include(look.y_from_to->first), y.include(look.y_from_to->second);
   if (x.empty()) x = {0, 1};
   if (y.empty()) y = {0, 1};
   const double near = 0.6 * std::max(y.high - y.low, 1e-300);

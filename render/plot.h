@@ -1,7 +1,9 @@
 // Line plots as SVG text or pixels: the paper's volume change over time, a line a body.
 #pragma once
 
+#include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "core/types.h"
@@ -19,7 +21,8 @@ struct PlotLook {
   int width_px = 900, height_px = 480;
   std::vector<double> limits = {};  // dashed lines at these y, as −10 and 10 per cent; they widen the y axis
                                     // only when near the data
-  bool log_x = false;  // x by its logarithm; all x > 0
+  bool log_x = false;                                       // x by its logarithm; all x > 0
+  std::optional<std::pair<double, double>> y_from_to = {};  // the y axis shows these at least
 };
 // A whole SVG document; valid XML, no external fonts or styles. Same input, same bytes. Its data-left and
 // data-right are the pixels where x is data-low and data-high.

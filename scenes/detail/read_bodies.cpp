@@ -46,8 +46,8 @@ CageSpec read_cage(const Node& table, const Model& model, const std::string& bod
   if (cage.mode != "lattice")
     complain(*table.find("mode"),
              fmt::format("{}.cage.mode is how a cage of so many tets is made, and this one is made of cells; "
-                         "leave mode out, or write tets = 300 instead of cells",
-                         body));
+                         "leave mode out, or write tets = 300 instead of {}",
+                         body, cells ? "cells" : "cell_m"));
   if (cell_m) {
     cage.cell_m = number(table, "cell_m");
     check_cell_size(*cell_m, cage.cell_m, model, body);

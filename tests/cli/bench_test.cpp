@@ -35,7 +35,7 @@ RunRecord record(const std::string& preset, int seed, bool solved, std::int64_t 
         {{"robot",
           {{"largest_percent", change_percent},
            {"frames", 100},
-           {"within_3_percent", 90 + seed},
+           {"within_3_percent", std::min(90 + seed, 100)},
            {"within_5_percent", 100},
            {"within_6_percent", 100},
            {"within_10_percent", 100}}}}},
@@ -98,8 +98,48 @@ TEST(BenchReport, UnsolvedRunsCountInTheSearchAndNotInTheMotion) {
   EXPECT_EQ(robot.at("frames"), 200);
   EXPECT_EQ(robot.at("within_3_percent"), 91 + 92);
   const std::string text = cli::text_of_benchmark(found);
-  for (const char* words : {"2/3", "15 20 60", "91.50", "fast: not solved with seeds 3"})
+  for (const char* words : {"2/3", "15 20 60", "91.50", "fast: not solved with seed 3"})
     EXPECT_NE(text.find(words), std::string::npos) << words << " in\n" << text;
+}
+
+// Names become those of files; figures are counted and drawn.
+TEST(BenchReport, ARecordThatNoRunLeavesIsRefused) {
+  const Json good = record("OMPL RRT, 2", 1, true, 10, 2).json;
+  for (const auto& [key, value] : {std::pair<const char*, Json>("scene", "../evil"),
+                                   {"scene", ""},
+                                   {"scene", "a/b"},
+                                   {"scene", std::string(65, 'x')},
+                                   {"preset", "a/b"},
+                                   {"preset", "<b>"},
+                                   {"iterations", -5},
+                                   {"iterations", 1'000'000'000'000'000'000},
+                                   {"cpu_s", -1.5},
+                                   {"wall_s", 1e300},
+                                   {"nodes", -1},
+                                   {"motion_s", -0.5}}) {
+    Json bad = good;
+    bad[key] = value;
+    try {
+      run_record_of(bad, "there.json");
+      FAIL() << key << " " << value;
+    } catch (const InputError& error) {
+      EXPECT_NE(std::string(error.what()).find(fmt::format("there.json: {} is ", key)), std::string::npos)
+          << error.what();
+    }
+  }
+  Json bad = good;
+  bad["volume"]["robot"]["within_6_percent"] = 101;
+  EXPECT_THROW(run_record_of(bad, "there.json"), InputError);
+}
+
+// Where nothing is solved the line lies at 0 of 100 %, not in the middle of a plot around it.
+TEST(BenchReport, CurvesGoFromNothingToAll) {
+  for (const bool solved : {false, true})
+    for (const auto& [name, svg] : curves_of_bench({record("fast", 1, solved, 10, 2)})) {
+      EXPECT_NE(svg.find(">100<"), svg.npos) << name;
+      EXPECT_NE(svg.find(">0<"), svg.npos) << name;
+      EXPECT_EQ(svg.find(">−"), svg.npos) << name;
+    }
 }
 
 Expected expected(const RunRecords& runs) {

@@ -241,12 +241,13 @@ TEST_F(Program_slow, ADiagnosisHearsAStop) {
   request_stop(0);
 }
 
-// A goal in the air in which nothing holds the robot: it is told how far from it the robot is in the end.
-// That is how far it fell to the floor, on which it stands a little pressed.
+// A goal in the air, where the robot starts, in which nothing holds it: that it does not move yet is no rest.
+// It is told how far away the robot is in the end, which is how far it fell to the floor, where it stands a
+// little pressed.
 TEST_F(Program_slow, ADiagnosisTellsWhereTheRobotComesToRest) {
   const scenes::Scene falling = scenes::read_scene_file(
       scene(), {"world.gravity_m_s2=[0, 0, -5]", "goal.center_of_mass_m=[0.6, 1, 1.3]", "goal.radius_m=0.05",
-                "bodies.robot.velocity_m_s=[0, 0, -0.5]", "planner.max_force_n=1"});
+                "planner.max_force_n=1"});
   const std::vector<PreparedBody> bodies = prepare_bodies(falling, {}, out());
   const fem::World world = build_world(falling, bodies);
   const FemSystem system(world, bodies, goal_rules_of(falling));
@@ -257,6 +258,8 @@ TEST_F(Program_slow, ADiagnosisTellsWhereTheRobotComesToRest) {
   const Diagnosis told = diagnose(world, system, plan);
   EXPECT_NEAR(told.json.at("rest").at("distance_m").get<double>(), 1.3 - 0.3, 0.05);
   EXPECT_NE(told.text.find("What holds it there is too weak"), told.text.npos) << told.text;
+  EXPECT_NEAR(told.json.at("weight_n").get<double>(), 0.6 * 0.6 * 0.6 * 100 * 5, 0.1);
+  EXPECT_NE(told.text.find("It weighs 108 N, and is pushed with 1 N at most"), told.text.npos) << told.text;
 }
 
 // No motion hangs on shells, so none are made where nothing reads them; whoever wants them is told how.

@@ -55,7 +55,8 @@ std::string plot_of(const std::map<std::string, Group>& presets, Figure figure, 
                                    .width_px = 560,
                                    .height_px = 320,
                                    .limits = {100},
-                                   .log_x = true});
+                                   .log_x = true,
+                                   .y_from_to = std::pair(0.0, 100.0)});
 }
 
 std::string number(std::optional<double> value, int digits) {
@@ -95,7 +96,8 @@ std::string page_of_bench(const RunRecords& records, const BenchReport& report) 
   std::vector<std::vector<std::string>> rows, estimates;
   for (const BenchGroup& g : report.groups) {
     rows.push_back({g.scene, g.preset, fmt::format("{} of {}", g.solved, g.runs), middle(g.iterations, 0),
-                    middle(g.cpu_s, 2), middle(g.motion_s, 1), number(g.largest_overlap_percent, 2),
+                    middle(g.cpu_s, 2), middle(g.motion_s, 1),
+                    number(g.solved ? std::optional(g.largest_overlap_percent) : std::nullopt, 2),
                     number(g.median_gap_percent, 2)});
     const Expected& e = g.expected;
     estimates.push_back({g.scene, g.preset, number(e.one_search, 0), number(e.restart_after, 0),

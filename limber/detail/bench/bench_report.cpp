@@ -11,9 +11,43 @@
 
 namespace limber::detail {
 
+namespace {
+
+// Names become those of files, and figures are counted and drawn.
+void require_sane(const RunRecord& record, const std::string& file) {
+  const auto refuse = [&](const std::string& what) {
+    throw InputError(
+        fmt::format("{}: {}; no run of limber bench is so: remove it and run it again", file, what));
+  };
+  const auto require_name = [&](const char* key, const std::string& name, std::string_view also) {
+    const bool good =
+        !name.empty() && name.size() <= 64 && std::all_of(name.begin(), name.end(), [&](char c) {
+          return ('a' <= c && c <= 'z') || ('A' <= c && c <= 'Z') || ('0' <= c && c <= '9') || c == '_' ||
+                 c == '-' || also.find(c) != also.npos;
+        });
+    if (!good) refuse(fmt::format("{} is {}", key, text_of(Json(name))));
+  };
+  require_name("scene", record.scene, ""), require_name("preset", record.preset, " ,");
+  constexpr double most = 1e12;
+  for (const auto& [key, value] : {std::pair("iterations", double(record.iterations)),
+                                   {"nodes", double(record.nodes)},
+                                   {"cpu_s", record.cpu_s},
+                                   {"wall_s", record.wall_s},
+                                   {"motion_s", record.motion_s},
+                                   {"distance_m", record.distance_m}})
+    if (!(0 <= value && value <= most)) refuse(fmt::format("{} is {:g}", key, value));
+  for (const auto& [body, figures] : record.volume)
+    for (const std::int64_t within : figures.within)
+      if (within < 0 || within > figures.frames)
+        refuse(fmt::format("of {}'s {} frames {} are within a limit", body, figures.frames, within));
+}
+
+}  // namespace
+
 RunRecord run_record_of(Json json, const std::string& file) {
   RunRecord record =
       read_fields<RunRecord>(json, file, "it is no record of limber bench: remove it and run it again");
+  require_sane(record, file);
   record.json = std::move(json);
   return record;
 }

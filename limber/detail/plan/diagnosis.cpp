@@ -125,7 +125,7 @@ Diagnosis diagnose(const fem::World& world, const FemSystem& system, const plan:
   const Block block = block_at(world, state, to_goal.normalized());
   if (block.body == -2) {
     d.json["blocked_by"] = nullptr;
-    d.text = "Nothing pushes the robot back there.";
+    d.text = "No contact pushes the robot back there.";
   } else {
     const std::string name = block.body < 0 ? "a wall" : world.bodies[std::size_t(block.body)].name;
     d.json["blocked_by"] = name;
@@ -135,6 +135,12 @@ Diagnosis diagnose(const fem::World& world, const FemSystem& system, const plan:
         name, block.force_n, plan.settings.max_force_n);
   }
 
+  const double weight_n = system.robot_mass_kg() * world.bodies[std::size_t(world.robot)].gravity_m_s2.norm();
+  d.json["weight_n"] = weight_n;
+  if (weight_n > settings.max_force_n)
+    d.text +=
+        fmt::format(" It weighs {:.3g} N, and is pushed with {:.3g} N at most; try a larger max_force_n.",
+                    weight_n, settings.max_force_n);
   if (settings.settle.max_duration_s > 0 && holds(goal, system.robot_center(state) - shift))
     tell_rest(dynamic_cast<const FemSystem&>(system.on_leg(plan.leg())), settings, state, d);
 
