@@ -34,7 +34,7 @@ class WindingNumber {
     double trace = 0;                      // ∫ x·n dA
     std::array<double, 6> quadratic = {};  // of r ↦ ∫ (x·r) (n·r) dA: by xx, xy, xz, yy, yz, zz of r
     Vec3 contracted = Vec3::Zero();        // ∫ (x·x) n + 2 (x·n) x dA
-    std::array<double, 10> cubic = {};     // of r ↦ ∫ (x·r)² (n·r) dA: by xxx to xzz, then yyy to zzz
+    std::array<double, 10> cubic = {};  // of r ↦ ∫ (x·r)² (n·r) dA: of x³, x²y, x²z, xy² … z³
   };
   // Two triangles side by side, corner by corner; the second may be a point, which is seen under no angle.
   typedef double Two __attribute__((vector_size(16)));

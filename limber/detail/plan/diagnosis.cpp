@@ -81,28 +81,24 @@ void tell_rest(const FemSystem& system, const plan::Settings& settings, const St
   plan::ControlRollout settle;
   settle.from = state;
   plan::run(system, settings, {&settle, 1}, {.stoppable = true});
-  const Vec3 away =
-      system.robot_center(settle.end) - system.goal_shift(settle.end) - settings.goal.center_of_mass_m;
-  const double speed = system.mean_speed(settle.end), after_s = settle.settle_steps * system.dt_s();
-  d.json["rest"] = {{"after_s", after_s}, {"distance_m", away.norm()}, {"mean_speed_m_s", speed}};
+  const Vec3 center = system.robot_center(settle.end), shift = system.goal_shift(settle.end);
+  const double distance_m = (center - shift - settings.goal.center_of_mass_m).norm(),
+               speed = system.mean_speed(settle.end), after_s = settle.settle_steps * system.dt_s();
+  const bool ended = settle.result == plan::ControlRollout::ends_elsewhere;
+  d.json["rest"] = {{"after_s", after_s}, {"distance_m", distance_m}, {"mean_speed_m_s", speed}};
   if (settle.result == plan::ControlRollout::rests_in_goal) {
     d.text += " It would come to rest there, but what frames of the way show is refused.";
-  } else if (settle.result == plan::ControlRollout::ends_elsewhere &&
-             !holds(settings.goal, system.robot_center(settle.end) - system.goal_shift(settle.end))) {
+  } else if (ended && !holds(settings.goal, center - shift)) {
     d.text += fmt::format(
         " What holds it there is too weak: drawn to the goal it is {:.3g} m from its middle after {:.3g} s, "
-        "at "
-        "({:.4g} {:.4g} {:.4g}) m, with {:.2g} m/s; try a goal where something bears it, or a larger one.",
-        away.norm(), after_s, system.robot_center(settle.end).x(), system.robot_center(settle.end).y(),
-        system.robot_center(settle.end).z(), speed);
-  } else if (settle.result == plan::ControlRollout::ends_elsewhere &&
-             speed >= settings.settle.mean_speed_m_s) {
+        "at ({:.4g} {:.4g} {:.4g}) m, with {:.2g} m/s; try a goal where something bears it, or a larger one.",
+        distance_m, after_s, center.x(), center.y(), center.z(), speed);
+  } else if (ended && speed >= settings.settle.mean_speed_m_s) {
     d.text += fmt::format(
-        " Drawn to the goal it still moves with {:.2g} m/s after {:.3g} s (settle_speed_m_s is {:.2g}); try "
-        "a "
-        "longer settle_time_s.",
+        " Drawn to the goal it still moves with {:.2g} m/s after {:.3g} s (settle_speed_m_s is {:.2g}); "
+        "try a longer settle_time_s.",
         speed, after_s, settings.settle.mean_speed_m_s);
-  } else if (settle.result == plan::ControlRollout::ends_elsewhere) {
+  } else if (ended) {
     d.text += " It comes to rest in the goal's place, but not turned, shaped or placed as the goal asks.";
   } else {
     const std::string why = system.why_not_acceptable(settle.end);
