@@ -23,6 +23,7 @@ namespace limber::plan {
 namespace {
 
 constexpr double settle_check_s = 0.05;  // rest is looked for this often
+constexpr int looks_at_rest = 5;         // and looked at so often in as long
 
 // Who can be stopped runs pieces of about so long, of so many steps at most.
 constexpr double min_piece_s = 0.05, max_piece_s = 0.1;
@@ -140,26 +141,13 @@ class Runner {
     settle_on();
   }
 
-  // Rest is looked for every 0.05 s. Where no settle is asked for, being in the goal is enough.
+  // Rest is looked for every 0.05 s. What has come to rest by itself is left to itself.
   void settle_on() {
-    const bool rests = system_.mean_speed(state_) < settings_.settle.mean_speed_m_s && stays(),
-               holds = system_.goal_holds(state_);
-    if ((rests && holds) || course_.settle_steps >= settle_limit_)
-      return end((rests || settings_.settle.max_duration_s == 0) && holds && in_goal()
-                     ? ControlRollout::rests_in_goal
-                     : ControlRollout::ends_elsewhere);
+    const bool rested = system_.goal_holds(state_) && rests(system_, settings_.settle, state_,
+                                                            course_.settle_steps > 0 ? control_ : Control());
+    if (rested || course_.settle_steps >= settle_limit_)
+      return end(rested && in_goal() ? ControlRollout::rests_in_goal : ControlRollout::ends_elsewhere);
     steps_left_ = std::min(steps_of(settle_check_s, system_.dt_s()), settle_limit_ - course_.settle_steps);
-  }
-
-  // At the world's start nothing has moved yet, whatever pulls: left to itself it must be slow after such a
-  // while too.
-  bool stays() const {
-    if (state_.step > 0 || settings_.settle.max_duration_s == 0) return true;
-    Rollout alone;
-    alone.from = &state_;
-    alone.control.steps = steps_of(settle_check_s, system_.dt_s());
-    system_.make_propagator()->propagate({&alone, 1});
-    return alone.ok && system_.mean_speed(alone.to) < settings_.settle.mean_speed_m_s;
   }
 
   void take_due_frames() {
@@ -227,6 +215,23 @@ void run_batch(const System& system, const Settings& settings, std::span<Control
 }
 
 }  // namespace
+
+bool rests(const System& system, const Settle& settle, const State& state, Control held_by) {
+  if (settle.max_duration_s == 0) return true;
+  const auto slow = [&](const State& s) { return system.mean_speed(s) < settle.mean_speed_m_s; };
+  if (!slow(state)) return false;
+  const std::unique_ptr<Propagator> propagator = system.make_propagator();
+  held_by.steps = steps_of(settle_check_s / looks_at_rest, system.dt_s());
+  State now = state;
+  for (int look = 0; look < looks_at_rest; ++look) {
+    Rollout on;
+    on.from = &now, on.control = held_by;
+    propagator->propagate({&on, 1});
+    if (!on.ok || !slow(on.to)) return false;
+    now = std::move(on.to);
+  }
+  return true;
+}
 
 bool may_be_shown(const System& system, const Settings& settings, const ControlRollout& course) {
   ControlRollout shown;

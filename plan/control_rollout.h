@@ -66,6 +66,10 @@ struct ControlRolloutOptions {
 // later: the cheapest of them, and the first of equals, is the same for any number of lanes and threads.
 void run(const System&, const Settings&, std::span<ControlRollout>, const ControlRolloutOptions&);
 
+// Rest is no moment without speed, as where a robot turns back: what is slow now must be so at five looks in
+// the next 0.05 s, under what holds it. Where no settle is asked for, all is at rest.
+bool rests(const System&, const Settle&, const State&, Control held_by);
+
 // Whether System::first_refused lets all frames of a course that was run and rests in the goal pass. Runs it
 // again. Throws Interrupted.
 bool may_be_shown(const System&, const Settings&, const ControlRollout&);

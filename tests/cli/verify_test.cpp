@@ -82,6 +82,20 @@ TEST(GoalTerms, RestIsAMatterOfSpeed) {
   }
 }
 
+// From rest F/M for 0.05 s: whether that is 0.02 m/s.
+TEST(GoalTerms, RestLasts) {
+  const BrickOverSlab at;
+  const State state = fem::rest_state(at.world);
+  const double mass_kg = at.world.bodies[0].mass_kg;
+  for (const float m_s2 : {0.f, 0.3f, 0.39f, 0.41f, 1.f}) {
+    Control push;
+    push.manipulation = Manipulation::body;
+    push.force_n = Vec3f(m_s2 * float(mass_kg), 0, 0);
+    EXPECT_TRUE(rest_term(at.scene, at.world, state).met);
+    EXPECT_EQ(stay_term(at.scene, at.world, state, push).met, m_s2 < 0.4f) << m_s2;
+  }
+}
+
 class Verify : public Program {
  protected:
   // The robot stands where it starts, at (0.6 1 1.3), from z = 1 to 1.6; the block ends at z = 0.9.

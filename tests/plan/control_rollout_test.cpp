@@ -110,6 +110,26 @@ TEST(ControlRollout, WhoMovesDoesNotRestHoweverShortTheSettle) {
   }
 }
 
+// Thrown up, it is slow for two hundredths of a second when rest is looked for, and falls. Held by the
+// settle's force, it comes to rest g/9 below the goal's middle, where 9/s² of the way draw it up.
+TEST(ControlRollout, WhoTurnsBackDoesNotRest) {
+  Toy toy;
+  toy.damping_per_s = 0, toy.weight_m_s2 = {0, 0, -1};
+  Settings s = toy_settings();
+  ControlRollout course;
+  course.from = toy.start();
+  course.from.velocities = {0, 0, 0.1f};
+  s.goal.center_of_mass_m = toy.robot_center(course.from), s.goal.radius_m = 0.5;
+  s.settle.max_duration_s = 5;
+  for (const auto& [share, result] :
+       {std::pair(0.0, ControlRollout::ends_elsewhere), std::pair(1.0, ControlRollout::rests_in_goal)}) {
+    s.settle.max_force_share = share;
+    run(toy, s, {&course, 1}, {});
+    EXPECT_EQ(course.result, result) << share << ", after " << course.settle_steps << " steps";
+  }
+  EXPECT_NEAR(toy.robot_center(course.end).z(), s.goal.center_of_mass_m.z() - 1.0 / 9, 0.02);
+}
+
 // What a course says it ran is what gives its end, step by step.
 TEST(ControlRollout, ItsControlsAreWhatWasRun) {
   const Toy toy(5, true, false, 99);

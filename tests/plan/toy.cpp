@@ -131,6 +131,7 @@ std::uint64_t Toy::hash() const {
       .value(nodes)
       .value(mass_kg)
       .value(damping_per_s)
+      .bytes(&weight_m_s2, sizeof weight_m_s2)
       .value(int(wall))
       .value(int(lava))
       .value(unacceptable_above_z)
@@ -166,7 +167,7 @@ bool Toy::step(const Control& c, State& s) const {
   const State before = s;
   for (int i = 0; i < nodes; ++i) {
     const Vec3f x = at(before.positions, i), v = at(before.velocities, i);
-    Vec3f a = -damping_per_s * v;
+    Vec3f a = weight_m_s2 - damping_per_s * v;
     for (const int j : {i - 1, i + 1}) {
       if (j < 0 || j >= nodes) continue;
       a += spring_per_s2 * ((at(before.positions, j) - x) - (rest_place(j) - rest_place(i)));

@@ -23,6 +23,7 @@ struct Toy final : System {
   int nodes = 1;
   float mass_kg = 2;
   float damping_per_s = 0.5f;
+  Vec3f weight_m_s2 = Vec3f::Zero();
   bool wall = false;                // across x = 5, 0.4 thick, open for 2 < y < 4
   bool lava = false;                // a rollout through y < 0.5 diverges
   float unacceptable_above_z = 99;  // no node may be there

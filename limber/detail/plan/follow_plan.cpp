@@ -6,6 +6,8 @@
 #include "core/hash.h"
 #include "limber/detail/plan/plan.h"
 #include "limber/detail/world/scene_world.h"
+#include "plan/control_rollout.h"
+#include "plan/expansion.h"
 
 namespace limber::detail {
 
@@ -56,15 +58,13 @@ FollowingTold FollowedPlan::facts(const plan::Plan& simulation, const fs::path& 
     largest = std::max(largest, double(largest_force(control)));
   const State& end = simulation.trajectory.end;
   const Vec3 center = system_->robot_center(end) - system_->goal_shift(end);
-  const double speed = system_->mean_speed(end);
-  const plan::Settle& settle = settings_.settle;
-  const bool rests = settle.max_duration_s == 0 || speed < settle.mean_speed_m_s;
+  const bool rests = plan::rests(*system_, settings_.settle, end, plan::settle_control(settings_, 0));
   return {.folder = fs::relative(folder_, from).generic_string(),
           .trajectory_hash = trajectory_hash_,
           .farthest_from_path_m = farthest,
           .largest_force_n = largest,
           .distance_m = (center - settings_.goal.center_of_mass_m).norm(),
-          .speed_m_s = speed,
+          .speed_m_s = system_->mean_speed(end),
           .reaches = rests && plan::holds(settings_.goal, center) && system_->goal_holds(end)};
 }
 

@@ -10,11 +10,13 @@
 
 #include "core/error.h"
 #include "core/hash.h"
+#include "core/same_bits.h"
 #include "limber/detail/plan/manifest.h"
 #include "limber/detail/plan/plan.h"
 #include "limber/detail/plan/tree_plot.h"
 #include "limber/detail/verify/plan_checks.h"
 #include "limber/detail/world/goal_terms.h"
+#include "plan/expansion.h"
 
 namespace limber::detail {
 
@@ -52,17 +54,26 @@ void check_goals(const PlanFolder& planned, const fem::World& world, const Repla
     const auto before = std::find(path.begin(), path.end(), plan.legs[v + 1].root) - path.begin();
     const State& state = replay.after(std::size_t(before));
     std::vector<GoalTerm> terms = terms_of(scene, via.goal, world, state);
-    if (via.rest && scene.planner.settle_time_s > 0) terms.push_back(rest_term(scene, world, state));
+    if (via.rest && scene.planner.settle_time_s > 0) {
+      terms.push_back(rest_term(scene, world, state));
+      const Control& last = plan.tree.controls[std::size_t(plan.legs[v + 1].root)];
+      const bool settled =
+          same_bits(last, plan::settle_control(plan::settings_of_leg(plan.settings, int(v)), last.steps));
+      terms.push_back(stay_term(scene, world, state, settled ? last : Control()));
+    }
     add_terms(name, terms, table);
   }
 
   const std::string name = "the goal";
   const State& end = replay.course().end;
   std::vector<GoalTerm> terms = terms_of(scene, scene.goal, world, end);
-  if (scene.planner.settle_time_s > 0)
+  if (scene.planner.settle_time_s > 0) {
     terms.push_back(rest_term(scene, world, end));
-  else
+    terms.push_back(stay_term(
+        scene, world, end, plan.trajectory.settle_steps > 0 ? plan.trajectory.controls.back() : Control()));
+  } else {
     table.measured("speed at the end, where no rest is asked for", rest_term(scene, world, end).found);
+  }
   if (plan.trajectory.settle_steps > 0) {
     GoalTerm entered = terms_of(scene, scene.goal, world, replay.after(path.size() - 1)).front();
     entered.asked = "entered before the robot is brought to rest";

@@ -2,6 +2,10 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <cmath>
+
+#include "fem/batch.h"
 #include "fem/observe.h"
 #include "scenes/models.h"
 
@@ -112,6 +116,25 @@ std::vector<GoalTerm> terms_of(const scenes::Scene& scene, const scenes::Goal& g
 GoalTerm rest_term(const scenes::Scene& scene, const fem::World& world, const State& state) {
   const double most = scene.planner.settle_speed_m_s, speed = fem::mean_speed_m_s(world, state, world.robot);
   return {fmt::format("at rest, slower than {:g} m/s", most), speed < most, fmt::format("{:.4f} m/s", speed)};
+}
+
+GoalTerm stay_term(const scenes::Scene& scene, const fem::World& world, const State& state, Control held_by) {
+  constexpr double look_s = 0.01;
+  constexpr int looks = 5;
+  const double most = scene.planner.settle_speed_m_s;
+  const std::string asked = fmt::format("at rest for {:g} s more", looks * look_s);
+  held_by.steps = std::max(1, int(std::lround(look_s / world.dt_s)));
+  fem::Batch batch(world, 1);
+  double fastest = 0;
+  State now = state;
+  for (int look = 0; look < looks; ++look) {
+    fem::Rollout on{&now, held_by, {}, {}};
+    fem::propagate(batch, {&on, 1});
+    if (on.outcome.status == fem::RunStatus::diverged) return {asked, false, "the dynamics diverge"};
+    fastest = std::max(fastest, fem::mean_speed_m_s(world, on.end, world.robot));
+    now = std::move(on.end);
+  }
+  return {asked, fastest < most, fmt::format("{:.4f} m/s at most", fastest)};
 }
 
 GoalTerm loss_term(const scenes::Scene& scene, const fem::World& world, const State& state) {

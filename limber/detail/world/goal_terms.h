@@ -21,6 +21,10 @@ std::vector<GoalTerm> terms_of(const scenes::Scene&, const scenes::Goal&, const 
 // Of the robot: its nodes' mean speed is below planner.settle_speed_m_s.
 GoalTerm rest_term(const scenes::Scene&, const fem::World&, const State&);
 
+// And it is no moment only, as where a body turns back: so every 0.01 s for the next 0.05 s too, under what
+// held it at last.
+GoalTerm stay_term(const scenes::Scene&, const fem::World&, const State&, Control held_by);
+
 // With goal.lost_below_m: whether the goal is there still.
 GoalTerm loss_term(const scenes::Scene&, const fem::World&, const State&);
 
