@@ -12,6 +12,7 @@
 #include "bench/dynamics/bullet.h"
 #include "bench/dynamics/count.h"
 #include "bench/dynamics/peak.h"
+#include "bench/dynamics/unfused.h"
 #include "core/error.h"
 #include "core/hash.h"
 #include "core/json.h"
@@ -21,6 +22,7 @@
 #include "fem/batch.h"
 #include "fem/detail/kernels.h"
 #include "fem/detail/make_tables.h"
+#include "fem/detail/stepper.h"
 #include "fem/observe.h"
 #include "tests/core/node_order.h"
 #include "tests/fem/worlds.h"
@@ -33,6 +35,9 @@ using fem::Cost;
 using fem::InstructionSet;
 using fem::MaterialModel;
 using fem::World;
+
+using Kernels = fem::detail::Kernels<float>;
+using Numbers = std::vector<float, fem::detail::LineAllocator<float>>;
 
 constexpr int rollouts = 16;
 constexpr int lane_counts[] = {1, 4, 8, 16};
@@ -397,6 +402,99 @@ Json compare_with_bullet(const std::vector<Measurement>& free, int repetitions) 
   return json;
 }
 
+// Steps of a free body by its kernels alone, without what a Batch does besides: the nodes' places afterwards.
+class KernelSteps {
+ public:
+  KernelSteps(const World& world, const std::vector<State>& starts, int lanes, const Kernels& kernels)
+      : world_(world), lanes_(lanes), kernels_(kernels) {
+    using namespace fem::detail;
+    const Layout at = state_layout(lanes);
+    first_velocity_ = lanes == 1 ? 4 : world.nodes * at.node;
+    state_.resize(std::size_t(world.nodes) * std::size_t(lanes == 1 ? 8 : 6 * lanes));
+    forces_.resize(std::size_t(world.nodes * force_layout(lanes).node));
+    found_.resize(std::size_t(7 * lanes));
+    for (int n = 0; n < world.nodes; ++n)
+      for (int c = 0; c < 3; ++c)
+        for (int l = 0; l < lanes; ++l) {
+          const State& start = starts[std::size_t(l)];
+          state_[std::size_t(at.at(n, c) + l)] = start.positions[std::size_t(3 * n + c)];
+          state_[std::size_t(first_velocity_ + at.at(n, c) + l)] = start.velocities[std::size_t(3 * n + c)];
+        }
+  }
+  void take(int steps) {
+    fem::detail::Motion<float> motion{
+        0,       world_.nodes,  world_.tables.inverse_mass.data(), float(world_.substep_s()),       {}, 1,
+        nullptr, found_.data(), &found_[std::size_t(3 * lanes_)],  &found_[std::size_t(6 * lanes_)]};
+    const auto elements = fem::detail::elements_of(world_.tables.elements);
+    float *const x = state_.data(), *const v = &state_[std::size_t(first_velocity_)];
+    for (int s = 0; s < steps; ++s) {
+      kernels_.elastic(elements, x, v, forces_.data());
+      kernels_.integrate(motion, x, v, forces_.data());
+    }
+  }
+  const Numbers& state() const { return state_; }
+
+ private:
+  const World& world_;
+  int lanes_, first_velocity_ = 0;
+  const Kernels& kernels_;
+  Numbers state_, forces_, found_;
+};
+
+// Kernels as they were, two lists and each operation rounded by itself, and as they are, one after the other.
+// Where they take a body is the same within a hundredth of how far it moved.
+Json compare_kernels(const std::vector<const Work*>& works, int repetitions) {
+  const Set set = sets_here().back();
+  if (set.set == InstructionSet::sse2) return {};
+  const bool wide = set.set == InstructionSet::avx512;
+  fmt::print(
+      "\n## Kernels before and now, {}, steps without a Batch\n\n"
+      "| ns a tet-step: two lists and no fused products, two lists, stars and no fused products, now; before "
+      "/ now | "
+      "W = 1 | W = 4 | W = 8 | W = 16 |\n|---|---|---|---|---|",
+      set.name);
+  Json json = Json::array();
+  for (const Work* work : works) {
+    const Work alone = with_edges_alone(*work);
+    const int tets = moving_tets(work->world), steps = work->controls[0].steps;
+    fmt::print("\n| {}, {} tets |", name_of(work->world.bodies[0].material.model), tets);
+    for (int k = 0; k < 4; ++k) {
+      const int lanes = lane_counts[k];
+      const Kernels &now = fem::detail::kernels<float>(
+                        wide ? fem::detail::Isa::avx512 : fem::detail::Isa::avx2, lanes),
+                    &unfused = (wide ? fem::detail::unfused_avx512() : fem::detail::unfused_avx2())[k];
+      const std::pair<const World*, const Kernels*> ways[] = {
+          {&alone.world, &unfused}, {&alone.world, &now}, {&work->world, &unfused}, {&work->world, &now}};
+      double best_ns[] = {1e30, 1e30, 1e30, 1e30};
+      std::vector<Numbers> ends(4);
+      for (int r = 0; r < repetitions; ++r)
+        for (int way = 0; way < 4; ++way) {
+          KernelSteps body(*ways[way].first, work->starts, lanes, *ways[way].second);
+          const double ns = 1e9 / (double(steps) * tets * lanes) * best_seconds(1, [&] { body.take(steps); });
+          best_ns[way] = std::min(best_ns[way], ns);
+          ends[std::size_t(way)] = body.state();
+        }
+      const Numbers start = KernelSteps(work->world, work->starts, lanes, now).state();
+      for (const Numbers& end : ends) {
+        float moved = 0, apart = 0;
+        for (std::size_t i = 0; i < end.size(); ++i)
+          moved = std::max(moved, std::abs(ends[3][i] - start[i])),
+          apart = std::max(apart, std::abs(ends[3][i] - end[i]));
+        LIMBER_CHECK(apart <= 0.01f * moved, lanes, apart, moved);
+      }
+      fmt::print(" {:.2f}, {:.2f}, {:.2f}, {:.2f}; {:.2f} |", best_ns[0], best_ns[1], best_ns[2], best_ns[3],
+                 best_ns[0] / best_ns[3]);
+      json.push_back({{"material", name_of(work->world.bodies[0].material.model)},
+                      {"tets", tets},
+                      {"lanes", lanes},
+                      {"ns_before", best_ns[0]},
+                      {"ns_now", best_ns[3]}});
+    }
+  }
+  fmt::print("\n");
+  return json;
+}
+
 // The same work in one thread and in two, each with a Batch of its own.
 Json compare_threads(const Work& work, int repetitions) {
   const auto million_a_second = [&](int threads) {
@@ -558,6 +656,7 @@ int main(int argc, char** argv) {
   fmt::print("\nLooking at the clock takes {:.0f} ns, five times in {} steps.\n", 1e9 * clock_s,
              Cost::sampled);
   json["bullet"] = compare_with_bullet(free, repetitions);
+  json["kernels"] = compare_kernels({&free_works[2], &free_works[3]}, repetitions);
   json["threads"] = compare_threads(free_works[2], repetitions);
 
   bool same = same_bits(free) & same_bits(alone) & same_bits(slab) & same_bits(contact);
