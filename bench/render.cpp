@@ -14,6 +14,7 @@
 #include <fstream>
 #include <map>
 #include <numbers>
+#include <string_view>
 
 #include "core/error.h"
 #include "core/hash.h"
@@ -315,8 +316,11 @@ void run(const std::string& model, const std::vector<int>& sizes, int frames, in
   for (const int triangles : sizes) {
     body = refined(body, triangles);
     if (!out.empty()) write_obj(out / fmt::format("{}k.obj", triangles / 1000), body);
-    for (const bool multisampling : {false, true}) {
-      Stage stage(body, coarse, look_of(1920, 1080, multisampling));
+    for (const char* way :
+         {"ssaa", "opengl", "msaa"}) {  // opaque bodies in tiles, by OpenGL, by OpenGL with MSAA
+      RenderSettings look = look_of(1920, 1080, way == std::string_view("msaa"));
+      look.tiles = way == std::string_view("ssaa");
+      Stage stage(body, coarse, look);
       stage.png(0, none, unused);  // shaders are compiled
       std::map<std::string, double> seconds;
       StageTimes stages;
@@ -324,8 +328,8 @@ void run(const std::string& model, const std::vector<int>& sizes, int frames, in
       const double before = cpu_seconds();
       for (int f = 0; f < frames; ++f) png = stage.png(f, seconds, stages);
       const double total = cpu_seconds() - before, ms = 1000.0 / frames;
-      const std::string name = fmt::format("{}k-{}", triangles / 1000, multisampling ? "msaa" : "ssaa");
-      fmt::print("{:>10}: {:5.0f}  = ", name, total * ms);
+      const std::string name = fmt::format("{}k-{}", triangles / 1000, way);
+      fmt::print("{:>12}: {:5.0f}  = ", name, total * ms);
       for (const auto& [what, s] : seconds) fmt::print("{} {:.0f}, ", what.substr(2), s * ms);
       fmt::print(
           "in draw: shadow map {:.0f}, ground {:.0f}, opaque {:.0f}, lines {:.0f}, finish {:.0f}; {} kB, "

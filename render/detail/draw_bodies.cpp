@@ -22,13 +22,9 @@ namespace limber::render {
 
 using detail::grain_waves;
 
-namespace {
-
-constexpr double max_shadow = 0.03;  // radius of the half-shade between bodies, over the side of the map
-
-// Where the soft box stands that surfaces mirror (its light is only ever seen mirrored): the key light's
-// direction turned by 110° about up, 25° above the horizon.
-Vec3 toward_soft_box(const RenderSettings& settings) {
+// Its light is only ever seen mirrored: the key light's direction turned by 110° about up, 25° above the
+// horizon.
+Vec3 detail::toward_soft_box(const RenderSettings& settings) {
   const Vec3 level = settings.toward_key - settings.toward_key.dot(settings.up) * settings.up;
   const Vec3 turned = level.norm() > 1e-6
                           ? Eigen::AngleAxisd(110 * std::numbers::pi / 180, settings.up) * level.normalized()
@@ -36,8 +32,6 @@ Vec3 toward_soft_box(const RenderSettings& settings) {
   const double height = 25 * std::numbers::pi / 180;
   return std::cos(height) * turned + std::sin(height) * settings.up;
 }
-
-}  // namespace
 
 // ---- what cuts a mesh ----
 
@@ -123,8 +117,8 @@ const Program& Renderer::Impl::use_mesh(const Mesh& mesh, const std::string& def
   p.set("shadow_offset_m", 2.0 * shadow_texel_m);
   p.set("shadow_from_normal", shadow_from_normal);
   p.set("shadow_softness", shadow_softness);
-  p.set("min_shadow", 1.9 / shadow_size);
-  p.set("max_shadow", max_shadow);
+  p.set("min_shadow", detail::min_shadow);
+  p.set("max_shadow", detail::max_shadow);
   p.set("ground_x", Vec3(ground.plane_from_world.row(0)));
   p.set("ground_y", Vec3(ground.plane_from_world.row(1)));
   p.set("ground_lower", sky_shade.lower);
@@ -133,7 +127,7 @@ const Program& Renderer::Impl::use_mesh(const Mesh& mesh, const std::string& def
   p.set("eye", camera.eye);
   p.set("up", settings.up);
   p.set("toward_key", settings.toward_key);
-  p.set("toward_box", toward_soft_box(settings));
+  p.set("toward_box", detail::toward_soft_box(settings));
   p.set("key_light", settings.key_light);
   p.set("sky_light", settings.sky_light);
   p.set("ground_color",
@@ -208,8 +202,11 @@ bool Renderer::Impl::hides_its_back(const Mesh& mesh) const {
 
 // Clears all targets and draws what is opaque, colours and depth; with `passes` also normal, scalar and
 // number of the mesh of every sample, into targets of their own. What is drawn nowhere keeps alpha 0, no
-// object (−1) and no scalar (NaN).
+// object (−1) and no scalar (NaN). Colours and depth are of the tiles where these can be drawn, with passes
+// too.
 void Renderer::Impl::draw_opaque(bool passes) {
+  if (!passes && draw_opaque_in_tiles()) return;
+  clean_tiles.clear();
   glBindFramebuffer(GL_FRAMEBUFFER, passes ? targets.passes().frame : targets.samples_frame);
   const SampleGrid grid = sample_grid(settings);
   glViewport(0, 0, grid.width, grid.height);
@@ -251,6 +248,7 @@ void Renderer::Impl::draw_opaque(bool passes) {
   glDisable(GL_CULL_FACE);
   glDisable(GL_POLYGON_OFFSET_FILL);
   plane_defines({});
+  if (passes && draw_opaque_in_tiles()) glBindFramebuffer(GL_FRAMEBUFFER, targets.passes().frame);
 }
 
 }  // namespace limber::render

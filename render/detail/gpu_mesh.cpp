@@ -53,13 +53,13 @@ void GpuMesh::set_positions(const Points& positions, const Points& normals) {
 }
 
 void GpuMesh::set_tints(const Eigen::Matrix<float, Eigen::Dynamic, 4, Eigen::RowMajor>& tints) {
-  std::vector<std::uint16_t> levels;
-  levels.reserve(4 * drawn_.vertex_from_drawn.size());
+  tints_.clear();
+  tints_.reserve(4 * drawn_.vertex_from_drawn.size());
   for (const int vertex : drawn_.vertex_from_drawn)
     for (int c = 0; c < 4; ++c)
-      levels.push_back(std::uint16_t(65535 * std::clamp(tints(vertex, c), 0.0f, 1.0f) + 0.5f));
+      tints_.push_back(std::uint16_t(65535 * std::clamp(tints(vertex, c), 0.0f, 1.0f) + 0.5f));
   if (tint_buffer_ == 0) tint_buffer_ = new_attribute(array_, at_tint, 4, GL_UNSIGNED_SHORT);
-  upload(tint_buffer_, levels);
+  upload(tint_buffer_, tints_);
 }
 
 void GpuMesh::set_scalars(const Eigen::VectorXd& values) {
@@ -71,12 +71,12 @@ void GpuMesh::set_scalars(const Eigen::VectorXd& values) {
 }
 
 void GpuMesh::set_rest(const Points& rest_positions) {
-  std::vector<float> drawn;
-  drawn.reserve(3 * drawn_.vertex_from_drawn.size());
+  rest_.clear();
+  rest_.reserve(3 * drawn_.vertex_from_drawn.size());
   for (const int vertex : drawn_.vertex_from_drawn)
-    for (int i = 0; i < 3; ++i) drawn.push_back(float(rest_positions(vertex, i)));
+    for (int i = 0; i < 3; ++i) rest_.push_back(float(rest_positions(vertex, i)));
   if (rest_buffer_ == 0) rest_buffer_ = new_attribute(array_, at_rest, 3, GL_FLOAT);
-  upload(rest_buffer_, drawn);
+  upload(rest_buffer_, rest_);
 }
 
 void GpuMesh::draw(std::size_t first_corner, std::size_t corners) const {

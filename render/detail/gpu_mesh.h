@@ -2,6 +2,7 @@
 // tint, scalars) has buffers of its own.
 #pragma once
 
+#include <cstdint>
 #include <utility>
 #include <vector>
 
@@ -32,11 +33,16 @@ class GpuMesh {
   Eigen::Index vertices() const { return vertices_; }
   const Box& box() const { return box_; }
   bool tinted() const { return tint_buffer_ != 0; }
+  // (drawn × 4) 65535 is 1, and (drawn × 3); empty where none were set.
+  const std::vector<std::uint16_t>& tints() const { return tints_; }
+  const std::vector<float>& rest() const { return rest_; }
 
  private:
   DrawnMesh drawn_;
   Eigen::Index vertices_;  // rows the caller hands over
   Box box_;
+  std::vector<std::uint16_t> tints_;
+  std::vector<float> rest_;
   unsigned array_ = 0, position_buffer_ = 0, normal_buffer_ = 0, tint_buffer_ = 0, scalar_buffer_ = 0,
            rest_buffer_ = 0, corner_buffer_ = 0;
   std::vector<std::pair<int, int>> edges_;  // drawn vertices; found when first asked for

@@ -14,6 +14,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cstdint>
 #include <functional>
 #include <map>
@@ -28,6 +29,7 @@
 #include "render/detail/image_on_card.h"
 #include "render/detail/layer_lists.h"
 #include "render/detail/program.h"
+#include "render/detail/shade_tile.h"
 #include "render/detail/shaders.h"
 #include "render/detail/targets.h"
 #include "render/renderer.h"
@@ -37,6 +39,8 @@ namespace limber::render {
 namespace detail {
 
 constexpr int shadow_size = Targets::shadow_size;
+// Radius of the half-shade between bodies, over the side of the map.
+constexpr double min_shadow = 1.9 / shadow_size, max_shadow = 0.03;
 
 // A mesh that was added, with what was set of it since.
 struct Mesh {
@@ -86,6 +90,9 @@ SampleGrid sample_grid(const RenderSettings&);
 // them. plane_defines({}) turns all of them off.
 std::string plane_defines(const std::vector<render::Plane>&);
 
+// Where the soft box stands that surfaces mirror.
+Vec3 toward_soft_box(const RenderSettings&);
+
 // Of a mesh that is drawn with its edges over it: pushes the surface back, so that no edge hides in its own
 // surface.
 double stand_back(const Mesh&, int samples_per_pixel_side);
@@ -131,6 +138,7 @@ struct Renderer::Impl {
   void draw_shadow_map();
   void shade_ground_maps();
   void draw_opaque(bool passes);
+  bool draw_opaque_in_tiles();
   struct Rectangle {               // of samples; rows go upward
     int left, top, right, bottom;  // right and bottom are beyond
     Rectangle with(const Rectangle& other) const {
@@ -196,6 +204,11 @@ struct Renderer::Impl {
   Plane ground_plane;
   bool ground_seen = false;  // there is one, and the eye is above it
   ShadeMap key_shade, sky_shade;
+  std::vector<float> shadow_depths, entry_depths;  // the maps, read back for the tiles
+  std::array<std::vector<unsigned>, 2>
+      relief_texels;  // for the tiles, plain and woven, made when they are asked for
+  std::array<detail::Relief, 2> reliefs;
+  std::vector<bool> clean_tiles;      // of the samples: nothing is in them
   Rectangle drawn = {0, 0, 0, 0};     // whole pixels: beyond it nothing is, and samples are not cleared
   std::vector<std::uint16_t> halves;  // the samples of it, read back
 };

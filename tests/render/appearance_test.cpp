@@ -39,6 +39,7 @@ Appearance of_quad(const Eigen::Vector2d& upper, SurfaceMaterial material, int i
 RenderSettings look_of_pictures() {
   RenderSettings look;
   look.width = 240, look.height = 240;
+  look.tiles = false;  // as meshes with images are drawn
   return look;
 }
 const Camera camera{.eye = {0, -6, 0}, .target = {0, 0, 0}};

@@ -164,7 +164,9 @@ void check_pictures(const fs::path& folder, const PlanFolder& planned, const fem
   const std::string other = first_difference(kept_summary(planned), entry);
   const std::string what = planned.plan.simulation ? "simulation" : "plan";
   table.row("manifest.json tells of this " + what, other.empty(),
-            other.empty() ? "" : (other == "." ? "plan" : "plan." + other) + " is another's");
+            other.empty()     ? ""
+            : entry.is_null() ? "it does not tell of one, or is missing"
+                              : (other == "." ? "plan" : "plan." + other) + " is another's");
   for (const auto& [name, content] : pictures_of(planned.scene, world, planned.plan, figures)) {
     const bool there = fs::exists(folder / name);
     table.row(name + " shows this " + what, there && read_file(folder / name) == content,
