@@ -84,7 +84,7 @@ bool Renderer::Impl::draw_opaque_in_tiles() {
                    detail::stand_back(*mesh, settings.supersampling),
                    planes.empty() ? nullptr : planes.data()))
       return false;
-    detail::ShadedMesh s{drawn_mesh.corners.data(), {}, {}, {}, false};
+    detail::ShadedMesh s{drawn_mesh.corners.data(), {}, {}, {}};
     detail::Finish& finish = s.finish;
     finish.tinted = mesh->card.tinted();
     finish.roughness = float(look.roughness), finish.metallic = float(look.metallic),
@@ -107,7 +107,7 @@ bool Renderer::Impl::draw_opaque_in_tiles() {
       const double away_m = (box.center() - camera.eye).norm() - 0.5 * box.diagonal(),
                    sample_m = 2 * std::max(away_m, near_m) *
                               std::tan(camera.fov_deg * std::numbers::pi / 360) / grid.height;
-      s.each_sample = look.grain_m < fine_relief * sample_m;
+      finish.fine = look.grain_m < fine_relief * sample_m;
     }
     const std::size_t vertices = drawn_mesh.vertex_from_drawn.size();
     s.vertices.resize(vertices * std::size_t(detail::vertex_numbers));

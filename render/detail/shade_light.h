@@ -42,6 +42,7 @@ struct Finish {
   float scatter_powers[3];  // − 1.4427 over the depth by which each colour falls to 1/e
   float scatter_radius;
   float grain;  // 0: none
+  bool fine;    // the relief: each of a pixel's samples shows another part of it
   const Relief* relief;
 };
 
@@ -57,7 +58,8 @@ struct alignas(64) LitPlaces {
   float side[places_at_once];                                // −1: seen from behind
   float pixel_x[places_at_once], pixel_y[places_at_once];    // whole
   float middle_x[places_at_once], middle_y[places_at_once];  // of the pixel, in samples from the place
-  float light[3][places_at_once];                            // out
+  float weight[4][places_at_once];  // of the pixel's samples, 0 where it does not show; their sum is 1
+  float light[3][places_at_once];   // out
 };
 
 using Shade = void (*)(const Stage&, const Finish&, LitPlaces&);

@@ -37,8 +37,7 @@ using Numbers = float __attribute__((vector_size(4 * vertex_numbers)));
 
 }  // namespace
 
-void TileShader::collect(const std::vector<ShadedMesh>& meshes, const std::vector<ScreenTriangle>& triangles,
-                         const Tiles::Samples& samples) {
+void TileShader::collect(const std::vector<ScreenTriangle>& triangles, const Tiles::Samples& samples) {
   for (std::vector<Item>& items : items_) items.clear();
   for (int y = 0; y < pixels; ++y)
     for (int x = 0; x < pixels; ++x) {
@@ -48,11 +47,10 @@ void TileShader::collect(const std::vector<ShadedMesh>& meshes, const std::vecto
       for (unsigned i = 0; i < 4; ++i) left |= unsigned(four[i] >= 0) << i;
       for (unsigned i = 0; left != 0; ++i) {
         if (!(left >> i & 1)) continue;
-        const std::size_t mesh = triangles[std::size_t(four[i])].mesh;
-        unsigned same = 1u << i;
-        for (unsigned j = i + 1; j < 4 && !meshes[mesh].each_sample; ++j)
-          same |= unsigned(four[j] == four[i]) << j;
-        items_[mesh].push_back({four[i], std::int16_t(x), std::int16_t(y), std::uint8_t(same)});
+        unsigned same = 0;
+        for (unsigned j = i; j < 4; ++j) same |= unsigned(four[j] == four[i]) << j;
+        items_[triangles[std::size_t(four[i])].mesh].push_back(
+            {four[i], std::int16_t(x), std::int16_t(y), std::uint8_t(same)});
         left &= ~same;
       }
     }
@@ -95,6 +93,8 @@ void TileShader::collect(const std::vector<ShadedMesh>& meshes, const std::vecto
     std::memcpy(rows[2][i], &along_y, sizeof value);
     places_.side[i] = t.front ? 1 : -1;
     places_.pixel_x[i] = float(x0 / 2 + item.x), places_.pixel_y[i] = float(y0 / 2 + item.y);
+    const float weight = 1 / float(std::popcount(item.samples));
+    for (int s = 0; s < 4; ++s) places_.weight[s][i] = item.samples >> s & 1 ? weight : 0;
     places_.middle_x[i] = -middle[0], places_.middle_y[i] = -middle[1];
   }
   for (int k = 0; k < vertex_numbers; ++k)
@@ -113,7 +113,7 @@ void TileShader::shade(const Stage& stage, const std::vector<ShadedMesh>& meshes
                        int y0, std::uint16_t* halves) {
   std::memset(halves, 0, sizeof(std::uint16_t) * 4 * tile_samples * tile_samples);
   items_.resize(meshes.size());
-  collect(meshes, triangles, samples);
+  collect(triangles, samples);
   const Shade light = best_shade();
   for (std::size_t m = 0; m < meshes.size(); ++m)
     for (std::size_t begin = 0; begin < items_[m].size(); begin += places_at_once) {

@@ -15,7 +15,6 @@ struct ShadedMesh {
   std::vector<float> vertices;   // (vertex_numbers each)
   std::vector<float> per_w;      // of each vertex, 1/w of its place in clip space
   Finish finish;
-  bool each_sample;  // by itself: its relief is too fine for one place a pixel
 };
 
 // Of one thread.
@@ -32,7 +31,7 @@ class TileShader {
     std::int16_t x, y;      // of the tile's pixels
     std::uint8_t samples;   // bits
   };
-  void collect(const std::vector<ShadedMesh>&, const std::vector<ScreenTriangle>&, const Tiles::Samples&);
+  void collect(const std::vector<ScreenTriangle>&, const Tiles::Samples&);
   void place(const ShadedMesh&, const std::vector<ScreenTriangle>&, const Item*, int count, int x0, int y0);
 
   std::vector<std::vector<Item>> items_;  // body by body

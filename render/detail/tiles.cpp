@@ -8,8 +8,8 @@ namespace limber::render::detail {
 namespace {
 
 constexpr int at_once = 16;
-using Ints = std::int32_t __attribute__((vector_size(4 * at_once)));
-using Floats = float __attribute__((vector_size(4 * at_once)));
+using Ints = std::int32_t __attribute__((vector_size(4 * at_once), may_alias));
+using Floats = float __attribute__((vector_size(4 * at_once), may_alias));
 constexpr Ints ascending{0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
 
 constexpr int parts = 256;           // of a sample, in which corners are given

@@ -156,8 +156,8 @@ TEST(TileLight, IsTheSameBitsWhateverTheInstructions) {
   stage.shadow = stage.entry = {side, depths.data()};
   for (int turn = 0; turn < 40; ++turn) {
     detail::Finish finish{
-        true, number(0.1, 1), number(0, 1),           number(0, 1), number(0, 1), number(0, 1),
-        {},   0.1f,           turn % 2 ? 0.4f : 0.0f, &relief};
+        true, number(0.1, 1), number(0, 1),           number(0, 1),  number(0, 1), number(0, 1),
+        {},   0.1f,           turn % 2 ? 0.4f : 0.0f, turn % 4 == 1, &relief};
     for (float& x : finish.scatter_powers) x = number(-9, -1);
     auto places = std::make_unique<detail::LitPlaces>();
     float* const numbers = reinterpret_cast<float*>(places.get());
