@@ -16,7 +16,7 @@ namespace limber::render {
 
 namespace {
 
-constexpr double fine_relief = 24;  // samples a wave: what is finer is shaded sample by sample
+constexpr double fine_relief = 24;  // samples a wave: of what is finer each sample has its own normal
 
 // With its rim.
 detail::DepthMap read_back(const Texture& map, int side, std::vector<float>& to) {
@@ -59,78 +59,60 @@ void put(const Vec3& from, float (&to)[3]) {
 
 }  // namespace
 
-// False where they cannot all be drawn so: with images or colours of corners, cut by planes, or before the
-// near plane.
-bool Renderer::Impl::draw_opaque_in_tiles() {
-  const SampleGrid grid = sample_grid(settings);
-  if (!settings.tiles || settings.multisampling || settings.supersampling != 2) return false;
-  std::vector<const Mesh*> opaque;
-  for (const Mesh& mesh : meshes)
-    if (mesh.look.seen && !mesh.transparent()) {
-      if (!mesh.card.drawn().batches.empty() || !mesh.planes.empty()) return false;
-      opaque.push_back(&mesh);
-    }
-  detail::Tiles tiles(grid.width, grid.height);
-  std::vector<detail::ShadedMesh> shaded;
+// Its vertices, packed, and how its surface answers light.
+detail::ShadedMesh Renderer::Impl::shaded_in_tiles(const Mesh& mesh) {
   const Eigen::Matrix4f shadow = shadow_from_world.cast<float>();
   const Eigen::RowVector4f w = clip_from_world.row(3).cast<float>();
   const Vec3f toward_key = settings.toward_key.cast<float>();
   const float offset_m = float(2 * shadow_texel_m);
-  for (const Mesh* mesh : opaque) {
-    const DrawnMesh& drawn_mesh = mesh->card.drawn();
-    const MeshLook& look = mesh->look;
-    const std::vector<Plane> planes = planes_of(*mesh);  // the ground's, or none
-    if (!tiles.add(drawn_mesh.positions, drawn_mesh.corners, clip_from_world, hides_its_back(*mesh),
-                   detail::stand_back(*mesh, settings.supersampling),
-                   planes.empty() ? nullptr : planes.data()))
-      return false;
-    detail::ShadedMesh s{drawn_mesh.corners.data(), {}, {}, {}};
-    detail::Finish& finish = s.finish;
-    finish.tinted = mesh->card.tinted();
-    finish.roughness = float(look.roughness), finish.metallic = float(look.metallic),
-    finish.sheen = float(look.sheen);
-    finish.open_power = std::exp2(-16 * finish.roughness - 1);
-    const Vec3 albedo = linear_from_srgb(look.color_srgb);
-    if (mesh->translucent()) {
-      const Vec3 reach = Vec3::Constant(0.3) + 0.7 * albedo / std::max(albedo.maxCoeff(), 1e-3);
-      finish.translucency = float(look.translucency);
-      put(-1.442695 * (look.scatter_m / shadow_depth_m * reach).cwiseInverse(), finish.scatter_powers);
-      finish.scatter_radius = float(1.5 * look.scatter_m / (shadow_texel_m * shadow_size));
-    }
-    float waves = 0;
-    if (mesh->grained()) {
-      const std::size_t kind = std::size_t(look.woven);
-      if (relief_texels[kind].empty()) fill_levels(look.woven, relief_texels[kind], reliefs[kind]);
-      finish.grain = float(look.grain), finish.relief = &reliefs[kind];
-      waves = float(1 / (detail::grain_waves * look.grain_m));
-      const Box& box = mesh->card.box();
-      const double away_m = (box.center() - camera.eye).norm() - 0.5 * box.diagonal(),
-                   sample_m = 2 * std::max(away_m, near_m) *
-                              std::tan(camera.fov_deg * std::numbers::pi / 360) / grid.height;
-      finish.fine = look.grain_m < fine_relief * sample_m;
-    }
-    const std::size_t vertices = drawn_mesh.vertex_from_drawn.size();
-    s.vertices.resize(vertices * std::size_t(detail::vertex_numbers));
-    s.per_w.resize(vertices);
-    for (std::size_t v = 0; v < vertices; ++v) {
-      float* to = &s.vertices[v * std::size_t(detail::vertex_numbers)];
-      const Eigen::Map<const Vec3f> place(&drawn_mesh.positions[3 * v]), normal(&drawn_mesh.normals[3 * v]);
-      std::copy_n(place.data(), 3, to), std::copy_n(normal.data(), 3, to + 3);
-      for (int c = 0; c < 4; ++c)
-        to[6 + c] = finish.tinted ? float(mesh->card.tints()[4 * v + std::size_t(c)]) / 65535
-                    : c < 3       ? float(albedo[c])
-                                  : 1.0f;
-      for (int c = 0; c < 3; ++c)
-        to[10 + c] = waves > 0 ? waves * mesh->card.rest()[3 * v + std::size_t(c)] : 0;
-      const Vec3f aside = place + (normal.dot(toward_key) < 0 ? -offset_m : offset_m) * normal;
-      const Vec3f in_map = (shadow * aside.homogeneous()).head<3>();
-      std::copy_n(in_map.data(), 3, to + 13);
-      s.per_w[v] = 1 / w.dot(place.homogeneous());
-    }
-    shaded.push_back(std::move(s));
+  const DrawnMesh& drawn_mesh = mesh.card.drawn();
+  const MeshLook& look = mesh.look;
+  detail::ShadedMesh s{drawn_mesh.corners.data(), {}, {}, {}};
+  detail::Finish& finish = s.finish;
+  finish.tinted = mesh.card.tinted();
+  finish.roughness = float(look.roughness), finish.metallic = float(look.metallic),
+  finish.sheen = float(look.sheen);
+  finish.open_power = std::exp2(-16 * finish.roughness - 1);
+  const Vec3 albedo = linear_from_srgb(look.color_srgb);
+  if (mesh.translucent()) {
+    const Vec3 reach = Vec3::Constant(0.3) + 0.7 * albedo / std::max(albedo.maxCoeff(), 1e-3);
+    finish.translucency = float(look.translucency);
+    put(-1.442695 * (look.scatter_m / shadow_depth_m * reach).cwiseInverse(), finish.scatter_powers);
+    finish.scatter_radius = float(1.5 * look.scatter_m / (shadow_texel_m * shadow_size));
   }
-  tiles.sort();
+  float waves = 0;
+  if (mesh.grained()) {
+    const std::size_t kind = std::size_t(look.woven);
+    if (relief_texels[kind].empty()) fill_levels(look.woven, relief_texels[kind], reliefs[kind]);
+    finish.grain = float(look.grain), finish.relief = &reliefs[kind];
+    waves = float(1 / (detail::grain_waves * look.grain_m));
+    const Box& box = mesh.card.box();
+    const double away_m = (box.center() - camera.eye).norm() - 0.5 * box.diagonal(),
+                 sample_m = 2 * std::max(away_m, near_m) * std::tan(camera.fov_deg * std::numbers::pi / 360) /
+                            sample_grid(settings).height;
+    finish.fine = look.grain_m < fine_relief * sample_m;
+  }
+  const std::size_t vertices = drawn_mesh.vertex_from_drawn.size();
+  s.vertices.resize(vertices * std::size_t(detail::vertex_numbers));
+  s.per_w.resize(vertices);
+  for (std::size_t v = 0; v < vertices; ++v) {
+    float* to = &s.vertices[v * std::size_t(detail::vertex_numbers)];
+    const Eigen::Map<const Vec3f> place(&drawn_mesh.positions[3 * v]), normal(&drawn_mesh.normals[3 * v]);
+    std::copy_n(place.data(), 3, to), std::copy_n(normal.data(), 3, to + 3);
+    for (int c = 0; c < 4; ++c)
+      to[6 + c] = finish.tinted ? float(mesh.card.tints()[4 * v + std::size_t(c)]) / 65535
+                  : c < 3       ? float(albedo[c])
+                                : 1.0f;
+    for (int c = 0; c < 3; ++c) to[10 + c] = waves > 0 ? waves * mesh.card.rest()[3 * v + std::size_t(c)] : 0;
+    const Vec3f aside = place + (normal.dot(toward_key) < 0 ? -offset_m : offset_m) * normal;
+    const Vec3f in_map = (shadow * aside.homogeneous()).head<3>();
+    std::copy_n(in_map.data(), 3, to + 13);
+    s.per_w[v] = 1 / w.dot(place.homogeneous());
+  }
+  return s;
+}
 
+detail::Stage Renderer::Impl::stage_of_tiles() {
   detail::Stage stage;
   put(camera.eye, stage.eye), put(settings.up, stage.up), put(settings.toward_key, stage.toward_key);
   put(detail::toward_soft_box(settings), stage.toward_box);
@@ -156,9 +138,37 @@ bool Renderer::Impl::draw_opaque_in_tiles() {
   stage.shadow = stage.entry = read_back(targets.shadow_map, shadow_size, shadow_depths);
   if (entry_map != &targets.shadow_map)
     stage.entry = read_back(*entry_map, Targets::entry_size, entry_depths);
+  return stage;
+}
+
+// False where they cannot all be drawn so: with images or colours of corners, cut open, or reaching before
+// the near plane.
+bool Renderer::Impl::draw_opaque_in_tiles() {
+  const SampleGrid grid = sample_grid(settings);
+  if (!settings.tiles || settings.multisampling || settings.supersampling != 2) return false;
+  std::vector<const Mesh*> opaque;
+  for (const Mesh& mesh : meshes)
+    if (mesh.look.seen && !mesh.transparent()) {
+      if (!mesh.card.drawn().batches.empty() || !mesh.planes.empty()) return false;
+      opaque.push_back(&mesh);
+    }
+  detail::Tiles tiles(grid.width, grid.height);
+  std::vector<detail::ShadedMesh> shaded;
+  for (const Mesh* mesh : opaque) {
+    const std::vector<Plane> planes = planes_of(*mesh);  // the ground's, or none
+    if (!tiles.add(mesh->card.drawn().positions, mesh->card.drawn().corners, clip_from_world,
+                   hides_its_back(*mesh), detail::stand_back(*mesh, settings.supersampling),
+                   planes.empty() ? nullptr : planes.data()))
+      return false;
+    shaded.push_back(shaded_in_tiles(*mesh));
+  }
+  tiles.sort();
+  const detail::Stage stage = stage_of_tiles();
 
   drawn = extent_of_drawn();
-  const bool more_follows = has_transparent() || !lines.empty();
+  const bool more_follows =
+      has_transparent() || !lines.empty() ||
+      std::any_of(meshes.begin(), meshes.end(), [](const Mesh& m) { return m.look.edges.has_value(); });
   clean_tiles.resize(std::size_t(tiles.columns() * tiles.rows()), false);
   constexpr int side = detail::tile_samples;
   glPixelStorei(GL_UNPACK_ROW_LENGTH, side);

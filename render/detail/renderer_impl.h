@@ -139,6 +139,8 @@ struct Renderer::Impl {
   void shade_ground_maps();
   void draw_opaque(bool passes);
   bool draw_opaque_in_tiles();
+  detail::ShadedMesh shaded_in_tiles(const Mesh&);
+  detail::Stage stage_of_tiles();
   struct Rectangle {               // of samples; rows go upward
     int left, top, right, bottom;  // right and bottom are beyond
     Rectangle with(const Rectangle& other) const {

@@ -232,14 +232,18 @@ TEST(TileLight, AMotionLeavesNoTrace) {
   const SurfaceMesh ball = sphere_mesh({0, 0, 0}, 0.3, 12);
   Camera camera;
   camera.eye = Vec3(0, -3, 1), camera.target = Vec3(0, 0, 0);
-  Renderer renderer(settings);
-  const int number = renderer.add_mesh(ball.triangles, ball.positions, {});
-  for (const double x : {-0.8, 0.1, 0.7, -0.2}) {
-    const Points moved = ball.positions.rowwise() + Eigen::RowVector3d(x, 0, 0.3 * x);
-    renderer.set_positions(number, moved);
-    Renderer fresh(settings);
-    fresh.set_positions(fresh.add_mesh(ball.triangles, ball.positions, {}), moved);
-    EXPECT_EQ(renderer.draw_shown(camera).rgb, fresh.draw_shown(camera).rgb) << x;
+  MeshLook plain, edged;
+  edged.edges = LineLook{.width_px = 24};
+  for (const MeshLook& look : {plain, edged}) {
+    Renderer renderer(settings);
+    const int number = renderer.add_mesh(ball.triangles, ball.positions, look);
+    for (const double x : {-0.8, 0.1, 0.7, -0.2, -0.75, 0.45, 0.0}) {
+      const Points moved = ball.positions.rowwise() + Eigen::RowVector3d(x, 0, 0.3 * x);
+      renderer.set_positions(number, moved);
+      Renderer fresh(settings);
+      fresh.set_positions(fresh.add_mesh(ball.triangles, ball.positions, look), moved);
+      EXPECT_EQ(renderer.draw_shown(camera).rgb, fresh.draw_shown(camera).rgb) << x;
+    }
   }
 }
 
