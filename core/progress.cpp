@@ -44,9 +44,9 @@ int this_thread() {
   return number;
 }
 
-bool has_line() {
+bool has_line(int thread) {
   int nobody = 0;
-  return line_of.compare_exchange_strong(nobody, this_thread()) || nobody == this_thread();
+  return line_of.compare_exchange_strong(nobody, thread) || nobody == thread;
 }
 
 bool on_terminal() { return enabled && ::isatty(STDERR_FILENO) == 1; }
@@ -65,13 +65,14 @@ std::string duration_text(double seconds) {
 Progress::Progress(std::string label, std::int64_t total)
     : label_(name_of_work.empty() ? std::move(label) : name_of_work + ": " + label),
       total_(total),
+      owner_(this_thread()),
       started_(seconds_now()) {
   ++bars;
   events::tell({{"event", "stage"}, {"stage", label_}, {"total", total_}});
 }
 
 Progress::~Progress() {
-  const bool is_its_line = line_of == this_thread();
+  const bool is_its_line = line_of == owner_;
   if (is_its_line && drawn_at_ >= 0 && on_terminal()) fmt::print(stderr, "\r\x1b[K");
   if (--bars == 0 && is_its_line) line_of = 0;
   if (current_job()) return;
@@ -89,7 +90,7 @@ void Progress::update(std::int64_t done, const std::string& note, double share) 
   if (another_second)
     events::tell(
         {{"event", "progress"}, {"stage", label_}, {"done", done}, {"total", total_}, {"note", note}});
-  if (!on_terminal() || !has_line()) return;
+  if (!on_terminal() || !has_line(owner_)) return;
   constexpr int width = 24;
   std::string line = fmt::format("\r\x1b[K{} ", label_);
   if (total_ > 0) {

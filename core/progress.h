@@ -20,6 +20,7 @@ class Progress {
  private:
   std::string label_;
   std::int64_t total_;
+  int owner_;  // the thread that made it; others may update it, one at a time
   double started_, drawn_at_ = -1;
 };
 void set_progress_enabled(bool);  // false: never draw

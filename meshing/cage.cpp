@@ -5,9 +5,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
 #include <optional>
 
 #include "core/error.h"
+#include "core/progress.h"
 #include "meshing/detail/coarsen.h"
 #include "meshing/detail/conform.h"
 #include "meshing/detail/gaps.h"
@@ -150,7 +152,8 @@ struct Fitted {
 
 // Parts the lattice's tets at gaps, draws them in and coarsens them to the budget (docs/cage.md, steps 7 to
 // 9). The dihedrals come down to their bounds by steps, for each step needs room to work with.
-Fitted fit(const ScaledModel& model, const Selection& selection, const CageOptions& options) {
+Fitted fit(const ScaledModel& model, const Selection& selection, const CageOptions& options,
+           const std::function<void(int, const char*)>& tell) {
   constexpr double max_growth = 1.4;  // by splitting; more would leave too few tets for the rest
   // Heights of a tet, as shares of one of the lattice: the simulation's time step goes with the lowest tet.
   // 0.3 costs 1 to 4 % of volume, 0.1 gains under 1 %. Narrow gaps need lower ones.
@@ -166,28 +169,35 @@ Fitted fit(const ScaledModel& model, const Selection& selection, const CageOptio
   };
   const auto part = [&](TetLimits bounds) {
     bounds.min_height_m = lowest_in_gap * lattice_height;
-    detail::split_at_gaps(model.cage_model, model.surface, {fitted.spacing, bounds, max_tets}, fitted.mesh);
+    detail::split_at_gaps(model.cage_model, {fitted.spacing, bounds, max_tets}, fitted.mesh);
     fitted.mesh = detail::open_gaps(model.cage_model, fitted.mesh);
   };
   const auto coarsen = [&](const TetLimits& bounds) {
-    detail::coarsen(model.cage_model, model.surface, bounds, options.tets, fitted.mesh);
+    detail::coarsen(model.cage_model, bounds, options.tets, fitted.mesh);
   };
   const auto draw_in = [&](const TetLimits& bounds) {
     return detail::shrink_fit(model.cage_model.tree, {model.gap, bounds}, fitted.mesh);
   };
+  tell(1, "gaps");
   part(limits(1));
+  tell(2, "drawing in");
   fitted.passes = draw_in(limits(1));
+  tell(3, "coarsening");
   coarsen(limits(1));
+  tell(4, "gaps");
   part(limits(0.5));
+  tell(5, "coarsening");
   coarsen(limits(0.5));
+  tell(6, "drawing in");
   fitted.passes += draw_in(limits(0));
-  fitted.glued_share = detail::glued_tets(model.cage_model, model.surface, fitted.mesh).share();
+  tell(7, "what is glued");
+  fitted.glued_share = detail::glued_tets(model.cage_model, fitted.mesh).share();
   return fitted;
 }
 
 // Fitting changes the number of tets: parting adds some, coarsening takes some. So the lattice's budget is
 // guessed from what its tets glue, and corrected by what came out.
-Fitted fit_lattice(const ScaledModel& model, const CageOptions& options) {
+Fitted fit_lattice(const ScaledModel& model, const CageOptions& options, Progress& progress) {
   constexpr double coarsened = 0.8;        // share that coarsening leaves where there are no gaps
   constexpr double added_a_glued_tet = 7;  // both as measured, on average
   constexpr int attempts = 3;
@@ -197,9 +207,9 @@ Fitted fit_lattice(const ScaledModel& model, const CageOptions& options) {
   const double tets = options.tets;
   Selection selection = fit_budget(model.cage_model, int(tets / coarsened), warp_within);
   if (selection.tets.empty()) return {};
-  const std::vector<bool> glued =
-      detail::glued_tets(model.cage_model, model.surface, detail::build_mesh(selection).mesh).glued;
-  const double for_gaps = added_a_glued_tet * double(std::count(glued.begin(), glued.end(), true));
+  const std::vector<char> glued =
+      detail::glued_tets(model.cage_model, detail::build_mesh(selection).mesh).glued;
+  const double for_gaps = added_a_glued_tet * double(std::count(glued.begin(), glued.end(), 1));
   double lattice_tets = std::max((tets - for_gaps) / coarsened, tets / 1.2);
   Fitted best;
   const auto miss = [&](const Fitted& f) { return std::abs(double(f.mesh.tets.rows()) / tets - 1); };
@@ -207,7 +217,9 @@ Fitted fit_lattice(const ScaledModel& model, const CageOptions& options) {
     if (i > 0 || lattice_tets < 0.95 * tets / coarsened)
       selection = fit_budget(model.cage_model, std::max(12, int(lattice_tets)), warp_within);
     if (selection.tets.empty()) break;
-    Fitted fitted = fit(model, selection, options);
+    Fitted fitted = fit(model, selection, options, [&](int step, const char* what) {
+      progress.update(step, i == 0 ? what : fmt::format("{}, try {} of {}", what, i + 1, attempts));
+    });
     lattice_tets *= tets / double(fitted.mesh.tets.rows());
     if (i == 0 || miss(fitted) < miss(best)) best = std::move(fitted);
     if (miss(best) < 0.09) break;
@@ -219,14 +231,16 @@ Fitted bare_lattice(const ScaledModel& model, const CageOptions& options) {
   const Selection selection = fit_budget(model.cage_model, options.tets, {});
   if (selection.tets.empty()) return {};
   Fitted fitted{detail::build_mesh(selection).mesh, 0, 0, selection.lattice.spacing};
-  fitted.glued_share = detail::glued_tets(model.cage_model, model.surface, fitted.mesh).share();
+  fitted.glued_share = detail::glued_tets(model.cage_model, fitted.mesh).share();
   return fitted;
 }
 
 Cage lattice_cage(const SurfaceMesh& surface, const CageOptions& options) {
+  Progress progress("cage", 8);
+  progress.update(0, "lattice");
   const ScaledModel model(surface, options);
-  Fitted fitted =
-      options.mode == CageMode::lattice ? fit_lattice(model, options) : bare_lattice(model, options);
+  Fitted fitted = options.mode == CageMode::lattice ? fit_lattice(model, options, progress)
+                                                    : bare_lattice(model, options);
   require(fitted.mesh.tets.rows() > 0, "the model is too thin for its length; give fewer tets");
 
   Cage cage;
@@ -276,7 +290,7 @@ Cage conforming_cage(const SurfaceMesh& surface, int tets) {
 void measure(const SurfaceMesh& surface, const CageOptions& options, Cage& cage) {
   const ScaledModel model(surface, options);
   const TetMesh scaled{cage.mesh.positions / model.unit, cage.mesh.tets};
-  cage.glued_share = detail::glued_tets(model.cage_model, model.surface, scaled).share();
+  cage.glued_share = detail::glued_tets(model.cage_model, scaled).share();
   if (model.cage_model.closed && volume(surface) > 0) cage.volume_ratio = volume(cage.mesh) / volume(surface);
 }
 

@@ -275,6 +275,8 @@ ContactShape make_contact_shape(const SurfaceMesh& surface, const TetMesh& cage,
     r.cpu_s = cpu_seconds() - start;
     return shape;
   };
+  Progress progress("contact", 4);
+  progress.update(0, "what is seen");
   const WindingNumber winding(surface.positions, surface.triangles);
   const double offset = detail::offset_share * size;
   const bool closed = is_closed(surface.triangles);
@@ -290,6 +292,7 @@ ContactShape make_contact_shape(const SurfaceMesh& surface, const TetMesh& cage,
   int cells = settings.cells;
   double thickness = 0;  // of a plate of this volume and area
   while (true) {
+    progress.update(samples.empty() ? 1 : 3, fmt::format("distances, {} cells", cells));
     shape.field = detail::grid_over(box, size / cells, settings.max_nodes);
     const double volume = detail::fill(seen, winding, closed, shape.field);
     thickness = 2 * volume / seen.area_m2;
@@ -299,6 +302,7 @@ ContactShape make_contact_shape(const SurfaceMesh& surface, const TetMesh& cage,
       const double squares = seen.area_m2 / (r.characteristic_m * r.characteristic_m);
       const int most = int(std::clamp(settings.samples_a_square * squares,
                                       double(settings.fewest_most_samples), double(settings.max_samples)));
+      progress.update(2, "samples");
       samples =
           detail::sample_surface(surface, seen, winding,
                                  {.missed_m = settings.missed_depth * r.characteristic_m,

@@ -43,7 +43,7 @@ class Shells {
   Shells(const SurfaceMesh& mesh, const DecomposeOptions& options)
       : mesh_(mesh),
         options_(options),
-        solid_(make_solid(mesh)),
+        solid_(solid_of(mesh, progress_)),
         inside_(solid_.mesh.positions, solid_.boundary),
         distance_(solid_.filled.positions, solid_.filled.triangles),
         model_(make_model(solid_.mesh.positions, solid_.mesh.triangles)) {
@@ -57,7 +57,8 @@ class Shells {
       }
     } else {
       parts_ = find_parts(model_, whole(model_, solid_.mesh.triangles), inside_, distance_,
-                          {options.max_shells, options.max_concavity * solid_.diagonal});
+                          {options.max_shells, options.max_concavity * solid_.diagonal}, progress_);
+      progress_.update(std::int64_t(parts_.size()), "shells", 0.85);
       result_.shells.resize(parts_.size());
       parallel_for(int(parts_.size()),
                    [&](int p) { result_.shells[std::size_t(p)] = shell_of(parts_[std::size_t(p)]); });
@@ -68,6 +69,10 @@ class Shells {
   Decomposition result();
 
  private:
+  static Solid solid_of(const SurfaceMesh& mesh, Progress& progress) {
+    progress.update(0, "the solid", 0);
+    return make_solid(mesh);
+  }
   Vec3 user_point(int p) const {
     return std::size_t(p) < solid_.user_vertex.size()
                ? Vec3(mesh_.positions.row(solid_.user_vertex[std::size_t(p)]))
@@ -86,6 +91,7 @@ class Shells {
 
   const SurfaceMesh& mesh_;
   const DecomposeOptions& options_;
+  Progress progress_{"decompose", parts_to_cut(options_.max_shells)};
   Solid solid_;
   InsideTest inside_;
   SurfaceDistance distance_;

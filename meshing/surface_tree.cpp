@@ -50,15 +50,18 @@ bool proved_disjoint(const Tet& tet, const Tri& tri) {
   static constexpr int face[4][3] = {{1, 3, 2}, {0, 2, 3}, {0, 3, 1}, {0, 1, 2}};
   const int own = orientation(tet[0], tet[1], tet[2], tet[3]);
   int side[4][3];
-  for (int i = 0; i < 4; ++i) {
-    for (int m = 0; m < 3; ++m)
+  for (int m = 0; m < 3; ++m) {
+    bool within = own != 0;
+    for (int i = 0; i < 4; ++i) {
       side[i][m] = orientation(tet[face[i][0]], tet[face[i][1]], tet[face[i][2]], tri[m]);
+      within = within && side[i][m] != -own;
+    }
+    if (within) return false;  // a corner of the triangle is in the tet
+  }
+  for (int i = 0; i < 4; ++i) {
     const int all = common(side[i][0], side[i][1], side[i][2]);
     if (all != 0 && all != own) return true;
   }
-  if (own != 0)
-    for (int m = 0; m < 3; ++m)
-      if (side[0][m] != -own && side[1][m] != -own && side[2][m] != -own && side[3][m] != -own) return false;
   const auto of_tri_plane = [&](int i) { return orientation(tri[0], tri[1], tri[2], tet[i]); };
   const int beyond[4] = {of_tri_plane(0), of_tri_plane(1), of_tri_plane(2), of_tri_plane(3)};
   if (common(beyond[0], beyond[1], beyond[2], beyond[3]) != 0) return true;

@@ -9,6 +9,8 @@
 #include <unordered_map>
 #include <vector>
 
+#include "core/threads.h"
+
 namespace limber::scenes {
 
 namespace {
@@ -18,6 +20,14 @@ struct Placed {
   Vec3 center, radii;
   double blend_m;
   bool hollow;
+
+  // Whether g of this part is above a distance for sure: k1 ≤ k0 / r_min and k0 ≥ |p − center| / r_max, so g
+  // ≥ (|p − center| / r_max − 1) r_min.
+  bool is_beyond(double distance, const Vec3& p) const {
+    const double reach = (1 + 1e-9) * (1 + std::max(distance, 0.0) / least_radius) * largest_radius;
+    return (p - center).squaredNorm() > reach * reach;
+  }
+  double least_radius = radii.minCoeff(), largest_radius = radii.maxCoeff();
 };
 
 std::vector<Placed> placed(std::span<const Ellipsoid> parts, Sides sides) {
@@ -45,6 +55,8 @@ class Union {
   double operator()(const Vec3& p) const {
     double f = 1e9;
     for (const Placed& part : parts_) {
+      // From here on it changes nothing.
+      if (part.is_beyond(part.blend_m + (part.hollow ? -f : f), p)) continue;
       const Vec3 q = (part.own_from_world * (p - part.center)).cwiseQuotient(part.radii);
       const double k0 = q.norm(), k1 = q.cwiseQuotient(part.radii).norm();
       const double g = k1 > 0 ? k0 * (k0 - 1) / k1 : -part.radii.minCoeff();
@@ -77,7 +89,7 @@ class MarchingTets {
   MarchingTets(const Union& f, const Box& box, double cell) : box_(box), cell_(cell) {
     for (int i = 0; i < 3; ++i) count_[std::size_t(i)] = int(std::ceil(box.size()[i] / cell)) + 1;
     value_.resize(std::size_t(count_[0]) * std::size_t(count_[1]) * std::size_t(count_[2]));
-    for (std::size_t n = 0; n < value_.size(); ++n) value_[n] = f(point(int(n)));
+    parallel_for_many(int(value_.size()), [&](int n) { value_[std::size_t(n)] = f(point(n)); });
     constexpr int order[6][3] = {{0, 1, 2}, {1, 2, 0}, {2, 0, 1},
                                  {0, 2, 1}, {2, 1, 0}, {1, 0, 2}};  // three even, three odd
     const std::array<int, 3> step{1, count_[0], count_[0] * count_[1]};
@@ -158,8 +170,10 @@ void smooth(const Union& f, std::vector<Vec3>& positions, const std::vector<Eige
         sum[std::size_t(t[c])] += positions[std::size_t(t[(c + 1) % 3])];
         ++count[std::size_t(t[c])];
       }
-    for (std::size_t v = 0; v < positions.size(); ++v)
+    parallel_for_many(int(positions.size()), [&](int n) {
+      const std::size_t v = std::size_t(n);
       positions[v] = f.nearer(0.4 * positions[v] + 0.6 * sum[v] / count[v]);
+    });
   }
 }
 

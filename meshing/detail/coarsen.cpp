@@ -11,9 +11,8 @@ namespace {
 
 class Coarsener {
  public:
-  Coarsener(const CageModel& model, const SurfaceMesh& surface, const TetLimits& limits, const TetMesh& mesh)
+  Coarsener(const CageModel& model, const TetLimits& limits, const TetMesh& mesh)
       : model_(model),
-        surface_(surface),
         limits_(limits),
         tets_(mesh),
         on_boundary_(tets_.positions.size()),
@@ -136,7 +135,7 @@ class Coarsener {
     }
     int glued = 0, glued_before = -1;
     for (const auto& corners : after) {
-      if (!is_glued(model_, surface_, corners)) continue;
+      if (!is_glued(model_, corners)) continue;
       if (glued_before < 0) glued_before = glued_round(v);
       if (++glued > glued_before) return false;
     }
@@ -147,7 +146,7 @@ class Coarsener {
     int count = 0;
     for (int t : tets_.star[v]) {
       std::optional<bool>& glued = glued_[t];
-      if (!glued) glued = is_glued(model_, surface_, tets_.corners(t));
+      if (!glued) glued = is_glued(model_, tets_.corners(t));
       count += *glued;
     }
     return count;
@@ -172,7 +171,6 @@ class Coarsener {
   }
 
   const CageModel& model_;
-  const SurfaceMesh& surface_;
   TetLimits limits_;
   EditTets tets_;
   std::vector<bool> on_boundary_;
@@ -181,9 +179,8 @@ class Coarsener {
 
 }  // namespace
 
-void coarsen(const CageModel& model, const SurfaceMesh& surface, const TetLimits& limits, int tets,
-             TetMesh& mesh) {
-  Coarsener coarsener(model, surface, limits, mesh);
+void coarsen(const CageModel& model, const TetLimits& limits, int tets, TetMesh& mesh) {
+  Coarsener coarsener(model, limits, mesh);
   coarsener.run(tets);
   mesh = coarsener.mesh();
 }

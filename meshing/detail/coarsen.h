@@ -8,6 +8,6 @@ namespace limber::meshing::detail {
 // Collapses edges, shortest first, until there are no more than `tets`, or none is left that may be: every
 // tet keeps the limits, none that was not glued becomes so, and the boundary moves only inwards, where what
 // it sweeps does not meet the surface.
-void coarsen(const CageModel&, const SurfaceMesh&, const TetLimits&, int tets, TetMesh& mesh);
+void coarsen(const CageModel&, const TetLimits&, int tets, TetMesh& mesh);
 
 }  // namespace limber::meshing::detail

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "core/progress.h"
+#include "core/threads.h"
 #include "meshing/detail/nearest_on_triangle.h"
 #include "meshing/detail/surface_spots.h"
 
@@ -34,43 +35,31 @@ class Filler {
   void measure_near() {
     const double reach = near_cells * cell_;
     clear_.assign(distance_.size(), float(reach));
+    // Slabs of nodes at once, each with its pieces in order.
+    constexpr int slab = 4;  // nodes high
+    std::vector<std::vector<int>> pieces_of_slab(std::size_t((nodes_[2] + slab - 1) / slab));
     for (int n = 0; n < int(pieces_.size()); ++n) {
-      throw_if_stopped();
-      const auto& [a, b, c] = pieces_[std::size_t(n)].corners;
-      const bool seen = pieces_[std::size_t(n)].seen;
-      Vec3 normal = (b - a).cross(c - a);
-      if (const double length = normal.norm(); length > 0) normal /= length;
-      std::array<int, 3> from, to;
-      for (int axis = 0; axis < 3; ++axis) {
-        const auto place = [&](double x) {
-          return std::clamp((x - lower_[axis]) / cell_, -1.0, double(nodes_[axis]));
-        };
-        from[axis] = int(std::max(0.0, std::ceil(place(std::min({a[axis], b[axis], c[axis]}) - reach))));
-        to[axis] =
-            std::min(nodes_[axis] - 1, int(std::floor(place(std::max({a[axis], b[axis], c[axis]}) + reach))));
-      }
-      for (int k = from[2]; k <= to[2]; ++k)
-        for (int j = from[1]; j <= to[1]; ++j)
-          for (int i = from[0]; i <= to[0]; ++i) {
-            const Vec3 p = position(i, j, k);
-            const std::size_t node = std::size_t(k * step_[2] + j * step_[1] + i);
-            const double off_plane = std::abs((p - a).dot(normal));
-            if (off_plane > clear_[node] && (!seen || off_plane >= distance_[node])) continue;
-            const double distance = (nearest_on_triangle(a, b, c, p) - p).norm();
-            clear_[node] = std::min(clear_[node], float(distance));
-            if (seen && distance < std::min(distance_[node], reach))
-              distance_[node] = distance, nearest_[node] = n;
-          }
+      const auto [from, to] = nodes_round(pieces_[std::size_t(n)], reach, 2);
+      for (int s = from / slab; s <= to / slab && from <= to; ++s)
+        pieces_of_slab[std::size_t(s)].push_back(n);
     }
-    fixed_.assign(distance_.size(), 0), unsaid_.assign(distance_.size(), 0);
+    parallel_for(int(pieces_of_slab.size()), [&](int s) {
+      for (const int n : pieces_of_slab[std::size_t(s)]) {
+        throw_if_stopped();
+        measure_round(n, reach, slab * s, slab * (s + 1) - 1);
+      }
+    });
+    fixed_.assign(distance_.size(), 0);
+    for (auto& unsaid : unsaid_) unsaid.assign(distance_.size(), 0);
     for (std::size_t n = 0; n < fixed_.size(); ++n)
-      if (nearest_[n] >= 0) fixed_[n] = 1, unsaid_[n] = to_all;
+      if (nearest_[n] >= 0) fixed_[n] = 1, to_say(n);
   }
 
   // A node takes the nearest piece of a neighbour where that is nearer than its own, in sweeps that run each
   // of the eight ways (the fast sweeping of Zhao, Mathematics of Computation 74, 2005, with pieces for
   // distances). What a node has said to a neighbour it does not say again before it has another piece: the
-  // neighbour would not take it.
+  // neighbour would not take it. A row hears of the two behind it, so blocks of rows along a diagonal are
+  // taken at once.
   void measure_far() {
     for (int way = 0; way < 8; ++way) {
       const std::array<bool, 3> down{(way & 1) != 0, (way & 2) != 0, (way & 4) != 0};
@@ -78,20 +67,27 @@ class Filler {
       std::array<std::uint8_t, 3> to_us;   // its bit for the way from there
       for (int axis = 0; axis < 3; ++axis) {
         back[axis] = down[axis] ? step_[axis] : -step_[axis];
-        to_us[axis] = std::uint8_t(1 << (2 * axis + down[axis]));
+        to_us[axis] = std::uint8_t(1 << down[axis]);
       }
-      for (int k = 0; k < nodes_[2]; ++k) {
-        throw_if_stopped();
-        const int z = down[2] ? nodes_[2] - 1 - k : k;
-        for (int j = 0; j < nodes_[1]; ++j) {
-          const int y = down[1] ? nodes_[1] - 1 - j : j;
-          std::ptrdiff_t node = z * step_[2] + y * step_[1] + (down[0] ? nodes_[0] - 1 : 0);
-          for (int i = 0; i < nodes_[0]; ++i, node -= back[0]) {
-            if (i > 0) hear(node, node + back[0], to_us[0]);
-            if (j > 0) hear(node, node + back[1], to_us[1]);
-            if (k > 0) hear(node, node + back[2], to_us[2]);
-          }
+      const auto take_row = [&](int j, int k) {
+        const int y = down[1] ? nodes_[1] - 1 - j : j, z = down[2] ? nodes_[2] - 1 - k : k;
+        std::ptrdiff_t node = z * step_[2] + y * step_[1] + (down[0] ? nodes_[0] - 1 : 0);
+        for (int i = 0; i < nodes_[0]; ++i, node -= back[0]) {
+          const std::array<int, 3> at{i, j, k};
+          for (int axis = 0; axis < 3; ++axis)
+            if (at[axis] > 0) hear(node, node + back[axis], unsaid_[axis].data(), to_us[axis]);
         }
+      };
+      constexpr int wide = 8;
+      const auto take_block = [&](int b, int c) {
+        for (int k = wide * c; k < std::min(nodes_[2], wide * (c + 1)); ++k)
+          for (int j = wide * b; j < std::min(nodes_[1], wide * (b + 1)); ++j) take_row(j, k);
+      };
+      const int blocks_y = (nodes_[1] + wide - 1) / wide, blocks_z = (nodes_[2] + wide - 1) / wide;
+      for (int diagonal = 0; diagonal < blocks_y + blocks_z - 1; ++diagonal) {
+        throw_if_stopped();
+        const int first = std::max(0, diagonal - blocks_y + 1), last = std::min(diagonal, blocks_z - 1);
+        parallel_for(last - first + 1, [&](int i) { take_block(diagonal - first - i, first + i); });
       }
     }
   }
@@ -183,7 +179,7 @@ class Filler {
           if (0.5 * cell_ < distance_[end]) {
             distance_[end] = 0.5 * cell_;
             nearest_[end] = int(pieces_.size() + closing_.size()) - 1;
-            unsaid_[end] = to_all;
+            to_say(end);
           }
       });
     if (!closing_.empty()) measure_far();
@@ -202,10 +198,10 @@ class Filler {
     if (!(spots >= 1)) return;
     const SurfaceSpots sequence(surface);
     std::vector<Place> places(std::size_t(std::min(spots, max_spots)));
-    for (std::size_t i = 0; i < places.size(); ++i) {
+    parallel_for_many(int(places.size()), [&](int i) {
       throw_if_stopped();
-      places[i] = place_of(sequence.at(std::uint32_t(i)).position);
-    }
+      places[std::size_t(i)] = place_of(sequence.at(std::uint32_t(i)).position);
+    });
     std::vector<float> weights(distance_.size());
     std::vector<char> known(distance_.size());
     std::vector<std::size_t> near;  // the nodes of all places
@@ -266,6 +262,38 @@ class Filler {
                 ((c & 4) ? share[2] : 1 - share[2]));
     return result;
   }
+  // The first and the last node along an axis of those that may be within reach of a piece.
+  std::pair<int, int> nodes_round(const SurfacePiece& piece, double reach, int axis) const {
+    const auto& [a, b, c] = piece.corners;
+    const auto place = [&](double x) {
+      return std::clamp((x - lower_[axis]) / cell_, -1.0, double(nodes_[std::size_t(axis)]));
+    };
+    return {int(std::max(0.0, std::ceil(place(std::min({a[axis], b[axis], c[axis]}) - reach)))),
+            std::min(nodes_[std::size_t(axis)] - 1,
+                     int(std::floor(place(std::max({a[axis], b[axis], c[axis]}) + reach))))};
+  }
+  // Of the nodes round a piece those from `lowest` to `highest` along z.
+  void measure_round(int n, double reach, int lowest, int highest) {
+    const SurfacePiece& piece = pieces_[std::size_t(n)];
+    const auto& [a, b, c] = piece.corners;
+    Vec3 normal = (b - a).cross(c - a);
+    if (const double length = normal.norm(); length > 0) normal /= length;
+    const auto [x0, x1] = nodes_round(piece, reach, 0);
+    const auto [y0, y1] = nodes_round(piece, reach, 1);
+    const auto [z0, z1] = nodes_round(piece, reach, 2);
+    for (int k = std::max(z0, lowest); k <= std::min(z1, highest); ++k)
+      for (int j = y0; j <= y1; ++j)
+        for (int i = x0; i <= x1; ++i) {
+          const Vec3 p = position(i, j, k);
+          const std::size_t node = std::size_t(k * step_[2] + j * step_[1] + i);
+          const double off_plane = std::abs((p - a).dot(normal));
+          if (off_plane > clear_[node] && (!piece.seen || off_plane >= distance_[node])) continue;
+          const double distance = (nearest_on_triangle(a, b, c, p) - p).norm();
+          clear_[node] = std::min(clear_[node], float(distance));
+          if (piece.seen && distance < std::min(distance_[node], reach))
+            distance_[node] = distance, nearest_[node] = n;
+        }
+  }
   // No surface crosses the edge between two neighbours, since the balls about both ends within which there is
   // none cover it.
   bool uncrossed(std::size_t node, std::size_t other) const {
@@ -282,16 +310,20 @@ class Filler {
         if (uncrossed(node, other)) visit(other);
       }
   }
+  // It has another piece since it was asked, whichever way.
+  void to_say(std::size_t node) {
+    for (auto& unsaid : unsaid_) unsaid[node] = 3;
+  }
   // `node` takes the piece of `other` where that is nearer than its own; `to_us` is the bit of that way.
-  void hear(std::ptrdiff_t node, std::ptrdiff_t other, std::uint8_t to_us) {
+  void hear(std::ptrdiff_t node, std::ptrdiff_t other, std::uint8_t* unsaid, std::uint8_t to_us) {
     const std::size_t n = std::size_t(node), o = std::size_t(other);
-    if (!(unsaid_[o] & to_us)) return;
-    unsaid_[o] &= std::uint8_t(~to_us);
+    if (!(unsaid[o] & to_us)) return;
+    unsaid[o] &= std::uint8_t(~to_us);
     const int piece = nearest_[o];
     if (fixed_[n] || piece == nearest_[n] || distance_[o] - cell_ >= distance_[n]) return;
     const auto [i, j, k] = indices(n);
     const double distance = distance_to(piece, position(i, j, k));
-    if (distance < distance_[n]) distance_[n] = distance, nearest_[n] = piece, unsaid_[n] = to_all;
+    if (distance < distance_[n]) distance_[n] = distance, nearest_[n] = piece, to_say(n);
   }
   double distance_to(int piece, const Vec3& p) const {
     if (std::size_t(piece) >= pieces_.size())
@@ -315,8 +347,9 @@ class Filler {
   std::vector<Vec3> closing_;                 // points that close holes
   std::vector<float> clear_;                  // no piece, seen or not, is nearer; up to near_cells
   std::vector<char> fixed_;
-  static constexpr std::uint8_t to_all = 0x3f;
-  std::vector<std::uint8_t> unsaid_;  // has another piece since it was asked along +x, −x, +y, −y, +z, −z
+  // Of each axis: a node has another piece since it was asked along + (1) and along − (2). No two threads
+  // touch the same axis of a node at once.
+  std::array<std::vector<std::uint8_t>, 3> unsaid_;
 };
 
 }  // namespace

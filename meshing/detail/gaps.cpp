@@ -6,7 +6,8 @@
 #include <optional>
 #include <set>
 
-#include "meshing/detail/edges.h"
+#include "core/threads.h"
+#include "core/union_find.h"
 #include "meshing/detail/edit_tets.h"
 #include "meshing/detail/manifold.h"
 #include "meshing/detail/tet_faces.h"
@@ -60,7 +61,7 @@ class Splitter {
 
   TetMesh mesh() const { return tets_.mesh(); }
 
-  void split_edges_of(const std::vector<bool>& glued) {
+  void split_edges_of(const std::vector<char>& glued) {
     constexpr double shortest = 0.4;  // edge that is split, in cells
     constexpr double near_end = 0.4;  // as a share of the edge
     std::set<EdgeEnds> edges;
@@ -70,11 +71,27 @@ class Splitter {
           const int v = tets_.tets[t][i], w = tets_.tets[t][j];
           edges.insert({std::min(v, w), std::max(v, w)});
         }
-    for (const auto& [p, q] : edges) {
-      const Vec3 &a = tets_.positions[p], &b = tets_.positions[q];
+    // Gaps are looked for at once; where an end has been moved since, again.
+    struct Way {
+      int p, q;
+      Vec3 a, b;
+      std::optional<Gap> gap;
+    };
+    std::vector<Way> ways;
+    for (const auto& [p, q] : edges) ways.push_back({p, q, tets_.positions[p], tets_.positions[q], {}});
+    const auto look = [&](Way& way) {
+      way.gap.reset();
+      if ((way.a - way.b).norm() >= shortest * limits_.spacing_m)
+        way.gap = gap_on(model_, limits_.spacing_m, way.a, way.b);
+    };
+    parallel_for(int(ways.size()), [&](int i) { look(ways[std::size_t(i)]); });
+    for (Way& way : ways) {
+      const auto& [p, q, a, b, gap] = way;
       if (tets_.tet_count >= limits_.max_tets) return;
-      if ((a - b).norm() < shortest * limits_.spacing_m) continue;
-      const std::optional<Gap> gap = gap_on(model_, limits_.spacing_m, a, b);
+      if (a != tets_.positions[p] || b != tets_.positions[q]) {
+        way.a = tets_.positions[p], way.b = tets_.positions[q];
+        look(way);
+      }
       if (!gap) continue;
       // An end that is near enough becomes the vertex in the gap, as in isosurface stuffing.
       const double share = (gap->middle - a).dot(b - a) / (b - a).squaredNorm();
@@ -219,7 +236,7 @@ struct Opened {
   std::vector<int> vertex_before;  // of each vertex
 };
 
-Opened rebuild(const TetMesh& mesh, const std::vector<bool>& left_out, const std::vector<Joint>& joints) {
+Opened rebuild(const TetMesh& mesh, const std::vector<char>& left_out, const std::vector<Joint>& joints) {
   const auto corner_of = [&](int tet, int vertex) {
     int k = 0;
     while (mesh.tets(tet, k) != vertex) ++k;
@@ -231,7 +248,7 @@ Opened rebuild(const TetMesh& mesh, const std::vector<bool>& left_out, const std
       for (int v : joint.vertices) corners.join(corner_of(joint.tet, v), corner_of(joint.other, v));
   Opened opened;
   std::vector<int> vertex_from_root(std::size_t(mesh.tets.size()), -1);
-  opened.mesh.tets.resize(std::count(left_out.begin(), left_out.end(), false), 4);
+  opened.mesh.tets.resize(std::count(left_out.begin(), left_out.end(), 0), 4);
   Eigen::Index row = 0;
   for (int t = 0; t < mesh.tets.rows(); ++t) {
     if (left_out[t]) continue;
@@ -253,12 +270,11 @@ Opened rebuild(const TetMesh& mesh, const std::vector<bool>& left_out, const std
 
 }  // namespace
 
-void split_at_gaps(const CageModel& model, const SurfaceMesh& surface, const GapLimits& limits,
-                   TetMesh& mesh) {
+void split_at_gaps(const CageModel& model, const GapLimits& limits, TetMesh& mesh) {
   constexpr int rounds = 2;  // a tet may span two gaps, and a cut may leave pieces to be cut again
   Splitter splitter(model, limits, mesh);
   for (int round = 0; round < rounds; ++round) {
-    splitter.split_edges_of(glued_tets(model, surface, mesh).glued);
+    splitter.split_edges_of(glued_tets(model, mesh).glued);
     splitter.relax();
     mesh = splitter.mesh();
   }
@@ -266,18 +282,18 @@ void split_at_gaps(const CageModel& model, const SurfaceMesh& surface, const Gap
 
 TetMesh open_gaps(const CageModel& model, const TetMesh& mesh) {
   const auto at = [&](int v) { return Vec3(mesh.positions.row(v)); };
-  std::vector<bool> meets(std::size_t(mesh.tets.rows())), left_out(meets.size());
-  for (int t = 0; t < mesh.tets.rows(); ++t) {
+  std::vector<char> left_out(std::size_t(mesh.tets.rows()));
+  parallel_for(int(mesh.tets.rows()), [&](int t) {
     const Vec3 a = at(mesh.tets(t, 0)), b = at(mesh.tets(t, 1)), c = at(mesh.tets(t, 2)),
                d = at(mesh.tets(t, 3));
-    meets[t] = model.tree.meets_tet(a, b, c, d);
-    left_out[t] = !meets[t] && !model.winding.inside(0.25 * (a + b + c + d));
-  }
+    left_out[t] = !model.tree.meets_tet(a, b, c, d) && !model.winding.inside(0.25 * (a + b + c + d));
+  });
   std::vector<Joint> joints = joints_of(mesh.tets);
-  for (Joint& joint : joints) {
+  parallel_for(int(joints.size()), [&](int i) {
+    Joint& joint = joints[std::size_t(i)];
     const Vec3 a = at(joint.vertices[0]), b = at(joint.vertices[1]), c = at(joint.vertices[2]);
     joint.open = !model.winding.inside((a + b + c) / 3) && !model.tree.meets_triangle(a, b, c);
-  }
+  });
   for (;;) {
     const Opened opened = rebuild(mesh, left_out, joints);
     const ManifoldFaults faults =

@@ -14,7 +14,7 @@ struct GapLimits {
 // Gives the edges of glued tets a vertex in the middle of the gap that they cross. The union of the tets
 // stays what it was, but for the rounding of vertices on boundary edges, which is proved not to let the
 // surface out.
-void split_at_gaps(const CageModel&, const SurfaceMesh&, const GapLimits&, TetMesh&);
+void split_at_gaps(const CageModel&, const GapLimits&, TetMesh&);
 
 // Without the tets of nothing but air, and disconnected over faces in the air: such a face meets no surface
 // and lies outside the model. Where the boundary would be no manifold all stays as it was. `mesh` has a

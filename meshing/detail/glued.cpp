@@ -2,11 +2,12 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <map>
-#include <tuple>
 #include <utility>
 
-#include "meshing/detail/edges.h"
+#include "core/threads.h"
+#include "core/union_find.h"
 
 namespace limber::meshing::detail {
 namespace {
@@ -57,31 +58,39 @@ std::vector<Vec3> clip(const std::array<FacePlane, 4>& planes, std::vector<Vec3>
   return polygon;
 }
 
-bool holds_strangers(const CageModel& model, const SurfaceMesh& surface, const TetCorners& corners,
-                     const std::vector<int>& triangles) {
+// Where a triangle stands in a list of some; −1: not in it.
+class PlaceIn {
+ public:
+  PlaceIn(const std::vector<int>& triangles, Eigen::Index of_all) : triangles_(triangles) {
+    if (std::ssize(places_) < of_all) places_.resize(std::size_t(of_all), -1);
+    for (int i = 0; i < int(triangles.size()); ++i) places_[std::size_t(triangles[i])] = i;
+  }
+  ~PlaceIn() {
+    for (const int t : triangles_) places_[std::size_t(t)] = -1;
+  }
+  int operator()(int triangle) const { return places_[std::size_t(triangle)]; }
+
+ private:
+  static inline thread_local std::vector<int> places_;  // −1 wherever no list is
+  const std::vector<int>& triangles_;
+};
+
+// `triangles`: those that meet the tet, ascending.
+bool holds_strangers(const CageModel& model, const TetCorners& corners, const std::vector<int>& triangles) {
   const std::array<FacePlane, 4> planes = planes_of(corners);
+  const SurfaceMesh& surface = model.surface;
   const auto at = [&](int v) { return Vec3(surface.positions.row(v)); };
 
-  struct Side {  // of a triangle, from one of its ends to the other
-    int low, high, triangle, from;
-  };
-  std::vector<Side> sides;
-  sides.reserve(3 * triangles.size());
+  const PlaceIn place(triangles, surface.triangles.rows());
+  UnionFind pieces(int(triangles.size()));
   for (int i = 0; i < int(triangles.size()); ++i)
     for (int k = 0; k < 3; ++k) {
-      const int v = surface.triangles(triangles[i], k), w = surface.triangles(triangles[i], (k + 1) % 3);
-      sides.push_back({std::min(v, w), std::max(v, w), i, v});
+      int side = model.side_before[std::size_t(3 * triangles[i] + k)];
+      while (side >= 0 && place(side / 3) < 0) side = model.side_before[std::size_t(side)];
+      if (side < 0) continue;
+      Vec3 a = at(surface.triangles(triangles[i], k)), b = at(surface.triangles(triangles[i], (k + 1) % 3));
+      if (clip(planes, a, b)) pieces.join(place(side / 3), i);
     }
-  std::sort(sides.begin(), sides.end(), [](const Side& a, const Side& b) {
-    return std::tie(a.low, a.high, a.triangle) < std::tie(b.low, b.high, b.triangle);
-  });
-  UnionFind pieces(int(triangles.size()));
-  for (std::size_t i = 1; i < sides.size(); ++i) {
-    const Side &before = sides[i - 1], &side = sides[i];
-    Vec3 a = at(side.from), b = at(side.low + side.high - side.from);
-    if (before.low == side.low && before.high == side.high && clip(planes, a, b))
-      pieces.join(before.triangle, side.triangle);
-  }
   std::vector<std::pair<int, int>> triangle_of_piece;
   for (int i = 0; i < int(triangles.size()); ++i) triangle_of_piece.push_back({pieces.root(i), i});
   std::sort(triangle_of_piece.begin(), triangle_of_piece.end());
@@ -116,26 +125,28 @@ bool holds_strangers(const CageModel& model, const SurfaceMesh& surface, const T
 
 }  // namespace
 
-bool is_glued(const CageModel& model, const SurfaceMesh& surface, const std::array<Vec3, 4>& tet) {
+bool is_glued(const CageModel& model, const std::array<Vec3, 4>& tet) {
   const std::vector<int> triangles = model.tree.triangles_meeting_tet(tet[0], tet[1], tet[2], tet[3]);
-  return !triangles.empty() && holds_strangers(model, surface, tet, triangles);
+  return !triangles.empty() && holds_strangers(model, tet, triangles);
 }
 
-GluedTets glued_tets(const CageModel& model, const SurfaceMesh& surface, const TetMesh& mesh) {
-  GluedTets all{std::vector<bool>(std::size_t(mesh.tets.rows())), 0};
-  for (Eigen::Index t = 0; t < mesh.tets.rows(); ++t) {
+GluedTets glued_tets(const CageModel& model, const TetMesh& mesh) {
+  GluedTets all{std::vector<char>(std::size_t(mesh.tets.rows())), 0};
+  std::atomic<int> meeting{0};
+  parallel_for(int(mesh.tets.rows()), [&](int t) {
     TetCorners p;
     for (int k = 0; k < 4; ++k) p[k] = mesh.positions.row(mesh.tets(t, k));
     const std::vector<int> triangles = model.tree.triangles_meeting_tet(p[0], p[1], p[2], p[3]);
-    if (triangles.empty()) continue;
-    ++all.meeting;
-    all.glued[std::size_t(t)] = holds_strangers(model, surface, p, triangles);
-  }
+    if (triangles.empty()) return;
+    ++meeting;
+    all.glued[std::size_t(t)] = holds_strangers(model, p, triangles);
+  });
+  all.meeting = meeting;
   return all;
 }
 
 double GluedTets::share() const {
-  return meeting > 0 ? double(std::count(glued.begin(), glued.end(), true)) / meeting : 0;
+  return meeting > 0 ? double(std::count(glued.begin(), glued.end(), 1)) / meeting : 0;
 }
 
 }  // namespace limber::meshing::detail

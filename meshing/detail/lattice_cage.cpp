@@ -1,11 +1,14 @@
 #include "meshing/detail/lattice_cage.h"
 
 #include <algorithm>
+#include <atomic>
 #include <bit>
 #include <cmath>
 
 #include "core/error.h"
 #include "core/mass_properties.h"
+#include "core/threads.h"
+#include "meshing/detail/edges.h"
 
 namespace limber::meshing::detail {
 namespace {
@@ -42,9 +45,11 @@ std::vector<int> cells_near(const CageModel& model, const Lattice& lattice) {
   // The tets of a cell reach from half a cell below its lower corner to its upper corner, and nodes move by
   // less than a half: so they lie within [−1, 1.5] cells of the lower corner.
   const double to_middle = 0.25, half_width = 1.25;
-  std::vector<bool> near(std::size_t(lattice.cell_count()));
-  for (const TrianglePiece& piece :
-       pieces_of(model.surface.positions, model.surface.triangles, lattice.spacing)) {
+  std::vector<char> near(std::size_t(lattice.cell_count()));
+  const std::vector<TrianglePiece> pieces =
+      pieces_of(model.surface.positions, model.surface.triangles, lattice.spacing);
+  parallel_for_many(int(pieces.size()), [&](int i) {
+    const TrianglePiece& piece = pieces[std::size_t(i)];
     std::array<Vec3, 3> p;
     for (int k = 0; k < 3; ++k)
       p[k] = (model.surface.positions.row(model.surface.triangles(piece.triangle, k)).transpose() -
@@ -60,8 +65,8 @@ std::vector<int> cells_near(const CageModel& model, const Lattice& lattice) {
       for (int y = first.y(); y <= last.y(); ++y)
         for (int x = first.x(); x <= last.x(); ++x)
           if (std::abs(n.dot(Vec3(x + to_middle, y + to_middle, z + to_middle) - p[0])) <= reach)
-            near[lattice.index({x, y, z})] = true;
-  }
+            std::atomic_ref(near[std::size_t(lattice.index({x, y, z}))]).store(1, std::memory_order_relaxed);
+  });
   std::vector<int> cells;
   for (int cell = 0; cell < int(near.size()); ++cell)
     if (near[cell]) cells.push_back(cell);
@@ -78,8 +83,8 @@ void warp(const CageModel& model, const std::vector<int>& cells, const DihedralR
   std::vector<Vec3> place(2 * std::size_t(lattice.cell_count()));
   for (std::size_t n = 0; n < place.size(); ++n) place[n] = lattice.place(lattice.node(int(n)));
   lattice.moved = place;
-  for (int cell : cells)
-    for (int n : {2 * cell, 2 * cell + 1}) {
+  parallel_for(int(cells.size()), [&](int i) {
+    for (int n : {2 * cells[i], 2 * cells[i] + 1}) {
       const Vec3& p = place[n];
       const std::optional<Vec3> nearest = model.tree.closest_point_within(p, reach * lattice.spacing);
       if (!nearest || *nearest == p) continue;
@@ -89,6 +94,7 @@ void warp(const CageModel& model, const std::vector<int>& cells, const DihedralR
       else if (distance < aim)
         lattice.moved[n] = *nearest + aim / distance * (p - *nearest);
     }
+  });
   for (bool all_good = false; !all_good;) {
     std::vector<int> back;
     for (int cell : cells)
@@ -105,11 +111,12 @@ void warp(const CageModel& model, const std::vector<int>& cells, const DihedralR
 }
 
 void mark_touched(const CageModel& model, const std::vector<int>& cells, Grid& grid) {
-  for (int cell : cells)
-    for (int tet = cell * tets_a_cell; tet < (cell + 1) * tets_a_cell; ++tet) {
+  parallel_for(int(cells.size()), [&](int i) {
+    for (int tet = cells[i] * tets_a_cell; tet < (cells[i] + 1) * tets_a_cell; ++tet) {
       const auto [a, b, c, d] = grid.lattice.tet_positions(tet);
       if (model.tree.meets_tet(a, b, c, d)) grid.state[tet] = touched;
     }
+  });
 }
 
 // From each touched tet to the untouched ones beside it, and on through those that are inside.
@@ -234,7 +241,14 @@ CageModel::CageModel(const SurfaceMesh& given)
       box(box_of_triangles(given)),
       tree(given.positions, given.triangles),
       winding(given.positions, given.triangles),
-      closed(is_closed(given.triangles)) {}
+      side_before(std::size_t(given.triangles.size()), -1),
+      closed(is_closed(given.triangles)) {
+  for_each_edge(edge_uses(given.triangles), [&](std::span<const EdgeUse> uses) {
+    for (std::size_t i = 1; i < uses.size(); ++i)
+      side_before[std::size_t(3 * uses[i].triangle + uses[i].side)] =
+          3 * uses[i - 1].triangle + uses[i - 1].side;
+  });
+}
 
 Selection select_tets(const CageModel& model, double spacing, const Vec3& phase,
                       const std::optional<DihedralRange>& warp_within) {

@@ -21,6 +21,9 @@ struct CageModel {
   Box box;  // of the triangles
   SurfaceTree tree;
   WindingNumber winding;
+  // Sides are 3 triangle + which. Of each: the side before it at the same edge, triangles ascending; −1:
+  // none.
+  std::vector<int> side_before;
   bool closed;  // the winding number is whole, and the same wherever one can go without meeting the surface
 };
 

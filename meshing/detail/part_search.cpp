@@ -6,7 +6,6 @@
 #include <optional>
 #include <set>
 
-#include "core/progress.h"
 #include "core/threads.h"
 #include "meshing/convex_hull.h"
 #include "meshing/detail/cut_search.h"
@@ -24,6 +23,8 @@ constexpr double min_gain = 5e-7;
 constexpr double worth_looking_ahead = 0.1;
 // A part that stands off by more than this share of the diagonal is cut even where that gains nothing.
 constexpr double far_off = 0.02;
+// Of the time that decomposing takes, before the first and after the last cut; for the estimate only.
+constexpr double share_before_cuts = 0.25, share_after_cuts = 0.7, share_before_cutting_anew = 0.77;
 // Two parts may touch when their boxes are no farther apart.
 constexpr double touching = 0.01;
 
@@ -67,10 +68,10 @@ struct Leaf {
 };
 
 std::vector<Part> cut_up(Model& model, Part root, InsideTest& inside, const SurfaceDistance& distance,
-                         const PartLimits& limits) {
+                         const PartLimits& limits, Progress& progress) {
   std::vector<Leaf> leaves;
   const double worth = worth_looking_ahead * root.hull_volume;
-  const std::size_t wanted = limits.most == 1 ? 1 : std::size_t(std::ceil(overcut * limits.most));
+  const std::size_t wanted = std::size_t(parts_to_cut(limits.most));
   const auto seen = [&](Part part) {
     throw_if_stopped();
     Leaf leaf;
@@ -90,10 +91,12 @@ std::vector<Part> cut_up(Model& model, Part root, InsideTest& inside, const Surf
     }
     return farthest;
   };
-  Progress progress("decompose", std::int64_t(wanted));
+  progress.update(0, "the first cut", share_before_cuts);
   leaves.push_back(seen(std::move(root)));
   while (leaves.size() < wanted) {
-    progress.update(std::int64_t(leaves.size()), "parts");
+    progress.update(
+        std::int64_t(leaves.size()), "parts",
+        share_before_cuts + (share_after_cuts - share_before_cuts) * double(leaves.size()) / double(wanted));
     Leaf* best = nullptr;
     for (Leaf& leaf : leaves)
       if (leaf.cut.gain > (best ? best->cut.gain : min_gain) &&
@@ -305,10 +308,15 @@ void cut_anew(Model& model, std::vector<Part>& parts, InsideTest& inside, const 
 
 }  // namespace
 
+int parts_to_cut(int most) { return most == 1 ? 1 : int(std::ceil(overcut * most)); }
+
 std::vector<Part> find_parts(Model& model, Part whole, InsideTest& inside, const SurfaceDistance& distance,
-                             const PartLimits& limits) {
-  std::vector<Part> parts = cut_up(model, std::move(whole), inside, distance, limits);
+                             const PartLimits& limits, Progress& progress) {
+  std::vector<Part> parts = cut_up(model, std::move(whole), inside, distance, limits, progress);
+  const std::int64_t cut = std::int64_t(parts.size());
+  progress.update(cut, "uniting", share_after_cuts);
   unite_cheapest(parts, inside, distance, limits);
+  progress.update(cut, "cutting anew", share_before_cutting_anew);
   cut_anew(model, parts, inside, distance, limits);
   return parts;
 }

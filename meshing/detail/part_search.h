@@ -3,6 +3,7 @@
 
 #include <vector>
 
+#include "core/progress.h"
 #include "meshing/detail/overshoot.h"
 #include "meshing/detail/part.h"
 
@@ -15,6 +16,9 @@ struct PartLimits {
 
 // Cuts more parts than asked for, unites the cheapest again, and cuts anew what two neighbours hold together
 // where that leaves less. New points are added to the model. Throws Interrupted.
-std::vector<Part> find_parts(Model&, Part whole, InsideTest&, const SurfaceDistance&, const PartLimits&);
+std::vector<Part> find_parts(Model&, Part whole, InsideTest&, const SurfaceDistance&, const PartLimits&,
+                             Progress&);
+// Parts that are cut first; the total of the progress.
+int parts_to_cut(int most);
 
 }  // namespace limber::meshing::detail

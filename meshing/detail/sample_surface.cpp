@@ -289,6 +289,8 @@ void share_area(std::span<const SurfaceSpot> candidates, double area, const Poin
   for (int n : nearest) samples[std::size_t(n)].area_m2 += share;
 }
 
+constexpr std::size_t judged_at_once = 64;  // more would be judged in vain, since others rule them out
+
 constexpr int planes = 13;
 // The normal, and those that lean from it by 15 and by 30 degrees.
 Eigen::Matrix<double, 3, planes> normals_about(const Vec3& normal) {
@@ -333,12 +335,23 @@ void add_tips(const std::vector<SurfaceSpot>& vertices, double scale, const Spac
     if (depth[v] > missed) tips.push_back(v);
   std::stable_sort(tips.begin(), tips.end(),
                    [&](std::size_t a, std::size_t b) { return depth[a] > depth[b]; });
-  for (const std::size_t v : tips) {
-    if (int(samples.size()) >= most) return;
-    const SurfaceSpot& spot = vertices[v];
-    if (!(depth_now(v) > missed) || is_hidden(spot)) continue;
-    grid.add(spot.position);
-    samples.push_back({spot.position, spot.normal, 0});
+  // Many are judged at once, and again where a sample has come since: that can but rule them out.
+  std::vector<char> taken(tips.size());
+  for (std::size_t begin = 0, end; begin < tips.size(); begin = end) {
+    end = std::min(tips.size(), begin + judged_at_once);
+    parallel_for(int(end - begin), [&](int i) {
+      const std::size_t v = tips[begin + std::size_t(i)];
+      taken[begin + std::size_t(i)] = depth_now(v) > missed && !is_hidden(vertices[v]);
+    });
+    bool changed = false;
+    for (std::size_t i = begin; i < end; ++i) {
+      if (int(samples.size()) >= most) return;
+      if (!taken[i] || (changed && !(depth_now(tips[i]) > missed))) continue;
+      const SurfaceSpot& spot = vertices[tips[i]];
+      grid.add(spot.position);
+      samples.push_back({spot.position, spot.normal, 0});
+      changed = true;
+    }
   }
 }
 
@@ -380,18 +393,34 @@ std::vector<SurfaceSample> sample_surface(const SurfaceMesh& surface, const Seen
     if (hidden == unknown) hidden = hidden_here(spots[i]) ? yes : no;
     return hidden == yes;
   };
+  constexpr std::size_t most_looked_at = 4096;  // at once
+  std::vector<char> covered_before(most_looked_at);
+  std::vector<std::size_t> open;  // no sample covers them yet
   for (double scale = 1;; scale *= 1.1) {
     PointGrid grid(box, spacing.max_m);
     std::vector<SurfaceSample> samples;
-    for (std::size_t i = 0; i < spots.size() && int(samples.size()) <= most; ++i) {
-      const SurfaceSpot& s = spots[i];
-      const bool covered = grid.any_within(s.position, scale * wanted[i], [&](int n, double) {
-        return samples[std::size_t(n)].normal.dot(s.normal) > same_side;
+    const auto is_covered = [&](std::size_t i) {
+      return grid.any_within(spots[i].position, scale * wanted[i], [&](int n, double) {
+        return samples[std::size_t(n)].normal.dot(spots[i].normal) > same_side;
       });
-      if (covered) continue;
-      if (is_hidden(i)) continue;
-      grid.add(s.position);
-      samples.push_back({s.position, s.normal, 0});
+    };
+    // Many are looked at at once, and those that nothing covered again: another of them may.
+    std::size_t count = judged_at_once;
+    for (std::size_t begin = 0; begin < spots.size() && int(samples.size()) <= most; begin += count) {
+      count = std::min(open.size() < judged_at_once / 2 && begin > 0 ? 2 * count : count, most_looked_at);
+      const std::size_t end = std::min(spots.size(), begin + count);
+      parallel_for_many(int(end - begin),
+                        [&](int i) { covered_before[std::size_t(i)] = is_covered(begin + std::size_t(i)); });
+      open.clear();
+      for (std::size_t i = begin; i < end; ++i)
+        if (!covered_before[i - begin]) open.push_back(i);
+      parallel_for(int(open.size()), [&](int i) { is_hidden(open[std::size_t(i)]); });
+      for (const std::size_t i : open) {
+        if (int(samples.size()) > most) break;
+        if (is_covered(i) || is_hidden(i)) continue;
+        grid.add(spots[i].position);
+        samples.push_back({spots[i].position, spots[i].normal, 0});
+      }
     }
     if (int(samples.size()) > most) continue;
     if (samples.empty()) return {};

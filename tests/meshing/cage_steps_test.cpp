@@ -76,9 +76,9 @@ void expect_manifold(const TetMesh& mesh) {
   EXPECT_TRUE(faults.vertices.empty());
 }
 
-std::ptrdiff_t glued_count(const CageModel& model, const SurfaceMesh& surface, const TetMesh& mesh) {
-  const std::vector<bool> glued = detail::glued_tets(model, surface, mesh).glued;
-  return std::count(glued.begin(), glued.end(), true);
+std::ptrdiff_t glued_count(const CageModel& model, const TetMesh& mesh) {
+  const std::vector<char> glued = detail::glued_tets(model, mesh).glued;
+  return std::count(glued.begin(), glued.end(), 1);
 }
 
 // Two plates, `gap` apart along z; `joined_at_one_end` makes them a U.
@@ -125,7 +125,7 @@ TEST(CageSteps, SplittingAtGapsFillsTheSameSpaceWithGoodTetsThatShareWholeFaces)
   const TetMesh before = lattice_mesh(model, 0.5);
   TetMesh after = before;
   const TetLimits kept{{18, 162}, 0.02};
-  detail::split_at_gaps(model, plates, {0.5, kept, 100'000}, after);
+  detail::split_at_gaps(model, {0.5, kept, 100'000}, after);
   EXPECT_GT(after.tets.rows(), before.tets.rows() + 50);
   EXPECT_NEAR(volume(after), volume(before), 1e-12);
   EXPECT_EQ(points_outside(after, before, 2000), 0);
@@ -134,7 +134,7 @@ TEST(CageSteps, SplittingAtGapsFillsTheSameSpaceWithGoodTetsThatShareWholeFaces)
   expect_manifold(after);
   EXPECT_TRUE(certify(plates, after).holds());
   TetMesh capped = before;
-  detail::split_at_gaps(model, plates, {0.5, kept, int(before.tets.rows()) + 20}, capped);
+  detail::split_at_gaps(model, {0.5, kept, int(before.tets.rows()) + 20}, capped);
   EXPECT_LE(capped.tets.rows(), before.tets.rows() + 40);  // one edge may go over it
 }
 
@@ -148,7 +148,7 @@ TEST(CageSteps, OpeningGapsOnlyTakesAirAndKeepsTheBoundaryAManifold) {
     for (double spacing : {0.6, 0.5, 0.4, 0.3}) {
       SCOPED_TRACE(name + " " + std::to_string(spacing));
       TetMesh split = lattice_mesh(model, spacing);
-      detail::split_at_gaps(model, surface, {spacing, limits, 100'000}, split);
+      detail::split_at_gaps(model, {spacing, limits, 100'000}, split);
       const TetMesh opened = detail::open_gaps(model, split);
       EXPECT_LE(volume(opened), volume(split));
       EXPECT_LE(opened.tets.rows(), split.tets.rows());
@@ -167,11 +167,11 @@ TEST(CageSteps, PlatesThatTheLatticeGluesBecomeTwoPiecesAndStayOneWhereAnEndJoin
       TetMesh mesh = lattice_mesh(model, spacing);
       ASSERT_EQ(measure_quality(mesh).components, 1);
       for (int round = 0; round < 2; ++round) {
-        detail::split_at_gaps(model, plates, {spacing, {{16.5, 163.5}, 0}, 100'000}, mesh);
+        detail::split_at_gaps(model, {spacing, {{16.5, 163.5}, 0}, 100'000}, mesh);
         mesh = drawn_in(model, detail::open_gaps(model, mesh));
       }
       EXPECT_EQ(measure_quality(mesh).components, u_shaped ? 1 : 2);
-      EXPECT_LT(detail::glued_tets(model, plates, mesh).share(), 0.02);
+      EXPECT_LT(detail::glued_tets(model, mesh).share(), 0.02);
       EXPECT_TRUE(certify(plates, mesh).holds());
     }
 }
@@ -185,12 +185,12 @@ TEST(CageSteps, CoarseningTakesTetsAndNothingElse) {
     TetMesh after = before;
     const int most = int(0.85 * double(before.tets.rows()));
     const TetLimits kept{{16.5, 163.5}, 0.5 * measure_quality(before).min_height_m};
-    detail::coarsen(model, surface, kept, most, after);
+    detail::coarsen(model, kept, most, after);
     EXPECT_LE(after.tets.rows(), most);
     EXPECT_GT(after.tets.rows(), most - 24);  // one collapse takes a ring of tets
     EXPECT_LE(volume(after), volume(before) * (1 + 1e-12));
     EXPECT_EQ(points_outside(after, before, 3000), 0);
-    EXPECT_LE(glued_count(model, surface, after), glued_count(model, surface, before));
+    EXPECT_LE(glued_count(model, after), glued_count(model, before));
     expect_limits_kept(after, kept);
     expect_manifold(after);
     EXPECT_TRUE(certify(surface, after).holds());
@@ -226,7 +226,7 @@ TEST(CageSteps, CoarseningKeepsHolesAndHollows) {
     for (double spacing : {0.3, 0.2}) {
       TetMesh mesh = lattice_mesh(CageModel(surface), spacing, {});
       ASSERT_EQ(euler_characteristic(mesh), expected);
-      detail::coarsen(model, speck, {{0.5, 179.5}, 0}, 24, mesh);
+      detail::coarsen(model, {{0.5, 179.5}, 0}, 24, mesh);
       EXPECT_EQ(euler_characteristic(mesh), expected);
       expect_manifold(mesh);
     }
@@ -236,9 +236,9 @@ TEST(CageSteps, CoarseningGluesNothing) {
   const SurfaceMesh plates = two_plates(0.2, true);
   const CageModel model(plates);
   TetMesh mesh = drawn_in(model, detail::open_gaps(model, lattice_mesh(model, 0.12)));
-  const auto before = glued_count(model, plates, mesh);
-  detail::coarsen(model, plates, {{10, 170}, 0}, 24, mesh);
-  EXPECT_LE(glued_count(model, plates, mesh), before);
+  const auto before = glued_count(model, mesh);
+  detail::coarsen(model, {{10, 170}, 0}, 24, mesh);
+  EXPECT_LE(glued_count(model, mesh), before);
   expect_manifold(mesh);
 }
 
@@ -247,7 +247,7 @@ TEST(CageSteps, CoarseningChangesNothingWhenTheBudgetIsMet) {
   const CageModel model(ball);
   const TetMesh before = lattice_mesh(model, 0.6);
   TetMesh after = before;
-  detail::coarsen(model, ball, limits, int(before.tets.rows()), after);
+  detail::coarsen(model, limits, int(before.tets.rows()), after);
   EXPECT_EQ(after.tets, before.tets);
   EXPECT_EQ(after.positions, before.positions);
 }
