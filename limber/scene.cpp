@@ -313,6 +313,7 @@ Plan search(const Problem& problem, const Plan* earlier, const SolveOptions& opt
     const scenes::Scene& scene = p.scene.impl().scene;
     scenes::require_plannable(scene);
     const detail::FemSystem system(p.world, p.prepared, detail::goal_rules_of(scene));
+    system.surfaces()->require_apart(system.start(), true);
     std::optional<plan::Plan> begun;
     Json summary;
     if (earlier) {
@@ -341,6 +342,7 @@ Plan Problem::resume(const Plan& earlier, const SolveOptions& options, const Con
 Plan Problem::simulate(double duration_s, const Context& context) const {
   return working_for(context, [&] {
     const scenes::FilmSpec& film = impl_->scene.impl().scene.film;
+    detail::Surfaces(impl_->world, impl_->prepared).require_apart(impl_->system.start(), false);
     return Plan(std::make_shared<Plan::Impl>(
         *this, plan::simulate_for(impl_->system, duration_s, film.frames_per_second / film.speed)));
   });

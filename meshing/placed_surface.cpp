@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <numeric>
 
@@ -16,6 +17,7 @@ namespace {
 constexpr int leaf_size = 4;
 constexpr int max_depth = 64;    // median splits: the tree's depth is below 32
 constexpr double far_radii = 3;  // a group is a dipole to points this many radii away
+constexpr int inner_triangles = 16, most_inner_components = 64;
 
 double squared_distance(const Box& box, const Vec3& p) {
   return (box.lower - p).cwiseMax(p - box.upper).cwiseMax(0.0).squaredNorm();
@@ -184,6 +186,61 @@ double PlacedSurface::winding(const Vec3& point) const {
     }
   }
   return sum;
+}
+
+const std::vector<Vec3>& PlacedSurface::inner_places() const {
+  std::call_once(inner_places_asked_, [&] {
+    std::vector<int> triangles;
+    const std::int64_t all = shape_->triangles.rows();
+    for (int k = 0; k < inner_triangles && all > 0; ++k)
+      triangles.push_back(int(all * (2 * k + 1) / (2 * inner_triangles)));
+    const auto& components = shape_->vertex_of_component;
+    for (int k = 0; k < std::min(int(components.size()), most_inner_components); ++k)
+      triangles.push_back(shape_->triangle_from_vertex[std::size_t(components[std::size_t(k)])]);
+    std::sort(triangles.begin(), triangles.end());
+    triangles.erase(std::unique(triangles.begin(), triangles.end()), triangles.end());
+    for (const int t : triangles) {
+      const auto [a, b, c] = corners(t);
+      const Vec3 middle = (a + b + c) / 3, normal = (b - a).cross(c - a).normalized();
+      if (const double way = way_out(middle, -normal); normal.norm() > 0 && std::isfinite(way))
+        inner_places_.push_back(middle - 0.5 * way * normal);
+    }
+  });
+  return inner_places_;
+}
+
+double PlacedSurface::way_out(const Vec3& from, const Vec3& direction) const {
+  const Vec3 inverse = direction.cwiseInverse();
+  double nearest = std::numeric_limits<double>::infinity();
+  const auto rejects = [&](const Box& box) {
+    const Eigen::Array3d a = (box.lower - from).cwiseProduct(inverse),
+                         b = (box.upper - from).cwiseProduct(inverse);
+    return !(a.min(b).maxCoeff() <= std::min(a.max(b).minCoeff(), nearest)) || a.max(b).minCoeff() < 0;
+  };
+  int stack[max_depth];
+  int count = 0;
+  if (!boxes_.empty()) stack[count++] = 0;
+  while (count > 0) {
+    const int n = stack[--count];
+    if (rejects(boxes_[std::size_t(n)])) continue;
+    const auto& place = shape_->tree.nodes[std::size_t(n)];
+    if (!place.leaf()) {
+      stack[count++] = place.right;
+      stack[count++] = place.left;
+      continue;
+    }
+    for (int t = place.begin; t < place.end; ++t) {
+      // Moeller and Trumbore 1997, of triangles that face along the direction.
+      const auto [a, b, c] = corners(t);
+      const Vec3 ab = b - a, ac = c - a, across = direction.cross(ac), from_a = from - a,
+                 along = from_a.cross(ab);
+      const double det = ab.dot(across);
+      if (!(det < 0)) continue;
+      const double u = from_a.dot(across) / det, v = direction.dot(along) / det, way = ac.dot(along) / det;
+      if (u >= 0 && v >= 0 && u + v <= 1 && way > 0) nearest = std::min(nearest, way);
+    }
+  }
+  return nearest;
 }
 
 Vec3 PlacedSurface::closest_point(const Vec3& point, double above) const {

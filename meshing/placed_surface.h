@@ -69,6 +69,9 @@ class PlacedSurface {
   double distance(const Vec3& point, double above = 0) const {
     return (closest_point(point, above) - point).norm();
   }
+  // Places within: of triangles all over it and one of each component, halfway from its middle to what is
+  // straight behind it. What lies behind nothing has none.
+  const std::vector<Vec3>& inner_places() const;
 
  private:
   // Of a node's area vector ∫ n dA as a dipole: where it stands and how far its triangles reach from there.
@@ -77,6 +80,9 @@ class PlacedSurface {
     double area = 0, squared_radius = 0;
   };
   void make_dipoles() const;
+  // How far it is from the point to the first triangle along that direction, of length 1, that it leaves the
+  // inside by; infinite where it meets none.
+  double way_out(const Vec3& from, const Vec3& direction) const;
 
   const SurfaceShape* shape_;
   Points positions_;
@@ -84,6 +90,8 @@ class PlacedSurface {
   Box box_;
   mutable std::once_flag dipoles_asked_;
   mutable std::vector<Dipole> dipoles_;  // made when the first winding number is asked for
+  mutable std::once_flag inner_places_asked_;
+  mutable std::vector<Vec3> inner_places_;
 };
 
 }  // namespace limber::meshing

@@ -207,6 +207,15 @@ void include_points_of(const PlacedSurface& a, const PlacedSurface& b, const std
       [&](const SurfacePoint& p, double above) { return b.distance(place_of(a, p), above); }, deepest);
 }
 
+// As far, at least, must one of them go to leave the other.
+void include_ball_in_both(const PlacedSurface& a, const PlacedSurface& b, SurfaceOverlap& deepest) {
+  for (const Vec3& p : a.inner_places()) {
+    if (!meet(b.box(), {p, p}) || !(b.winding(p) > 0.5 && a.winding(p) > 0.5)) continue;
+    const double diameter = 2 * std::min(a.distance(p), b.distance(p));
+    if (diameter > deepest.depth_m) deepest = {diameter, p};
+  }
+}
+
 // What is less is of rounding.
 double min_depth(const PlacedSurface& surface) { return 1e-9 * surface.shape().size_m(); }
 
@@ -242,6 +251,8 @@ SurfaceOverlap overlap(const PlacedSurface& a, const PlacedSurface& b) {
   SurfaceOverlap deepest{least, Vec3::Zero()};
   if (!of_a.empty() || !seeds_a.empty()) include_points_of(a, b, of_a, seeds_a, deepest);
   if (!of_b.empty() || !seeds_b.empty()) include_points_of(b, a, of_b, seeds_b, deepest);
+  include_ball_in_both(a, b, deepest);
+  include_ball_in_both(b, a, deepest);
   return deepest.depth_m > least ? deepest : SurfaceOverlap{};
 }
 

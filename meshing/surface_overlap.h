@@ -12,7 +12,9 @@ struct SurfaceOverlap {
 };
 
 // The largest distance to the other surface over the points of either's edges that are inside the other
-// (winding number above a half), to a hundredth of it. Does not depend on the order of the two.
+// (winding number above a half), to a hundredth of it. Or, where that is more, the diameter of the largest
+// ball round one of either's inner places that lies in both: bodies that fill the same place have surfaces
+// that are near one another all over. Does not depend on the order of the two.
 SurfaceOverlap overlap(const PlacedSurface&, const PlacedSurface&);
 
 struct SurfaceGap {

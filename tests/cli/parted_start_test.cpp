@@ -123,5 +123,22 @@ TEST_F(PartedStart_slow, IsRefusedWhereTheSceneWantsThatOrItCannotBe) {
   EXPECT_NE(deep.err.find("cannot be parted: that is more than a quarter of"), std::string::npos) << deep.err;
 }
 
+// Their surfaces are near one another all over, so that nothing is deep in anything.
+TEST_F(PartedStart_slow, IsRefusedWhereTwoBodiesFillTheSamePlace) {
+  for (const char* at : {"[1.5, 1, 1]", "[1.501, 1, 1]"}) {
+    const std::string into_it = fmt::format("bodies.ball.pose.position_m={}", at);
+    const Result checked = limber_program({"scene", "check", scene(overlapping), "--set", into_it});
+    EXPECT_EQ(checked.code, exit_bad_input);
+    EXPECT_NE(checked.out.find("too deep to be parted; move them apart"), std::string::npos) << checked.out;
+    for (const char* command : {"plan", "simulate"}) {
+      const Result deep = limber_program({command, scene(overlapping), "-o", out(command), "--set", into_it});
+      EXPECT_EQ(deep.code, exit_bad_input);
+      EXPECT_NE(deep.err.find("bodies robot and ball overlap at the start"), std::string::npos) << deep.err;
+      EXPECT_NE(deep.err.find("more than a quarter of"), std::string::npos) << deep.err;
+      EXPECT_FALSE(fs::exists(out(command) + "/plan.npz"));
+    }
+  }
+}
+
 }  // namespace
 }  // namespace limber::detail

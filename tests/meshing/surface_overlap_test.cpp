@@ -170,6 +170,40 @@ TEST(SurfaceOverlap, OfABallInsideAnotherReachesToItsDeepestPoint) {
   EXPECT_EQ(gap(small, ball, 0.01).distance_m, 0);
 }
 
+// All points of either's surface are near the other's. The largest ball in both is the smaller body's own,
+// and no ball that lies in both is larger.
+TEST(SurfaceOverlap, OfBodiesThatFillTheSamePlaceIsNotHowFarTheirSurfacesAreApart) {
+  const Eigen::Isometry3d motion = some_motion();
+  const auto placed = [&](const SurfaceMesh& mesh, double scale, const Vec3& by) {
+    return mapped(mesh, [&](const Vec3& p) { return Vec3(motion * Vec3(scale * p + by)); });
+  };
+  const SurfaceMesh ball = made_sphere(40), coarse = made_sphere(17), bar = made_bar({1, 1, 1}, {3, 3, 3});
+  struct Case {
+    SurfaceMesh one, other;
+    double most, least;
+  };
+  const Case cases[] = {
+      {placed(ball, 1, {0, 0, 0}), placed(ball, 1, {0, 0, 0}), 2, 1.9},
+      {placed(ball, 1, {0, 0, 0}), placed(ball, 1, {0.002, 0, 0}), 2, 1.9},
+      {placed(ball, 1, {0, 0, 0}), placed(coarse, 1, {0, 0.003, 0}), 2, 1.9},
+      {placed(ball, 1, {0, 0, 0}), placed(ball, 0.99, {0, 0, 0}), 1.98, 1.9},
+      {placed(bar, 1, {0, 0, 0}), placed(bar, 1, {0, 0, 0}), 1, 0.6},  // places are not in the very middle
+      {placed(bar, 1, {0, 0, 0}), placed(bar, 1, {0.001, 0.001, 0}), 1, 0.6},
+  };
+  for (const Case& c : cases) {
+    SCOPED_TRACE(&c - cases);
+    const double depth = overlap(c.one, c.other).depth_m;
+    EXPECT_GE(depth, c.least);
+    EXPECT_LE(depth, c.most + 1e-9);
+    EXPECT_EQ(overlap(c.other, c.one).depth_m, depth);
+  }
+  // Two of many pieces, of which one pair fills the same place.
+  SurfaceMesh many = placed(ball, 0.1, {0, 0, 0});
+  for (int k = 1; k < 20; ++k) many = both(many, placed(ball, 0.1, {0.3 * k, 0, 0}));
+  EXPECT_NEAR(overlap(many, placed(ball, 0.1, {0.3 * 13, 0.0001, 0})).depth_m, 0.2, 0.01);
+  EXPECT_EQ(overlap(many, placed(ball, 0.04, {0.3 * 13.5, 0, 0})).depth_m, 0);
+}
+
 // A bar's ridge, along x, reaches d into the ridge, along y, of another one that is turned by `turn` about y:
 // the stretch of it that is inside is longer on one side, and its deepest point, on the other ridge's
 // bisector, is d / (√2 cos turn) from both faces. No vertex is inside anything, and the stretch's middle is

@@ -31,7 +31,9 @@ struct BenchRuns::Setup {
         scene(read_scene(options)),
         bodies(prepare_bodies(scene, bench.data, bench.out / scene.name, bench.store)),
         world(build_world_in(bench.out / scene.name, bench.store, scene, bodies)),
-        system(world, bodies, goal_rules_of(scene)) {}
+        system(world, bodies, goal_rules_of(scene)) {
+    system.surfaces()->require_apart(system.start(), true);
+  }
   Setup(const Setup&) = delete;
 
   static PlanOptions options_of(const BenchOptions& bench, const std::string& scene,

@@ -356,7 +356,9 @@ class Worker {
     Setup(const scenes::Scene& scene, const PlanOptions& options)
         : bodies(prepare_bodies(scene, options.scene.data, options.out, options.scene.store)),
           world(build_world_in(options.out, options.scene.store, scene, bodies)),
-          system(world, bodies, goal_rules_of(scene)) {}
+          system(world, bodies, goal_rules_of(scene)) {
+      system.surfaces()->require_apart(system.start(), true);
+    }
   };
   const Setup& setup() {
     if (!setup_) setup_ = std::make_unique<Setup>(scene_, plan_options());

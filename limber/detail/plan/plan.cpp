@@ -286,6 +286,7 @@ KeptPlan plan(const PlanOptions& options, const scenes::Scene& scene) {
   const fem::World world = build_world_in(options.out, options.scene.store, scene, bodies);
   const Beginning beginning = beginning_of(other, options.out, scene, world);
   const FemSystem system(world, bodies, goal_rules_of(scene), beginning.start);
+  system.surfaces()->require_apart(system.start(), true);
   const fs::path file = options.out / "plan.npz";
   if (options.portfolio > 1 && (options.resume || options.stats))
     throw InputError(fmt::format("--portfolio is of several searches, {} of one; leave one of the two out",

@@ -139,6 +139,8 @@ KeptPlan simulate(const SimulateOptions& options) {
   const fem::World world = build_world_in(options.out, options.scene.store, scene, bodies);
   const Beginning beginning = beginning_of(other, options.out, scene, world);
   const FemSystem system(world, {}, beginning.start);
+  const Surfaces surfaces(world, bodies);
+  surfaces.require_apart(system.start(), false);
   std::optional<FollowedPlan> followed;
   if (!options.follow.empty()) followed.emplace(options.follow, scene, world);
   const double duration_s = options.duration_s.value_or(followed ? followed->duration_s() : 5);
@@ -165,7 +167,7 @@ KeptPlan simulate(const SimulateOptions& options) {
   MotionFigures figures;
   try {
     const NothingToKeep nothing_to_keep;
-    if (!is_unmeasured(plan)) figures = measure_motion(world, bodies, plan.trajectory);
+    if (!is_unmeasured(plan)) figures = measure_motion(world, bodies, plan.trajectory, &surfaces);
   } catch (const Interrupted&) {
     plan.simulation->ending = plan::Simulation::stopped;
   }

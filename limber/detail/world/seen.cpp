@@ -3,9 +3,11 @@
 #include <algorithm>
 #include <map>
 
+#include "core/error.h"
 #include "core/progress.h"
 #include "core/threads.h"
 #include "fem/observe.h"
+#include "fem/parting.h"
 #include "limber/detail/world/surface_at.h"
 #include "limber/detail/world/wall.h"
 
@@ -109,6 +111,25 @@ SeenFrame Surfaces::at(const State& state) const {
   return known_[hash] = frame;
 }
 
+void Surfaces::require_apart(const State& start, bool as_promised) const {
+  const SeenFrame seen = at(start);
+  if (seen.overlap_body < 0) return;
+  const auto size_m = [&](int body) { return shapes_[std::size_t(body)].size_m(); };
+  const auto name = [&](int body) { return world_.bodies[std::size_t(body)].name; };
+  const int one = seen.overlap_body, other = seen.overlap_other,
+            smaller = size_m(one) < size_m(other) ? one : other;
+  const std::string what = fmt::format("bodies {} and {} overlap at the start, {:.3g} m deep", name(one),
+                                       name(other), seen.overlap_m);
+  if (seen.overlap_m > fem::deepest_parted_share * size_m(smaller))
+    throw InputError(fmt::format("{}, which is more than a quarter of {}'s size, {:.3g} m; move them apart",
+                                 what, name(smaller), size_m(smaller)));
+  const double promised = SeenLimits().overlap, robot_m = size_m(world_.robot);
+  if (as_promised && world_.touches_on_surfaces() && seen.overlap_m > promised * robot_m)
+    throw InputError(fmt::format(
+        "{}, {:.2f} % of the robot's size, where {:g} % is promised of every frame; move them apart", what,
+        100 * seen.overlap_m / robot_m, 100 * promised));
+}
+
 SeenFrame Surfaces::measure(const State& state) const {
   std::deque<meshing::PlacedSurface> moved;
   std::vector<const meshing::PlacedSurface*> now;
@@ -153,9 +174,14 @@ double largest_cage_penetration_m(const fem::World& world) {
 
 std::vector<SeenFrame> measure_seen(const Surfaces& surfaces, const std::vector<State>& frames) {
   std::vector<SeenFrame> seen(frames.size());
+  Progress progress("what is seen", std::ssize(frames));
+  std::mutex mutex;
+  std::int64_t done = 0;
   parallel_for(int(frames.size()), [&](int f) {
     if (nothing_to_keep()) throw_if_stopped();
     seen[std::size_t(f)] = surfaces.at(frames[std::size_t(f)]);
+    const std::lock_guard lock(mutex);
+    progress.update(++done, "frames");
   });
   keep_what_presses(seen);
   return seen;

@@ -58,6 +58,9 @@ class Surfaces {
 
   // With the gaps of all that touch, however lightly. Kept, so that to ask again costs nothing.
   SeenFrame at(const State&) const;
+  // Throws InputError where two bodies of this state, which is a start, are in one another: deeper than could
+  // be parted, or, for whoever asks for that, than is promised of any frame.
+  void require_apart(const State& start, bool as_promised) const;
 
  private:
   SeenFrame measure(const State&) const;
