@@ -14,13 +14,26 @@ std::string size_text(const Json& surface) {  // "0.12 × 0.09 × 0.1"
   return text;
 }
 
+// Files do not tell their unit, and those of scanners are mostly in millimetres.
+std::string doubt_of_unit(const Json& report) {
+  constexpr double large_m = 20;
+  const Json &surface = report.at("surface"), model = report.at("input").value("model", Json());
+  if (!model.is_object() || model.value("scale", 0.0) != 1) return "";
+  double longest_m = 0;
+  for (std::size_t c = 0; c < 3; ++c)
+    longest_m =
+        std::max(longest_m, surface.at("upper_m")[c].get<double>() - surface.at("lower_m")[c].get<double>());
+  return longest_m > large_m ? " (if the file is in millimetres: --scale 0.001)" : "";
+}
+
 }  // namespace
 
 std::string text_of_report(const Json& report) {
   const Json& surface = report.at("surface");
-  std::string text = fmt::format("{}\n  surface      {} vertices, {} triangles; {} m\n",
-                                 report.at("model").get<std::string>(), surface.at("vertices").get<int>(),
-                                 surface.at("triangles").get<int>(), size_text(surface));
+  std::string text =
+      fmt::format("{}\n  surface      {} vertices, {} triangles; {} m{}\n",
+                  report.at("model").get<std::string>(), surface.at("vertices").get<int>(),
+                  surface.at("triangles").get<int>(), size_text(surface), doubt_of_unit(report));
   if (report.contains("shells")) {
     const Json& shells = report.at("shells");
     text += fmt::format(

@@ -74,6 +74,17 @@ std::string what_is_wrong(const CLI::App& program, int argc, const char* const* 
   return fmt::format("{} needs a command, one of {}; see {} --help", name, fmt::join(commands, ", "), name);
 }
 
+// What is named must have a name: an empty one, as of a variable of a script that is not set, would be taken
+// for this folder, or for nothing.
+void refuse_empty_names(CLI::App& command) {
+  for (CLI::Option* option : command.get_options())
+    if (option->get_positional() || option->check_lname("out"))
+      option->check([](const std::string& word) {
+        return word.empty() ? std::string("is empty; give a name (a variable that is not set?)") : "";
+      });
+  for (CLI::App* one : command.get_subcommands({})) refuse_empty_names(*one);
+}
+
 // To people on stderr, to who listens to --progress as the last event, and with --json as the document.
 int report_failure(int code, const std::string& what, bool json) {
   log::warn("limber: {}", what);
@@ -101,6 +112,7 @@ int run_command_line(int argc, const char* const* argv) {
       "with all finished work kept.");
   DescribedCommands commands(program);
   commands.add_all();
+  refuse_empty_names(program);
   const GlobalOptions& global = commands.global;
 
   try {

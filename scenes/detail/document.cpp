@@ -117,6 +117,9 @@ Node parse_document(const std::string& text, const std::string& source) {
   try {
     return converted(toml::parse(std::string_view(text), std::string_view(source)), source);
   } catch (const toml::parse_error& error) {
+    if (error.description().find("utf-8") != std::string_view::npos)
+      throw InputError(fmt::format("{}: this is not UTF-8, in which TOML is written; save the file as that",
+                                   where_of(error.source().begin, source).text()));
     throw InputError(fmt::format("{}: this is not TOML: {}; see docs/scene.md for how a scene is written",
                                  where_of(error.source().begin, source).text(),
                                  sentence(error.description())));

@@ -444,6 +444,12 @@ TEST_F(Program, UsageErrorsAreBadInput) {
   EXPECT_EQ(limber_program({"render", out("nothing")}).code, exit_bad_input);
   EXPECT_EQ(limber_program({"verify", folder.path().string()}).code, exit_bad_input);
   EXPECT_EQ(limber_program({"info", out("nothing")}).code, exit_bad_input);
+  for (const auto& words :
+       {std::vector<std::string>{"verify", ""}, {"robust", ""}, {"plan", ""}, {"plan", scene(), "-o", ""}}) {
+    const Result result = limber_program(words);
+    EXPECT_EQ(result.code, exit_bad_input);
+    EXPECT_NE(result.err.find("is empty; give a name"), std::string::npos) << result.err;
+  }
   // A picture that cannot be written is refused before it is painted.
   for (const char* picture : {"--still", "--storyboard"})
     for (const auto& [file, told] : {std::pair(out("nowhere/x.png"), "make it first"),

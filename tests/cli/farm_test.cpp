@@ -253,7 +253,7 @@ TEST_F(Farm_slow, APortfolioHasTheSamePlanOnAnyNumberOfWorkers) {
 
 // Stopped in the middle a search is kept, and goes on to the tree of one that nobody stopped.
 TEST_F(Farm_slow, ASearchThatIsStoppedGoesOn) {
-  const std::vector<std::string> hard{"--set", "goal.radius_m=0.001", "--iterations", "6000"};
+  const std::vector<std::string> hard{"--set", "goal.radius_m=0.001", "--iterations", "30000"};
   std::vector<std::string> words{"plan", quick_scene(), "-o", out("one")};
   words.insert(words.end(), hard.begin(), hard.end());
   ASSERT_EQ(run(words).code, exit_no_plan);

@@ -126,6 +126,19 @@ TEST_F(SceneCheck, AGoalWithinARigidBodyIsTold) {
   EXPECT_FALSE(is_told("deformable", "center_of_mass_m = [2, 1, 0.45]\nradius_m = 0.19"));
 }
 
+// The robot is 0.6 m wide, the walls are at y = 0 and 2 and z = 2.
+TEST_F(SceneCheck, AGoalThatOnlyAFlatRobotReachesIsTold) {
+  const auto is_told = [&](const std::string& goal, const std::string& wall) {
+    const std::string text = with(small_scene, "center_of_mass_m = [3.2, 1, 1]\nradius_m = 0.3", goal);
+    const Json json = limber_program({"scene", "check", scene(text), "--json"}).json();
+    return json.at("warnings").dump().find("from the wall " + wall) != std::string::npos;
+  };
+  EXPECT_TRUE(is_told("center_of_mass_m = [3.2, 1, 1.9]\nradius_m = 0.1", "z = 2"));
+  EXPECT_TRUE(is_told("center_of_mass_m = [3.2, 0.05, 1]\nradius_m = 0.1", "y = 0"));
+  EXPECT_FALSE(is_told("center_of_mass_m = [3.2, 1, 1.9]\nradius_m = 0.25", "z"));
+  EXPECT_FALSE(is_told("center_of_mass_m = [3.2, 1, 1.69]\nradius_m = 0.01", "z"));
+}
+
 TEST_F(SceneCheck, WhatElseAGoalAsksForIsTold) {
   const auto goals = [&](const std::string& more) {
     const std::string text = with(small_scene, "radius_m = 0.3", "radius_m = 0.3\n" + more);

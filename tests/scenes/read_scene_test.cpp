@@ -678,6 +678,11 @@ TEST(ReadScene, DeepNestingIsRefused) {
   EXPECT_THAT(complaint("a = " + std::string(100000, '[')), HasSubstr("not TOML"));
 }
 
+TEST(ReadScene, FilesInOtherEncodingsAreToldFromWrongToml) {
+  EXPECT_THAT(complaint("name = \"\xe4rger\""), HasSubstr("1:8: this is not UTF-8"));
+  EXPECT_THAT(complaint("\xff\xfen\0a\0"), HasSubstr("1:1: this is not UTF-8"));
+}
+
 // ---- the reader's table of keys and docs/scene.md ----
 
 // A legal value that differs from what `good` holds, so that reading it must change the scene.

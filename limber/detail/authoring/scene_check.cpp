@@ -151,6 +151,29 @@ class Check {
                         which, name(b)));
   }
 
+  // A goal that is all nearer to a wall of the bounds than the middle of the robot is to its own surface.
+  void look_at_walled(const std::string& which, const scenes::Goal& goal,
+                      const meshing::PlacedSurface& robot) {
+    if (!scene_.walls || goal.moves_with >= 0) return;
+    const Vec3 own_middle = middle_of(models_[std::size_t(scene_.robot)]->model.surface);
+    if (!(robot.winding(own_middle) > 0.5)) return;
+    const double inner_m = robot.distance(own_middle);
+    const Vec3 reach = Vec3::Constant(goal.radius_m),
+               lower = goal.box_m ? goal.box_m->lower : Vec3(goal.center_of_mass_m - reach),
+               upper = goal.box_m ? goal.box_m->upper : Vec3(goal.center_of_mass_m + reach);
+    for (int c = 0; c < 3; ++c)
+      for (const double wall : {scene_.bounds_m.lower[c], scene_.bounds_m.upper[c]}) {
+        const double farthest_m = wall == scene_.bounds_m.lower[c] ? upper[c] - wall : wall - lower[c];
+        if (farthest_m < 0.9 * inner_m)
+          found_.warnings.push_back(
+              fmt::format("{} is nowhere more than {:.3g} m from the wall {} = {:g}, and the middle of the "
+                          "robot is {:.3g} m "
+                          "from its own surface: it comes there only if it is squeezed flat; move the goal, "
+                          "or make it larger",
+                          which, std::max(farthest_m, 0.0), "xyz"[c], wall, inner_m));
+      }
+  }
+
   // Surfaces in one another, or so near that they push.
   void look_at_pairs() {
     const bool cages = all_touched_at_cages(scene_);
@@ -163,9 +186,13 @@ class Check {
       const SurfaceMesh& surface = loaded->model.surface;
       placed.emplace_back(shapes.emplace_back(surface.positions, surface.triangles), surface.positions);
     }
+    const auto look_at_goal = [&](const std::string& which, const scenes::Goal& goal) {
+      look_at_blocked(which, goal, placed);
+      look_at_walled(which, goal, placed[std::size_t(scene_.robot)]);
+    };
     for (std::size_t v = 0; v < scene_.via.size(); ++v)
-      look_at_blocked(fmt::format("via {}", v + 1), scene_.via[v].goal, placed);
-    if (scene_.lacks.empty()) look_at_blocked("the goal", scene_.goal, placed);
+      look_at_goal(fmt::format("via {}", v + 1), scene_.via[v].goal);
+    if (scene_.lacks.empty()) look_at_goal("the goal", scene_.goal);
     const auto size_of = [&](std::size_t b) { return box_of(int(b)).size().maxCoeff(); };
     struct Pair {
       std::size_t one, other;

@@ -46,11 +46,14 @@ std::vector<std::pair<std::string, int>> refusals_at(const fem::World& world, co
   push.manipulation = Manipulation::body;
   push.steps =
       std::max(1, int(std::lround((settings.min_duration_s + settings.max_duration_s) / 2 / system.dt_s())));
-  constexpr int piece_steps = 64;
+  constexpr int piece_steps = 64, pushes = 14;
+  Progress progress("what is refused", pushes);
+  int asked = 0;
   fem::Batch batch(world, 1);
   for (int k = 0; k < 27; ++k) {
     const Vec3 way(k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1);
     if (const double axes = way.cwiseAbs().sum(); axes != 1 && axes != 3) continue;
+    progress.update(asked++, "pushes");
     push.force_n = (settings.max_force_n * way.normalized()).cast<float>();
     fem::Rollout rollout{&state, push, state, {}};
     State before;
@@ -78,6 +81,8 @@ std::vector<std::pair<std::string, int>> refusals_at(const fem::World& world, co
 // A node in the goal that solves nothing: what becomes of the robot there once it is drawn to the goal, to
 // come to rest. Throws Interrupted.
 void tell_rest(const FemSystem& system, const plan::Settings& settings, const State& state, Diagnosis& d) {
+  Progress progress("where it comes to rest", 0);
+  progress.update(0);
   plan::ControlRollout settle;
   settle.from = state;
   plan::run(system, settings, {&settle, 1}, {.stoppable = true});
