@@ -1,10 +1,14 @@
 // Choosing a node: by distance or time to a random point (as LaValle and Kuffner's RRT does, IJRR 2001), or,
 // for draws that are guided, by the rank of a promise. The promise of a node, seconds, less is better, is
 //
-//     time to the goal over the grid + time_weight × time it took + child_price × children,
+//     time to the goal over the grid + time_weight × time it took
+//         + child_price × (children + density_price × nodes that were in its cell before it),
 //
 // the first by bang-bang thrust along the cheapest way and a stop of what moves across it. With children it
-// gets worse, so no node is tried for ever.
+// gets worse, so no node is tried for ever; with density no place is. Where what is free shuts the way, all
+// that comes after it stands before it, and each of those nodes has no child yet. Density as in expansive
+// space trees (Hsu, Latombe and Motwani, ICRA 1997), which draw a node by the inverse of what is near it;
+// counted when a node is added, so that no rank changes by what comes later.
 //
 // What always holds: a choice is a function of the draw and of the nodes told of so far, in their order. Ties
 // go to the first node. Prices are learnt in a copy of the grid that is this object's own, from controls that
@@ -24,6 +28,7 @@ namespace limber::plan {
 namespace {
 
 constexpr double child_price = 0.25;                     // of the time it takes to cross the robot's radius
+constexpr double cell_radii = 0.5;                       // side of a cell for density, of the robot's radius
 constexpr double nearest_ahead = 1, farthest_ahead = 5;  // of the robot's radius
 constexpr double aside_share = 0.25;                     // of the way ahead
 constexpr double stuck_share = 0.3;                      // of the way it would have gone in the open
@@ -79,6 +84,11 @@ void NodeSelector::add(const Tree& tree, int of_tree) {
   children_.push_back(0), refused_.push_back(false);
   plant(node);
   if (!guidance_) return;
+  std::array<int, 3> cell;
+  for (int c = 0; c < 3; ++c)
+    cell[std::size_t(c)] =
+        int(std::floor(double(center[c]) / (cell_radii * guidance_->workspace().robot_radius_m)));
+  crowd_.push_back(nodes_in_[cell]++);
   const int parent = tree.parents[std::size_t(of_tree)] - root_;  // < 0: of the root
   if (parent >= 0) {
     unrank(parent);
@@ -140,7 +150,8 @@ double NodeSelector::heuristic(int node) const {
     to_go = seconds_to_go(*guidance_, at.center - at.goal_shift, at.velocity - at.goal_velocity, at.windings);
   return to_go + settings_.search_options.time_weight * times_s_[std::size_t(node)] +
          child_price * std::sqrt(2 * guidance_->workspace().robot_radius_m / strongest().acceleration) *
-             children_[std::size_t(node)];
+             (children_[std::size_t(node)] +
+              settings_.search_options.density_price * crowd_[std::size_t(node)]);
 }
 
 // Where a strong push from parent to node got less far than it should have, going on that way gets dearer.

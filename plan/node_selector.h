@@ -2,6 +2,8 @@
 // it was told of, in their order.
 #pragma once
 
+#include <array>
+#include <map>
 #include <optional>
 
 #include "plan/expansion.h"
@@ -59,6 +61,8 @@ class NodeSelector {
   std::vector<NodeMotion> motions_;
   std::vector<double> times_s_;                  // of the nodes
   std::vector<int> children_;                    // of a node
+  std::map<std::array<int, 3>, int> nodes_in_;   // of cells of half the robot's radius
+  std::vector<int> crowd_;                       // of a node: those in its cell before it
   std::vector<bool> refused_;                    // is a node
   std::vector<std::pair<double, int>> ranking_;  // (promise, node) of those that are not, ascending
   // Nodes by their places, in that which is of the metric; the others are empty.

@@ -72,6 +72,7 @@ template <class AnySettings, class Visitor>
 void describe_rare(AnySettings& s, const Visitor& visit) {
   visit("/max_pressure_pa", s.max_pressure_pa, at_least_zero);
   visit("/settle/pressure_pa", s.settle.pressure_pa, Range{0, s.max_pressure_pa});
+  visit("/laws/density_price", s.search_options.density_price, at_least_zero);
 }
 
 // What a message calls it: /settle/hold is settle.hold.

@@ -55,8 +55,11 @@ struct SearchOptions {
   double guidance = 0;        // share of expansions led by the cost-to-go of a grid; needs a lag, in [0, 1]
   double soft_price = 0;      // a metre in a passage so tight that nothing is left costs so many more
   bool learn_prices = false;  // where pushing does not help, going on gets dearer
-  bool steer = false;         // pushes reckon with the robot's velocity, and last as long as the way takes
-  double look_s = 0;          // rollouts are looked at so often, 0: never; needed by the following
+  // Of guided draws: each node that was there before it, half the robot's radius about, counts against a node
+  // as so many children of its own do.
+  double density_price = 0;
+  bool steer = false;  // pushes reckon with the robot's velocity, and last as long as the way takes
+  double look_s = 0;   // rollouts are looked at so often, 0: never; needed by the following
   bool stop_in_goal = false;
   bool hold = false;          // towards the goal the robot is held, not interpolated: it may arrive turned
   bool end_hopeless = false;  // a rollout that gets nowhere, or leads away, ends there

@@ -86,10 +86,12 @@ fs::path find_scene(const std::string& name_or_path) {
     names.push_back(scene.name);
   }
   const std::string meant = nearest(name_or_path, names);
-  const std::string wrong = name_or_path.empty() ? "no scene is named"
-                            : is_folder(name_or_path)
-                                ? name_or_path + ": a folder without a scene.toml; name the scene's file"
-                                : name_or_path + ": no such scene file, and no scene of that name";
+  std::error_code unseen;  // what cannot be asked about is not there
+  const std::string wrong =
+      name_or_path.empty()      ? "no scene is named"
+      : is_folder(name_or_path) ? name_or_path + ": a folder without a scene.toml; name the scene's file"
+      : fs::exists(name_or_path, unseen) ? name_or_path + ": no regular file, as a scene is"
+                                         : name_or_path + ": no such scene file, and no scene of that name";
   throw InputError(fmt::format("{}; {}known scenes: {}", wrong,
                                meant.empty() ? "" : fmt::format("did you mean \"{}\"? ", meant),
                                names.empty() ? "none (set LIMBER_SCENES to their folder)"

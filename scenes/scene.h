@@ -244,7 +244,7 @@ struct PlannerSpec {
   // What the preset `fast` adds; plan/settings.h and docs/planning.md say what they do.
   int lag = 0;
   std::string metric;  // "distance" or "time_to_go"
-  double time_weight = 0, guidance = 0, soft_price = 0, look_s = 0;
+  double time_weight = 0, guidance = 0, soft_price = 0, density_price = 0, look_s = 0;
   bool learn_prices = false, steer = false, stop_in_goal = false, hold = false, end_hopeless = false;
 
   int shortcut_rounds = 0;  // of sixteen changes to the path that was found

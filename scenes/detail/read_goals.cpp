@@ -222,6 +222,7 @@ PlannerSpec read_planner(const Node& table) {
   planner.time_weight = number(table, "time_weight");
   planner.guidance = number(table, "guidance");
   planner.soft_price = number(table, "soft_price");
+  planner.density_price = number(table, "density_price");
   planner.look_s = number(table, "look_s");
   planner.learn_prices = flag(table, "learn_prices");
   planner.steer = flag(table, "steer");

@@ -790,6 +790,11 @@ constexpr Key all_keys[] = {
      "soft "
      "things",
      "", ""},
+    {"planner.density_price", Type::number, at_least_zero, 0, "0.0",
+     "with guidance: each node that was in a node's place before it counts against it as so many tries of "
+     "its "
+     "own; above 0 a search goes back from where something free shuts the way",
+     "", ""},
     {"planner.learn_prices",
      Type::boolean,
      {},

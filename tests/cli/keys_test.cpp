@@ -371,6 +371,7 @@ const std::vector<Row> rows{
     {"planner.time_weight", "planner.time_weight=0.5", search},
     {"planner.guidance", "planner.guidance=0.5", search},
     {"planner.soft_price", "planner.soft_price=50", search},
+    {"planner.density_price", "planner.density_price=1", search},
     {"planner.learn_prices", "planner.learn_prices=false", search},
     {"planner.steer", "planner.steer=false", search},
     {"planner.look_s", "planner.look_s=0.2", search},

@@ -322,6 +322,7 @@ List of_the_plan() {
       {"laws.time_weight", [](Settings& s) { s.search_options.time_weight = 0.5; }},
       {"laws.guidance", [](Settings& s) { s.search_options.guidance = 0.5; }},
       {"laws.soft_price", [](Settings& s) { s.search_options.soft_price = 1; }},
+      {"laws.density_price", [](Settings& s) { s.search_options.density_price = 1; }},
       {"laws.learn_prices", [](Settings& s) { s.search_options.learn_prices = false; }},
       {"laws.steer", [](Settings& s) { s.search_options.steer = false; }},
       {"laws.look_s", [](Settings& s) { s.search_options.look_s = 0.2; }},

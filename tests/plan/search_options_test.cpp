@@ -2,6 +2,8 @@
 // function of system and settings alone.
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "core/threads.h"
 #include "plan/node_selector.h"
 #include "plan/search.h"
@@ -23,6 +25,7 @@ Settings fast_settings() {
                       .guidance = 0.7,
                       .soft_price = 10,
                       .learn_prices = true,
+                      .density_price = 0.3,
                       .steer = true,
                       .look_s = 0.1,
                       .stop_in_goal = true,
@@ -87,6 +90,45 @@ std::vector<Settings> refusing_settings() {
 // Of each node, in the order in which they came, found once more by what is simulated: where it ends a way to
 // the goal that goes too high, nothing grows from the edge that does so first; where it does not, it is the
 // solution.
+// Nodes of one state and one place, near the goal, each the child of the one before, and the root far off.
+// The k-th of them has the promise T + c (1 + p k), the root T' + c, so those that rank before the root are a
+// number that goes with 1/p.
+TEST(SearchOptions, WhereManyNodesAreOthersComeFirst) {
+  const Toy toy;
+  Settings s = fast_settings();
+  s.search_options.time_weight = 0;
+  constexpr int crowd = 400;
+  const auto before_root = [&](double price, bool apart) {
+    s.search_options.density_price = price;
+    Tree tree;
+    const State start = toy.start();
+    tree.add(start, -1, Control{}, -1, toy.robot_center(start).cast<float>());
+    const Vec3 near = s.goal.center_of_mass_m - Vec3(2 * s.goal.radius_m, 0, 0);
+    const double cell_m = 0.5 * toy.workspace().robot_radius_m;
+    for (int k = 0; k < crowd; ++k)  // apart: in forty cells one on the other
+      tree.add(start, k, Control{}, k,
+               (near + (apart ? Vec3(0, 0, cell_m * (k % 40 - 20)) : Vec3(0, 0, 0))).cast<float>());
+    const Guidance guidance(toy.workspace(), s.goal.center_of_mass_m, s.search_options.soft_price);
+    NodeSelector selector(toy, s, &guidance, 0);
+    for (int n = 0; n < tree.size(); ++n) selector.add(tree, n);
+    Sample d = draw_sample(s, toy, 0);
+    d.guided = true;
+    int before = 0;
+    for (; before < crowd; ++before) {
+      d.rank = std::log(before + 1.5) / std::log(crowd + 2.0);  // the rank `before`
+      if (selector.choose(d).node == 0) break;
+    }
+    return before;
+  };
+  EXPECT_EQ(before_root(0, false), crowd);
+  const int once = before_root(0.1, false);
+  EXPECT_GT(once, 20);
+  EXPECT_LT(once, crowd / 2);
+  EXPECT_NEAR(before_root(0.2, false), once / 2.0, 1);
+  EXPECT_NEAR(before_root(0.4, false), once / 4.0, 1);
+  EXPECT_EQ(before_root(0.1, true), crowd);  // ten a cell
+}
+
 TEST(SearchOptions, NothingGrowsFromARefusedEdge) {
   Toy toy(1, true, false, 99);
   toy.refused_above_z = low;

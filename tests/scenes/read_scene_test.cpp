@@ -1062,8 +1062,9 @@ std::string all_of(const Scene& s) {
                    p.goal_bias, p.weight_body, p.weight_control_point, p.weight_interpolation, p.max_force_n,
                    p.min_force_share, p.max_force_share, p.min_duration_s, p.max_duration_s,
                    p.control_point_radius_m, p.settle_time_s, p.settle_speed_m_s, p.settle_force_share);
-  t += fmt::format("{} {} {} {} {} {} {} {} {} {} {}\n", p.lag, p.metric, p.time_weight, p.guidance,
-                   p.soft_price, p.look_s, p.learn_prices, p.steer, p.stop_in_goal, p.end_hopeless, p.hold);
+  t += fmt::format("{} {} {} {} {} {} {} {} {} {} {} {}\n", p.lag, p.metric, p.time_weight, p.guidance,
+                   p.soft_price, p.density_price, p.look_s, p.learn_prices, p.steer, p.stop_in_goal,
+                   p.end_hopeless, p.hold);
   t += fmt::format("{} {} {} {}\n", p.shortcut_rounds, p.settle_hold, p.lead, p.carry);
   t += fmt::format("{} {}\n", p.max_pressure_pa, s.goal.volume);
   for (const Box& patch : p.patches_m) t += b(patch);

@@ -182,6 +182,7 @@ plan::Settings settings_of(const scenes::Scene& scene, const PlanOptions& option
                       .guidance = p.guidance,
                       .soft_price = p.soft_price,
                       .learn_prices = p.learn_prices,
+                      .density_price = p.density_price,
                       .steer = p.steer,
                       .look_s = p.look_s,
                       .stop_in_goal = p.stop_in_goal,
