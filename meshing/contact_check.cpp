@@ -25,7 +25,8 @@ constexpr std::uint64_t seed = 1;
 constexpr int nodes_anywhere = 2000, nodes_at_samples = 4000, spots = 2000;
 // What was found of good shapes is at most a half of these.
 constexpr double max_field_cells = 1.5, max_steepness = 2.5, max_gap = 4;
-constexpr double rounding = 1e-9;  // of the size
+constexpr double rounding = 1e-9;           // of the size
+constexpr double rounding_of_sums = 1e-15;  // of the coordinates of places that are added up
 
 std::size_t index_of(const DistanceField& field, const std::array<int, 3>& at) {
   return (std::size_t(at[2]) * std::size_t(field.nodes[1]) + std::size_t(at[1])) *
@@ -56,6 +57,7 @@ class Checker {
         surface_(surface),
         cage_(cage),
         size_(bounding_box(surface.positions).size().maxCoeff()),
+        slack_m_(rounding * size_ + rounding_of_sums * surface.positions.cwiseAbs().maxCoeff()),
         winding_(surface.positions, surface.triangles),
         closed_(is_closed(surface.triangles)),
         seen_(detail::seen_surface(surface, winding_, closed_, size_ / 32, detail::offset_share * size_)),
@@ -150,7 +152,7 @@ class Checker {
     // lie on a piece that is not seen.
     const auto off_surface = [&](const Vec3& p) {
       const double off = distance_.at(p);
-      if (off <= rounding * size_) return off;
+      if (off <= slack_m_) return off;
       if (!whole_surface) whole_surface.emplace(surface_.positions, surface_.triangles);
       return whole_surface->at(p);
     };
@@ -192,9 +194,9 @@ class Checker {
       c_.field_fault = fmt::format("it changes by {:.2f} m a metre", c_.steepest);
     else if (c_.wrong_least_weights > 0)
       c_.field_fault = fmt::format("least_weight of {} tets is another's", c_.wrong_least_weights);
-    if (c_.off_surface_m > rounding * size_)
+    if (c_.off_surface_m > slack_m_)
       c_.sample_fault = fmt::format("one is {:.2g} m off the surface", c_.off_surface_m);
-    else if (c_.misplaced_m > rounding * size_)
+    else if (c_.misplaced_m > slack_m_)
       c_.sample_fault = fmt::format("one is bound {:.2g} m beside itself", c_.misplaced_m);
     else if (std::abs(c_.area_share - 1) > 1e-6)
       c_.sample_fault = fmt::format("they stand for {:.6f} of the surface", c_.area_share);
@@ -205,7 +207,7 @@ class Checker {
   const ContactShape& shape_;
   const SurfaceMesh& surface_;
   const TetMesh& cage_;
-  const double size_;
+  const double size_, slack_m_;  // m; the other is what rounding may be off by
   const WindingNumber winding_;
   const bool closed_;
   const detail::SeenSurface seen_;

@@ -163,7 +163,8 @@ struct Kind {
 };
 constexpr std::array<Kind, 13> kinds{{
     {"n_gons", "face of more than three corners", "faces of more than three corners", &Defects::n_gons},
-    {"non_finite_vertices", "infinite vertex", "infinite vertices", &Defects::non_finite_vertices},
+    {"non_finite_vertices", "vertex that is not finite", "vertices that are not finite",
+     &Defects::non_finite_vertices},
     {"duplicate_vertices", "duplicate vertex", "duplicate vertices", &Defects::duplicate_vertices},
     {"isolated_vertices", "vertex in no face", "vertices in no face", &Defects::isolated_vertices},
     {"degenerate_faces", "face without area", "faces without area", &Defects::degenerate_faces},

@@ -117,7 +117,7 @@ PolygonSoup read_soup(const fs::path& path) {
       return detail::read_by_assimp(path);
   }
   const std::string extension = lower_case_extension(path);
-  if (extension != kind.extension)
+  if (!extension.empty() && extension != kind.extension)
     soup.warnings.push_back(
         fmt::format("the file is named \"{}\" but holds {}: read as such", extension, kind.name));
   return soup;
@@ -290,10 +290,10 @@ ImportedModel finish(const PolygonSoup& soup, const ImportOptions& options, cons
   CornerMap corners;
   if (!looks.empty()) corners = same_corners(mesh.triangles.rows());
   if (unusable)
-    model.warnings.push_back(fmt::format("{} and {} at them dropped, the first: {}",
-                                         counted(unusable.count, "infinite vertex", "infinite vertices"),
-                                         counted(faces.lost_faces, "face", "faces"),
-                                         unusable.places.front()));
+    model.warnings.push_back(
+        fmt::format("{} and {} at them dropped, the first: {}",
+                    counted(unusable.count, "vertex that is not finite", "vertices that are not finite"),
+                    counted(faces.lost_faces, "face", "faces"), unusable.places.front()));
   if (faces.n_gons)
     model.mended.push_back(counted(faces.n_gons.count, "face", "faces") +
                            " of more than three corners cut into triangles");

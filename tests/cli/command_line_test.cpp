@@ -539,6 +539,43 @@ TEST_F(Program, PrepareReportsAndVerifyProvesAgain) {
     EXPECT_EQ(limber_program({"info", (fs::path(out()) / name).string()}).code, exit_done) << name;
 }
 
+// As models of maps lie. Farther away, or smaller than anything, there is no body that could be read again.
+TEST_F(Program_slow, FarFromTheOriginABodyIsKeptOrRefused) {
+  const std::string model = (folder / "far.obj").string();
+  const auto prepared = [&](double far_m, double size_m) {
+    std::ofstream file(model);
+    for (const Vec3& p : {Vec3(0, 0, 0), Vec3(1, 0, 0), Vec3(0, 1, 0), Vec3(0, 0, 1)})
+      file << fmt::format("v {:.17g} {:.17g} {:.17g}\n", far_m + size_m * p.x(), size_m * p.y() - far_m,
+                          size_m * p.z());
+    file << "f 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n";
+    file.close();
+    return limber_program({"prepare", model, "-o", out(), "--tets", "60"});
+  };
+  for (const double far_m : {5.4e6, 9e7}) {
+    const Result near_enough = prepared(far_m, 0.37);
+    ASSERT_EQ(near_enough.code, exit_done) << near_enough.err;
+    const Result kept = limber_program({"verify", out()});
+    EXPECT_EQ(kept.code, exit_done) << kept.out;
+  }
+  for (const auto& [far_m, size_m] : {std::pair(1e12, 1.), {0., 1e-28}, {0., 1e28}}) {
+    const Result beyond = prepared(far_m, size_m);
+    EXPECT_EQ(beyond.code, exit_bad_input);
+    EXPECT_NE(beyond.err.find("scale or move the model"), std::string::npos) << beyond.err;
+  }
+}
+
+// Of its own triangles: cut as other models are it would have ten thousand.
+TEST_F(Program_slow, ACubeHasOneExactPart) {
+  const std::string model = (folder / "cube.obj").string();
+  std::ofstream(model) << "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nv 0 0 1\nv 1 0 1\nv 0 1 1\nv 1 1 1\n"
+                          "f 1 3 4 2\nf 5 6 8 7\nf 1 2 6 5\nf 3 7 8 4\nf 1 5 7 3\nf 2 4 8 6\n";
+  const Result parts = limber_program({"prepare", model, "-o", out(), "--exact", "--json"});
+  ASSERT_EQ(parts.code, exit_done) << parts.err;
+  EXPECT_EQ(parts.json().at("shells").at("count"), 1);
+  EXPECT_EQ(parts.json().at("surface").at("triangles"), 12);
+  EXPECT_EQ(limber_program({"verify", out(), "--model", model}).code, exit_done);
+}
+
 // An open model has no exact parts, which shows after it was read.
 TEST_F(Program_slow, ARefusedModelLeavesTheFolderAsItWas) {
   const std::string model = (folder / "open.obj").string();

@@ -149,20 +149,27 @@ TEST_F(SceneCheck, WhatElseAGoalAsksForIsTold) {
   EXPECT_EQ(goals("").find("not known before bodies are prepared; --work DIR tells"), std::string::npos);
 }
 
+// The robot is 0.6 m wide and ends at x = 0.9: a cage may reach to what is near it, never farther than its
+// size.
 TEST_F(SceneCheck, ABoxBesideTheBodyThatItShouldHoldIsTold) {
-  const auto warnings = [&](double from) {
+  const auto told = [&](const char* key, double from) {
     return limber_program({"scene", "check",
                            scene(with(small_scene, "name = \"robot\"\n",
                                       fmt::format("name = \"robot\"\nfixed = [{{ box_m = [[{}, 0, 0], "
                                                   "[{}, 2, 2]] }}]\n",
                                                   from, from + 0.2))),
                            "--json"})
-        .json()
-        .at("warnings")
-        .dump();
+               .json()
+               .at(key)
+               .dump()
+               .find("is beside the body") != std::string::npos;
   };
-  EXPECT_NE(warnings(1.5).find("is beside the body"), std::string::npos);
-  EXPECT_EQ(warnings(0.8).find("is beside the body"), std::string::npos);
+  EXPECT_TRUE(told("warnings", 1.2));
+  EXPECT_FALSE(told("problems", 1.2));
+  EXPECT_TRUE(told("problems", 2.5));
+  EXPECT_FALSE(told("warnings", 2.5));
+  EXPECT_FALSE(told("warnings", 0.8));
+  EXPECT_FALSE(told("problems", 0.8));
 }
 
 TEST_F(SceneCheck_slow, InAWorkFolderItPreparesAndTries) {

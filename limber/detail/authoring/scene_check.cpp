@@ -126,15 +126,17 @@ class Check {
   // What is held are nodes of the cage, which reaches beyond its surface by a few hundredths of the size.
   void look_at_held(std::size_t b) {
     const Box body = box_of(int(b));
-    const double margin = 0.1 * body.size().maxCoeff();
-    for (const Box& box : scene_.bodies[b].fixed.boxes_m)
-      if ((box.lower.array() > body.upper.array() + margin).any() ||
-          (box.upper.array() < body.lower.array() - margin).any())
-        found_.warnings.push_back(fmt::format(
-            "{}: bodies.{}.fixed: the box from [{:.6g}] to [{:.6g}] is beside the body, which "
-            "reaches from [{:.6g}] to [{:.6g}]; a box that holds no node of its cage is refused",
-            scene_.bodies[b].where, name(b), fmt::join(box.lower, ", "), fmt::join(box.upper, ", "),
-            fmt::join(body.lower, ", "), fmt::join(body.upper, ", ")));
+    const double size = body.size().maxCoeff(), perhaps = 0.1 * size, certainly = size;
+    for (const Box& box : scene_.bodies[b].fixed.boxes_m) {
+      const double apart = std::max((box.lower - body.upper).maxCoeff(), (body.lower - box.upper).maxCoeff());
+      if (apart > perhaps)
+        (apart > certainly ? found_.problems : found_.warnings)
+            .push_back(fmt::format(
+                "{}: bodies.{}.fixed: the box from [{:.6g}] to [{:.6g}] is beside the body, which "
+                "reaches from [{:.6g}] to [{:.6g}]; a box that holds no node of its cage is refused",
+                scene_.bodies[b].where, name(b), fmt::join(box.lower, ", "), fmt::join(box.upper, ", "),
+                fmt::join(body.lower, ", "), fmt::join(body.upper, ", ")));
+    }
   }
 
   // A goal of which no point is outside a rigid body that stays where it is.

@@ -53,7 +53,8 @@ void look_into_images(Appearance& appearance, std::vector<std::string>& warnings
 
 void make_model_of_body(meshing::ImportedModel& model, const PrepareSettings& settings) {
   look_into_images(model.appearance, model.warnings);
-  if (settings.tets > 0) {
+  // Exact parts are of the model's own triangles: cutting edges makes many times as many of the same solid.
+  if (settings.tets > 0 && !settings.exact) {
     const Eigen::Index own_vertices = model.surface.positions.rows();
     CornerMap corners;
     model.surface =
@@ -66,6 +67,20 @@ void make_model_of_body(meshing::ImportedModel& model, const PrepareSettings& se
                       model.surface.triangles.rows()));
   }
   round_to_floats(model.appearance);
+}
+
+// What contact keeps is read again within these, metres.
+void require_size(const SurfaceMesh& surface, const std::string& model) {
+  constexpr double farthest_m = 1e8, least_m = 1e-20;
+  const Box box = bounding_box(surface.positions);
+  const double far = std::max(box.lower.cwiseAbs().maxCoeff(), box.upper.cwiseAbs().maxCoeff()),
+               size = box.size().maxCoeff();
+  if (far > farthest_m || size < least_m)
+    throw InputError(fmt::format(
+        "{}: reaches {:.3g} m from the origin and is {:.3g} m long; a body is at least {:g} m long "
+        "and no point of it farther than {:g} m from the origin; scale or move the model "
+        "(--scale, or a scene's model.scale)",
+        model, far, size, least_m, farthest_m));
 }
 
 double concavity_of(const SurfaceMesh& surface, const PrepareSettings& settings) {
@@ -100,6 +115,7 @@ WholeBody make_body(const BodySource& source, const PrepareSettings& settings,
   body.model = source.load();
   SurfaceMesh& surface = body.model.surface;
   validate(surface, source.model);
+  if (settings.is_whole()) require_size(surface, source.model);
   make_model_of_body(body.model, settings);
   end_stage("import");
   throw_if_stopped();

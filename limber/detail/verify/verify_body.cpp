@@ -22,7 +22,8 @@ namespace limber::detail {
 
 namespace {
 
-constexpr double rounding = 1e-9;  // of the size, or of a figure
+constexpr double rounding = 1e-9;           // of the size, or of a figure
+constexpr double rounding_of_sums = 1e-15;  // of the coordinates of places that are added up
 
 // The first figure of `facts` that the report has otherwise, "" where there is none.
 std::string first_wrong(const Json& facts, const Json& report) {
@@ -112,7 +113,11 @@ void check_shells(const std::string& name, const PreparedBody& body, const Prepa
 
 void check_binding(const std::string& name, const PreparedBody& body, Promises& table) {
   const ffd::Binding& binding = body.binding;
-  const double size = bounding_box(body.surface.positions).diagonal();
+  // As far as places so far from the origin can be told apart.
+  const Box box = bounding_box(body.surface.positions);
+  const double slack =
+      rounding * box.diagonal() +
+      rounding_of_sums * std::max(box.lower.cwiseAbs().maxCoeff(), box.upper.cwiseAbs().maxCoeff());
   std::int64_t outside = 0, wrong = 0;
   double most = 0;
   for (Eigen::Index v = 0; v < body.surface.positions.rows(); ++v) {
@@ -123,10 +128,10 @@ void check_binding(const std::string& name, const PreparedBody& body, Promises& 
                Vec3(body.cage.positions.row(body.cage.tets(binding.tet_from_vertex[v], k)));
     const bool inside = binding.weights.row(v).minCoeff() >= -rounding;
     const double off = (there - p).norm();
-    if (inside && off <= rounding * size) continue;
+    if (inside && off <= slack) continue;
     // What is in no tet hangs on the nearest, as far as a weight of −1 allows.
     if (const bool clamped = binding.weights.row(v).minCoeff() < -1 + 1e-6;
-        !inside && (clamped || off <= rounding * size) && !in_a_tet(body.cage, p))
+        !inside && (clamped || off <= slack) && !in_a_tet(body.cage, p))
       ++outside;
     else
       ++wrong, most = std::max(most, off);
