@@ -434,6 +434,9 @@ TEST_F(Filmed_slow, EveryFalseWordOfAFilmIsNamed) {
         [&] { fs::copy_file(work / "frames" / number(1), work / "frames" / "0001.PNG"); });
   named("a frame beyond the last", "no other pictures",
         [&] { fs::copy_file(work / "frames" / number(1), work / "frames" / "0500.png"); });
+  for (const char* film_of_nobody : {"film.mov", "FILM.mp4", "film.MKV"})
+    named(film_of_nobody, "no other pictures",
+          [&] { fs::copy_file(work / "film.mp4", work / film_of_nobody); });
   named("a pass of nobody", "no other pictures",
         [&] { fs::copy_file(work / "frames" / number(1), work / "frames" / "0002.depth.png"); });
   named("another key of passes", "passes.json says", [&] {

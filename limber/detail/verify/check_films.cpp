@@ -105,12 +105,33 @@ std::vector<int> picked(const Filming& filming, const std::vector<int>& frames, 
   return picks;
 }
 
+std::string lower_case(std::string text) {
+  for (char& c : text) c = char(std::tolower(static_cast<unsigned char>(c)));
+  return text;
+}
+
 bool is_picture(const fs::path& file) {
-  std::string ending = file.extension().string();
-  for (char& c : ending) c = char(std::tolower(static_cast<unsigned char>(c)));
-  static const std::set<std::string> endings{".png", ".jpg", ".jpeg", ".webp", ".gif",
-                                             ".bmp", ".tif", ".tiff", ".exr"};
-  return endings.contains(ending);
+  static const std::set<std::string> endings{".png", ".jpg",  ".jpeg", ".webp", ".gif", ".bmp",
+                                             ".tif", ".tiff", ".exr",  ".avif", ".heic"};
+  return endings.contains(lower_case(file.extension().string()));
+}
+
+constexpr const char* film_endings[] = {".mp4", ".webm", ".gif"};
+
+// A film named like this one that limber cannot have made; empty: none.
+std::string stray_film(const fs::path& folder, const std::string& suffix) {
+  static const std::set<std::string> endings{".mp4",  ".webm", ".gif", ".mov",  ".mkv",
+                                             ".avi",  ".m4v",  ".ogv", ".ogg",  ".mpg",
+                                             ".mpeg", ".wmv",  ".flv", ".apng", ".webp"};
+  std::set<std::string> own, here;
+  for (const char* ending : film_endings) own.insert("film" + suffix + ending);
+  for (const auto& entry : fs::directory_iterator(folder)) {
+    const fs::path& file = entry.path();
+    if (lower_case(file.stem().string()) == lower_case("film" + suffix) &&
+        endings.contains(lower_case(file.extension().string())) && !own.contains(file.filename().string()))
+      here.insert(file.string());
+  }
+  return here.empty() ? "" : *here.begin();
 }
 
 // A picture or folder in the folder of frames that is named like none of this film; empty: none. Passes that
@@ -154,7 +175,6 @@ fs::path found(const fs::path& folder, const RenderedFilm& entry, const fs::path
 }
 
 constexpr std::string_view stage = "render";
-constexpr const char* film_endings[] = {".mp4", ".webm", ".gif"};
 
 // The film that is told of, and those of other endings that lie beside it: an earlier --video made them.
 std::vector<fs::path> same_named(const fs::path& folder, const std::string& suffix, const fs::path& told) {
@@ -224,7 +244,8 @@ void check_film(const fs::path& folder, const std::string& suffix, const Json& w
   const Filming& seen = untold.empty() ? filming : with_untold.emplace(options);
   const std::string odd = first_odd(seen, good);
   table.row(name + "its frames' files are as limber wrote them", odd.empty(), odd);
-  const std::string stray = stray_frame(seen);
+  std::string stray = stray_frame(seen);
+  if (stray.empty()) stray = stray_film(folder, suffix);
   table.row(name + "no other pictures lie among its frames", stray.empty(),
             stray.empty() ? "" : stray + " is none of this film's; remove it");
   if (!options.passes.empty()) {
