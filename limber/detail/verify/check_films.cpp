@@ -127,7 +127,9 @@ std::string stray_film(const fs::path& folder, const std::string& suffix) {
   for (const char* ending : film_endings) own.insert("film" + suffix + ending);
   for (const auto& entry : fs::directory_iterator(folder)) {
     const fs::path& file = entry.path();
-    if (lower_case(file.stem().string()) == lower_case("film" + suffix) &&
+    const std::string stem = file.stem().string();  // names of cameras may differ by case alone
+    if (lower_case(stem.substr(0, 4)) + stem.substr(std::min<std::size_t>(4, stem.size())) ==
+            "film" + suffix &&
         endings.contains(lower_case(file.extension().string())) && !own.contains(file.filename().string()))
       here.insert(file.string());
   }
