@@ -10,10 +10,14 @@ namespace limber::cli {
 
 namespace {
 
-std::string text_of_any(const Json& json) {
+// A line for each value, tables within tables as "table.key".
+std::string text_of_any(const Json& json, const std::string& within = "") {
   std::string text;
   for (const auto& [key, value] : json.items())
-    text += fmt::format("{:28} {}\n", key, value.is_string() ? value.get<std::string>() : text_of(value));
+    text += value.is_object() && !value.empty()
+                ? text_of_any(value, within + key + ".")
+                : fmt::format("{:28} {}\n", within + key,
+                              value.is_string() ? value.get<std::string>() : text_of(value));
   return text;
 }
 
@@ -37,7 +41,10 @@ std::string text_of_body(const Json& body) {
                        v[2].get<double>());
   };
   std::string text = text_of_report(body);
-  if (!body.contains("shell_list")) return text + "  shells       none, for its scene asks for none\n";
+  const std::string only = body.at("input").at("settings").value("only", "");
+  if (!only.empty()) text += fmt::format("  part         made with --only {}: no body to plan with\n", only);
+  if (!body.contains("shell_list"))
+    return !only.empty() ? text : text + "  shells       none, for its scene asks for none\n";
   text +=
       "  shell        middle, m                     size, m                       tets  in "
       "preview-shells.png\n";

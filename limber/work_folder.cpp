@@ -4,6 +4,7 @@
 
 #include "core/error.h"
 #include "core/json_text.h"
+#include "limber/detail/batch/verify_many.h"
 #include "limber/detail/exports/export_motion.h"
 #include "limber/detail/interface/problem.h"
 #include "limber/detail/interface/ranges.h"
@@ -15,12 +16,22 @@ namespace limber {
 
 using detail::working_for;
 
+namespace detail {
+namespace {
+
+Verified verify_any(const VerifyOptions& options) {
+  return holds_many(options.folder) ? verify_many(options) : detail::verify(options);
+}
+
+}  // namespace
+}  // namespace detail
+
 std::vector<Promise> verify(const std::filesystem::path& folder, const std::string& scene,
                             const Context& context) {
   return working_for(context, [&] {
     VerifyOptions options;
     options.folder = folder, options.scene.scene = scene;
-    return detail::verify(options).promises.rows();
+    return detail::verify_any(options).promises.rows();
   });
 }
 
@@ -36,7 +47,7 @@ std::vector<Promise> verify(const std::filesystem::path& folder, const Scene& sc
 Verdict verify(const VerifyOptions& options, const Context& context) {
   detail::require_in("repaint", options.repaint, 1, 1'000'000);
   return working_for(context, [&] {
-    const detail::Verified found = detail::verify(options);
+    const detail::Verified found = detail::verify_any(options);
     return Verdict{found.promises.all_kept(), found.promises.rows(), found.promises.measured(),
                    found.motion ? text_of(detail::json_of(*found.motion), 2) : "", found.scene};
   });

@@ -17,7 +17,8 @@ struct Promise {
   std::string name, value;
   bool kept = false;
 };
-// Every promise that limber makes of a work folder or a body's folder, checked anew from its files: replayed,
+// Every promise that limber makes of a work folder, a body's folder or one of many models (a row for each),
+// checked anew from its files: replayed,
 // searched again (which takes as long as the search did), measured. `scene`: a file or name of the one that
 // the plan must be of, without edits but those that change nothing; empty: its own word is taken. Throws
 // InputError where it is no such folder.
@@ -58,7 +59,7 @@ struct Verdict {
   };
   std::optional<Scene> scene;
 };
-// The same with all that can be asked. Throws InputError where the folder is none of the two.
+// The same with all that can be asked. Throws InputError where the folder is none of these.
 LIMBER_API Verdict verify(const VerifyOptions&, const Context& = {});
 
 // Of a body's folder: also that it is of this model, read again with the scale, axes and label that the body

@@ -24,6 +24,7 @@ using Weights4 = Eigen::RowVector4d;
 constexpr double min_cells_thick = 2;
 constexpr double well_resolved_cells = 3;  // a thickness that is not worth more cells than settings.max_cells
 constexpr int max_cells_for_thin_walls = 1000;
+constexpr double double_share_worth_a_word = 0.05;  // of a volume
 constexpr double open_share_worth_a_word = 0.1, open_share_too_large = 0.5;
 
 // Barycentric coordinates in each tet of a mesh.
@@ -290,11 +291,11 @@ ContactShape make_contact_shape(const SurfaceMesh& surface, const TetMesh& cage,
   ContactShape shape;
   std::vector<detail::SurfaceSample> samples;
   int cells = settings.cells;
-  double thickness = 0;  // of a plate of this volume and area
+  double filled = 0, thickness = 0;  // volume; of a plate of this volume and area
   while (true) {
     progress.update(samples.empty() ? 1 : 3, fmt::format("distances, {} cells", cells));
     shape.field = detail::grid_over(box, size / cells, settings.max_nodes);
-    const double volume = detail::fill(seen, winding, closed, shape.field);
+    const double volume = filled = detail::fill(seen, winding, closed, shape.field);
     thickness = 2 * volume / seen.area_m2;
     if (samples.empty()) {
       r.characteristic_m = std::min(size, 3 * thickness);
@@ -327,6 +328,14 @@ ContactShape make_contact_shape(const SurfaceMesh& surface, const TetMesh& cage,
         most,
         int(std::max({1.1 * cells, thin ? by_thickness : 0, std::min(by_error, 1.0 * settings.max_cells)})));
   }
+  if (const double own = volume(surface);
+      closed &&
+      own - filled > std::max(double_share_worth_a_word * own, 0.25 * seen.area_m2 * shape.field.cell_m))
+    r.warnings.push_back(
+        fmt::format("solids of it overlap or lie in one another: its volume, {:.3g} m³, has {:.0f} % twice, "
+                    "and so has its mass; "
+                    "what it fills is {:.3g} m³; unite them, or leave out what lies within",
+                    own, 100 * (own - filled) / own, filled));
   r.cells = int(std::lround(size / shape.field.cell_m));
   r.nodes = std::int64_t(shape.field.values.size());
   r.memory_mb = double(shape.field.values.size() * sizeof(std::int16_t)) / 1e6;

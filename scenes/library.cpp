@@ -117,6 +117,11 @@ std::string how_to_get_model(const std::string& file, const std::vector<fs::path
   for (const fs::path& folder : folders)
     searched.push_back(folder.empty() ? "the folder of the scene" : folder.string());
   searched.push_back(model_cache().string());
+  std::error_code unseen;
+  for (const fs::path& folder : folders)
+    if (const fs::path there = folder / file; fs::exists(there, unseen))
+      return fmt::format("model {}: {} is {}; name a model's file", file, there.string(),
+                         is_folder(there) ? "a folder" : "no regular file");
   std::string text = fmt::format("model {} was not found in {}", file, fmt::join(searched, ", "));
   for (const fs::path& folder : folders)
     if (is_file(folder / "setup"))

@@ -1,6 +1,7 @@
 // Many models: one that fails fails alone, and what comes out has the same bytes however often it was
 // stopped.
 #include <fcntl.h>
+#include <gmock/gmock.h>
 #include <signal.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -19,6 +20,8 @@
 
 namespace limber::detail {
 namespace {
+
+using testing::HasSubstr;
 
 class Batch_slow : public Program {
  protected:
@@ -227,13 +230,60 @@ TEST_F(Batch_slow, AnEntryThatWasChangedIsMadeAnew) {
 // A file lies wherever an entry would: nothing can be kept, and nothing else is different.
 TEST_F(Batch_slow, AStoreThatCannotBeWrittenIsDoneWithout) {
   ball("a.obj", 0);
-  ASSERT_EQ(prepare(models(), "one", {"--only", "cage"}).code, exit_done);
+  ASSERT_EQ(prepare(models(), "one", {"--only", "cage", "--store", out("elsewhere")}).code, exit_done);
   make_folder(folder / "store");
   for (int i = 0; i < 256; ++i) write_file(folder / "store" / fmt::format("{:02x}", i), "");
   const Ended ended = prepare(models(), "two", {"--only", "cage", "--store", out("store")});
   EXPECT_EQ(ended.code, exit_done) << ended.json;
   EXPECT_EQ(ended.json.at("made"), 1);
   expect_same("one", "two");
+}
+
+// All of a batch's bodies by one command; each false word is named, and so is the model.
+TEST_F(Batch_slow, AllAreVerifiedAtOnce) {
+  ball("a.obj", 0), ball("b.obj", 1), broken("c.obj");
+  ASSERT_EQ(prepare(models(), "out").code, exit_models_failed);
+  const fs::path batch = out("out");
+  const Result good = limber_program({"verify", batch.string()});
+  EXPECT_EQ(good.code, exit_done) << good.out << good.err;
+  EXPECT_THAT(good.out, HasSubstr("b.obj: all that is promised of a body"));
+  EXPECT_THAT(good.out, HasSubstr("c.obj: failed"));
+  EXPECT_EQ(limber_program({"verify", batch.string(), "--film"}).code, exit_bad_input);
+  const Json info = limber_program({"info", batch.string(), "--json"}).json();
+  EXPECT_EQ(info.at("prepared"), 2) << info;
+  EXPECT_EQ(info.at("certificates_that_hold"), 2) << info;
+  EXPECT_EQ(info.at("failed"), Json({{"c.obj", "refused"}})) << info;
+
+  const auto named = [&](const std::string& words, const fs::path& file, const std::string& from,
+                         const std::string& to) {
+    const std::string bytes = read_file(batch / file);
+    ASSERT_NE(bytes.find(from), std::string::npos) << file << " " << from;
+    std::string other = bytes;
+    write_file(batch / file, other.replace(other.find(from), from.size(), to));
+    const Result result = limber_program({"verify", batch.string()});
+    write_file(batch / file, bytes);
+    EXPECT_EQ(result.code, exit_defect) << file << " " << to;
+    std::istringstream lines(result.out);
+    bool is_named = false;
+    for (std::string line; std::getline(lines, line);)
+      is_named = is_named || (line.starts_with("  BROKEN") && line.find(words) != std::string::npos);
+    EXPECT_TRUE(is_named) << file << " " << to << '\n' << result.out;
+  };
+  named("a.obj: all", "bodies/a.obj/report.json", "\"vertices_outside\": 0", "\"vertices_outside\": 1");
+  named("b.obj: all", "bodies/b.obj/cage.msh", "$Nodes", "$nodes");
+  const std::string tells = "manifest.jsonl tells", same = "manifest.csv says";
+  named(tells, "manifest.jsonl", "\"certificate_holds\":true", "\"certificate_holds\":false");
+  named(tells, "manifest.jsonl", "\"name\":\"a.obj\"", "\"name\":\"b.obj\"");
+  named(tells, "manifest.jsonl", "\"name\":\"a.obj\"", "\"name\":\"../bodies/a.obj\"");
+  named(tells, "manifest.jsonl", "{", "{\"best\":true,");
+  named(tells, "manifest.jsonl", "refused", "time");
+  named(tells, "manifest.jsonl", "}\n", "}\nall is well\n");
+  named(tells, "failed/c.obj.txt", "refused", "time");
+  named(same, "manifest.csv", "refused", "done");
+  fs::rename(batch / "bodies/a.obj", batch / "bodies/z.obj");
+  const Result moved = limber_program({"verify", batch.string()});
+  EXPECT_EQ(moved.code, exit_defect);
+  EXPECT_THAT(moved.out, HasSubstr("bodies/z.obj"));
 }
 
 TEST_F(Batch_slow, OnlyAPartIsMadeAndSaidSo) {
@@ -248,13 +298,40 @@ TEST_F(Batch_slow, OnlyAPartIsMadeAndSaidSo) {
     for (const auto& [name, bytes] : contents(out(only)))
       if (name != "report.json") there.push_back(name);
     EXPECT_EQ(there, files);
-    for (const std::string& name : files) {
-      if (name == "cage.msh") continue;  // whose tets are not labelled by shells
-      EXPECT_EQ(read_file(fs::path(out(only)) / name), read_file(fs::path(out("body")) / name)) << name;
-    }
+    // Long edges are cut for cages alone.
+    constexpr int triangles_of_model = 224;
+    const Json made = read_json(fs::path(out(only)) / "report.json"),
+               whole = read_json(fs::path(out("body")) / "report.json");
+    if (only == "shells")
+      EXPECT_EQ(made.at("surface").at("triangles"), triangles_of_model);
+    else
+      EXPECT_EQ(made.at("surface"), whole.at("surface"));
+    EXPECT_GT(whole.at("surface").at("triangles"), triangles_of_model);
     const Result info = limber_program({"info", out(only)});
-    EXPECT_EQ(info.code, exit_bad_input);
-    EXPECT_NE(info.err.find("--only " + only), std::string::npos) << info.err;
+    EXPECT_EQ(info.code, exit_done) << info.err;
+    EXPECT_NE(info.out.find("made with --only " + only), std::string::npos) << info.out;
+    const Result exported = limber_program({"export", out(only), "--format", "urdf"});
+    EXPECT_EQ(exported.code, exit_bad_input) << exported.out;
+    EXPECT_NE(exported.err.find("without --only"), std::string::npos) << exported.err;
+    // It keeps what a part promises; a figure of a file that is there, and of one that is not, is a false
+    // word.
+    const Result verified = limber_program({"verify", out(only), "--model", model});
+    EXPECT_EQ(verified.code, exit_done) << verified.out << verified.err;
+    EXPECT_NE(verified.out.find(only == "cage" ? "no vertex outside the cage" : "shells are convex"),
+              std::string::npos)
+        << verified.out;
+    const fs::path report = fs::path(out(only)) / "report.json";
+    const Json told = read_json(report);
+    for (const auto& [pointer, value] :
+         {std::pair<std::string, Json>{only == "cage" ? "/cage/tets" : "/shells/count", 7},
+          {"/contact", {{"usable", true}}},
+          {"/files/binding.npz", std::string(16, '0')}}) {
+      Json other = told;
+      other[Json::json_pointer(pointer)] = value;
+      write_json(report, other);
+      EXPECT_EQ(limber_program({"verify", out(only)}).code, exit_defect) << pointer;
+    }
+    write_json(report, told);
     // and the same folder can become a whole body
     ASSERT_EQ(run({"prepare", model, "-o", out(only), "--tets", "60"}).code, exit_done);
     EXPECT_EQ(limber_program({"verify", out(only)}).code, exit_done);

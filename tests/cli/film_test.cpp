@@ -444,6 +444,16 @@ TEST_F(Filmed_slow, EveryFalseWordOfAFilmIsNamed) {
     key.at("depth_m")[1] = key.at("depth_m")[1].get<double>() + 1;
     write_json(work / "frames-deep" / "passes.json", key);
   });
+  named("a key of passes, and no passes", "passes.json says",
+        [&] { fs::copy_file(work / "frames-deep" / "passes.json", work / "frames" / "passes.json"); });
+  named("a film of which a frame failed", "manifest.json tells of this film", [&] {
+    Json manifest = read_json(work / "manifest.json");
+    manifest.at("render")["failed"] = 1, manifest.at("render")["painted"] = frames - 1;
+    write_json(work / "manifest.json", manifest);
+  });
+  named("a part of a film, and less of it", "manifest.json tells of this film", [&] {
+    for (const char* file : {"0003.png", "0003.depth.png"}) fs::remove(work / "frames-deep" / file);
+  });
   named("a folder of frames of no film", "manifest.json tells of each",
         [&] { fs::copy(work / "frames", work / "frames-near", fs::copy_options::recursive); });
   named("no film", film, [&] { fs::remove(work / "film.mp4"); });

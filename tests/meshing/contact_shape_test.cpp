@@ -53,6 +53,33 @@ TEST(ContactShape, FallsOfSpotsAreThoseOfOneAfterTheOther) {
   EXPECT_GT(changed, 200);
 }
 
+// Solids that fill one place twice: the volume of the model counts that twice, the field does not. A cavity,
+// and what lies in it, are no such thing.
+TEST(ContactShape, WhatIsFilledTwiceIsTold) {
+  const auto ball = [](double radius, double at, bool hollow = false) {
+    SurfaceMesh mesh = made_sphere(16);
+    mesh.positions *= radius;
+    mesh.positions.col(0).array() += at;
+    if (hollow) mesh.triangles.col(1).swap(mesh.triangles.col(2));
+    return mesh;
+  };
+  const auto warnings = [](const SurfaceMesh& mesh) { return Made(mesh).report.warnings; };
+  EXPECT_EQ(warnings(ball(1, 0)).size(), 0u);
+  EXPECT_EQ(warnings(joined(ball(1, 0), ball(1, 2.2))).size(), 0u);
+  const SurfaceMesh shell = joined(ball(1, 0), ball(0.7, 0, true));
+  EXPECT_EQ(warnings(shell).size(), 0u);
+  EXPECT_EQ(warnings(joined(shell, ball(0.5, 0))).size(), 0u);
+  // Of two balls a radius apart a lens of 5/16 of one is common: 5/32 of both.
+  const auto told_twice = [&](const SurfaceMesh& mesh) {
+    const auto all = warnings(mesh);
+    EXPECT_EQ(all.size(), 1u);
+    const std::size_t at = all.empty() ? std::string::npos : all[0].find(" has ");
+    return at == std::string::npos ? -1 : std::stod(all[0].substr(at + 5));
+  };
+  EXPECT_NEAR(told_twice(joined(ball(1, 0), ball(1, 1))), 100 * 5 / 32., 1);
+  EXPECT_NEAR(told_twice(joined(ball(1, 0), ball(0.7, 0))), 100 * 0.343 / 1.343, 1);
+}
+
 // A cage that leaves most of the surface outside: no weight is wild, and each sample goes with the tet next
 // to it.
 TEST(ContactShape, OutsideTheCageWeightsAreClamped) {

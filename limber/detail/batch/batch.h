@@ -85,6 +85,9 @@ struct BatchRow {
 };
 BatchRow row_of(const fs::path& batch, const BatchModel&);
 
+// manifest.csv of these rows.
+std::string manifest_csv(const std::vector<Json>& rows);
+
 // manifest.jsonl, manifest.csv; seconds.csv, which tells what the journal does.
 void write_tables(const fs::path& batch, const std::vector<BatchModel>&, const Journal&);
 

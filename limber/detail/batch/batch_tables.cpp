@@ -126,22 +126,29 @@ BatchRow row_of(const fs::path& batch, const BatchModel& model) {
   return row;
 }
 
+std::string manifest_csv(const std::vector<Json>& rows) {
+  const std::vector<std::string> columns = manifest_columns();
+  std::string table = fmt::format("{}\r\n", fmt::join(columns, ","));
+  for (const Json& row : rows) table += csv_line(columns, row);
+  return table;
+}
+
 void write_tables(const fs::path& batch, const std::vector<BatchModel>& models, const Journal& journal) {
   FileWriter lines(batch / "manifest.jsonl"), table(batch / "manifest.csv"), seconds(batch / "seconds.csv");
-  const std::vector<std::string> columns = manifest_columns();
+  std::vector<Json> rows;
   std::vector<std::string> costs{"name", "clock_s", "cpu_s", "peak_mb"};
   costs.insert(costs.end(), std::begin(stages), std::end(stages));
-  table.append(fmt::format("{}\r\n", fmt::join(columns, ",")));
   seconds.append(fmt::format("{}\r\n", fmt::join(costs, ",")));
   for (const BatchModel& model : models) {
-    const Json row = json_of_fields(row_of(batch, model));
-    lines.append(text_of(row) + "\n"), table.append(csv_line(columns, row));
+    rows.push_back(json_of_fields(row_of(batch, model)));
+    lines.append(text_of(rows.back()) + "\n");
     const Attempt* said = journal.find(model.model.name);
     if (!said || said->key != model.key) continue;
     Json cost = json_of_fields(*said);
     for (const auto& [stage, cpu_s] : said->cpu_seconds.value_or(InOrder<double>{})) cost[stage] = cpu_s;
     seconds.append(csv_line(costs, cost));
   }
+  table.append(manifest_csv(rows));
   lines.commit(), table.commit(), seconds.commit();
 }
 

@@ -201,11 +201,19 @@ std::vector<std::string> files_of_body(const PrepareSettings& settings, const Ap
 }
 
 PreparedBody read_body(const fs::path& folder) {
+  PreparedBody body = read_made(folder);
+  if (const std::string& only = body.report.input.settings.only; !only.empty())
+    throw InputError(fmt::format(
+        "{}: is a part of a body, made with --only {}; make the whole with limber prepare, without --only",
+        folder.string(), only));
+  return body;
+}
+
+PreparedBody read_made(const fs::path& folder) {
   PreparedBody body;
   try {
     body.report = read_body_report(folder);
-    if (const std::string& only = body.report.input.settings.only; !only.empty())
-      throw InputError(fmt::format("{}: is a part of a body, made with --only {}", folder.string(), only));
+    const PrepareSettings& settings = body.report.input.settings;
     const auto known = [&](const std::string& name) {  // bytes of the file that was reported
       std::string bytes = read_file(folder / name);
       if (!body.report.has_file(name, hex(hash_of(std::string_view(bytes)))))
@@ -214,8 +222,12 @@ PreparedBody read_body(const fs::path& folder) {
       return bytes;
     };
     body.surface = ply_from(known("surface.ply"), folder / "surface.ply");
-    body.cage = msh_from(known("cage.msh"), folder / "cage.msh", &body.shell_from_tet);
-    if (body.report.input.settings.has_shells()) known("shells.obj");
+    if (settings.has_cage()) {
+      body.cage = msh_from(known("cage.msh"), folder / "cage.msh", &body.shell_from_tet);
+      body.gradients = node_gradients(body.cage);
+    }
+    if (settings.has_shells()) known("shells.obj");
+    if (!settings.is_whole()) return body;
     for (const char* name : {"binding.npz", "contact.npz"}) known(name);
     body.binding = ffd::read_binding(folder / "binding.npz", body.surface, body.cage);
     body.contact = read_contact_shape(folder / "contact.npz", body.surface, body.cage);
@@ -225,7 +237,6 @@ PreparedBody read_body(const fs::path& folder) {
       for (std::size_t i = 0; i < body.appearance.images.size(); ++i)
         known(name_of_image_file(body.appearance, i));
     }
-    body.gradients = node_gradients(body.cage);
   } catch (const InputError& error) {
     throw InputError(
         fmt::format("{}; remove {} and make the body anew, by limber prepare or the scene's plan",

@@ -117,6 +117,8 @@ struct PreparedBody {
 void place(PreparedBody&, const Vec3& place_m);
 // How much of its cage a body's model fills, at most 1; 1 where the model is not closed.
 double filled_share(const PreparedBody&);
+// Leaves out what is told of files that are not made.
+void keep_made(Json& told, const PrepareSettings&);
 // What a report tells of the files beside it, worked out from these alone: tables within "surface", "shells",
 // "cage", "certificate", "binding" and "contact".
 Json facts_of_body(const SurfaceMesh&, const std::vector<ConvexShell>&, const TetMesh& cage,
@@ -128,6 +130,8 @@ std::vector<std::string> files_of_body(const PrepareSettings&, const Appearance&
 // In the body's own frame. Throws InputError naming the file and the command that renews it when one is
 // missing, damaged, or of another body.
 PreparedBody read_body(const fs::path& folder);
+// Also of a folder that was made with --only: what was not made is empty.
+PreparedBody read_made(const fs::path& folder);
 
 // Where the fine surface is (V × 3), overwritten, when the cage's nodes are there: the one answer of films,
 // exports and reports.

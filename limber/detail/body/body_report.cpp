@@ -147,6 +147,11 @@ Json facts_of_making(const MadeBody& made, const PrepareSettings& settings) {
   return facts;
 }
 
+void keep_made(Json& told, const PrepareSettings& settings) {
+  if (!settings.has_cage()) told.erase("cage"), told.erase("certificate");
+  if (!settings.is_whole()) told.erase("binding"), told.erase("contact"), told.erase("appearance");
+}
+
 std::vector<std::string> warnings_of(const WholeBody& body) {
   const meshing::Certificate& certificate = body.certificate;
   std::vector<std::string> warnings = body.model.warnings;
@@ -169,8 +174,7 @@ Json report_of(const WholeBody& body, const BodySource& source, const PrepareSet
   if (!body.model.appearance.empty()) report["appearance"] = facts_of_appearance(body.model.appearance);
   const Json making = facts_of_making(body.made, settings);
   for (const auto& [table, figures] : making.items()) report[table].update(figures);
-  if (!settings.has_cage()) report.erase("cage"), report.erase("certificate");
-  if (!settings.is_whole()) report.erase("binding"), report.erase("contact"), report.erase("appearance");
+  keep_made(report, settings);
   return report;
 }
 

@@ -53,8 +53,9 @@ void look_into_images(Appearance& appearance, std::vector<std::string>& warnings
 
 void make_model_of_body(meshing::ImportedModel& model, const PrepareSettings& settings) {
   look_into_images(model.appearance, model.warnings);
-  // Exact parts are of the model's own triangles: cutting edges makes many times as many of the same solid.
-  if (settings.tets > 0 && !settings.exact) {
+  // Exact parts, and shells without a cage, are of the model's own triangles: cutting edges makes more of the
+  // same solid.
+  if (settings.tets > 0 && !settings.exact && settings.has_cage()) {
     const Eigen::Index own_vertices = model.surface.positions.rows();
     CornerMap corners;
     model.surface =

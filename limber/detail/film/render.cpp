@@ -256,6 +256,10 @@ RenderedFilm render(const RenderOptions& options) {
   const double cpu_before = cpu_seconds();
   const std::vector<FailedFrame> failures = paint_frames(filming, missing);
   const double cpu_s = cpu_seconds() - cpu_before;
+  if (stop_signal() != 0)
+    log::warn("{} of {} frames are in {} and kept; limber render {} --resume goes on",
+              std::count_if(wanted.begin(), wanted.end(), is_good), wanted.size(), files.folder.string(),
+              options.folder.string());
   throw_if_stopped();
   for (const FailedFrame& failure : failures) log::warn("frame {}: {}", failure.frame, failure.why);
 
@@ -265,7 +269,7 @@ RenderedFilm render(const RenderOptions& options) {
   result.cpu_s = cpu_s;
   // Several that share the folder may come here at once.
   const FolderLock makes_film(files.folder, FolderLock::alone, FolderLock::waits);
-  bool complete = true;
+  bool complete = failures.empty();  // an older picture may stand for one that failed
   for (int f = 0; f < frame_count && complete; ++f) complete = is_good(f);
   if (complete) {
     const fs::path sheet = options.folder / ("sheet" + suffix + ".png");

@@ -2,6 +2,7 @@
 
 #include "core/error.h"
 #include "core/hash.h"
+#include "core/json_lines.h"
 #include "core/json_text.h"
 #include "core/mesh_files.h"
 #include "core/npz.h"
@@ -96,10 +97,31 @@ Json info_of_shells(const PreparedBody& body, const std::vector<ConvexShell>& sh
 }
 
 Json info_of_body(const fs::path& folder) {
-  const PreparedBody body = read_body(folder);
+  const PreparedBody body = read_made(folder);
   Json json = body.report.json;
   if (body.report.shells) json["shell_list"] = info_of_shells(body, read_obj_shells(folder / "shells.obj"));
   return json;
+}
+
+// Of many models that limber prepare made.
+Json info_of_many(const fs::path& folder) {
+  int done = 0, holding = 0;
+  Json failed = Json::object();
+  const std::vector<Json> rows = JsonLines(folder / "manifest.jsonl").read();
+  for (const Json& row : rows) {
+    const auto told = [&](const char* key) { return row.is_object() ? row.value(key, Json()) : Json(); };
+    if (!told("name").is_string())
+      throw InputError(fmt::format("{}: a line names no model", (folder / "manifest.jsonl").string()));
+    if (told("status") == "failed")
+      failed[told("name").get<std::string>()] = told("reason");
+    else
+      ++done, holding += told("certificate_holds") == true;
+  }
+  return {{"models", rows.size()},
+          {"prepared", done},
+          {"certificates_that_hold", holding},
+          {"failed", failed},
+          {"page", (folder / "index.html").string()}};
 }
 
 FileFacts as(FileFacts::Kind kind, const Json& facts) { return {kind, text_of(facts, 2)}; }
@@ -114,6 +136,8 @@ FileFacts facts_of_file(const fs::path& path) {
     if (fs::exists(path / "scene.toml")) return scene(path / "scene.toml");
     if (fs::exists(path / "plan.npz")) return as(FileFacts::other, read_plan_folder(path).summary);
     if (fs::exists(path / "report.json")) return as(FileFacts::body, info_of_body(path));
+    if (fs::exists(path / "manifest.jsonl") && fs::is_directory(path / "bodies"))
+      return as(FileFacts::other, info_of_many(path));
     throw InputError(fmt::format(
         "{}: holds none of plan.npz, report.json, scene.toml; nothing here is limber's", path.string()));
   }

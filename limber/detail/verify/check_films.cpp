@@ -40,6 +40,7 @@ std::string false_word(const Json& entry, const RenderedFilm& told, RenderedFilm
       told.wanted > told.frames)
     return "it counts more frames than there are";
   if (told.film.has_value() != told.sheet.has_value()) return "a film has a contact sheet";
+  if (told.film && told.failed > 0) return "no film is made where a frame failed";
   // What was done, and where.
   is.wanted = told.wanted, is.painted = told.painted, is.failed = told.failed, is.cpu_s = told.cpu_s;
   is.film = told.film, is.sheet = told.sheet;
@@ -220,9 +221,6 @@ void check_film(const fs::path& folder, const std::string& suffix, const Json& w
   RenderOptions options = options_of(folder, suffix, entry);
   const Filming filming(options);
   const std::string name = "film" + suffix + ": ";
-  const std::string wrong = false_word(written, entry, filming.told(options));
-  table.row(name + "manifest.json tells of this film", wrong.empty(), wrong);
-
   const int count = filming.shot->frames();
   const bool is_whole = entry.film.has_value();
   std::vector<int> good, bad;
@@ -233,6 +231,10 @@ void check_film(const fs::path& folder, const std::string& suffix, const Json& w
     else if (is_whole || fs::exists(filming.files.of(f)))
       bad.push_back(f);
   }
+  std::string wrong = false_word(written, entry, filming.told(options));
+  if (wrong.empty() && !is_whole && entry.wanted - entry.failed > std::ssize(good))
+    wrong = fmt::format("{} frames are told of, and {} are here", entry.wanted - entry.failed, good.size());
+  table.row(name + "manifest.json tells of this film", wrong.empty(), wrong);
   table.row(name + "each frame says that it shows what it should", bad.empty() && !good.empty(),
             good.empty()  ? fmt::format("no frame is there, of {}", count)
             : bad.empty() ? fmt::format("{} of {} frames", good.size(), count)
@@ -250,8 +252,11 @@ void check_film(const fs::path& folder, const std::string& suffix, const Json& w
   if (stray.empty()) stray = stray_film(folder, suffix);
   table.row(name + "no other pictures lie among its frames", stray.empty(),
             stray.empty() ? "" : stray + " is none of this film's; remove it");
+  const fs::path key = filming.files.folder / "passes.json";
+  if (options.passes.empty() && fs::exists(key))
+    table.row(name + "passes.json says what the passes hold", false,
+              key.string() + ": there are none; remove it");
   if (!options.passes.empty()) {
-    const fs::path key = filming.files.folder / "passes.json";
     const bool same = fs::exists(key) && read_json(key) == Json::parse(seen.shot->key_of_passes().dump());
     table.row(name + "passes.json says what the passes hold", same,
               same ? "" : key.string() + " says otherwise, or is not there; render the passes again");

@@ -3,6 +3,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <set>
 
 #include "core/error.h"
 #include "core/hash.h"
@@ -12,6 +13,7 @@
 #include "limber/detail/verify/check_films.h"
 #include "limber/detail/verify/verify_body.h"
 #include "limber/detail/verify/verify_plan.h"
+#include "limber/detail/world/body_source.h"
 #include "limber/detail/world/scene_world.h"
 #include "scenes/library.h"
 
@@ -39,6 +41,27 @@ void check_bodies(const fs::path& folder, const scenes::Scene& scene, const Veri
     check_body(body.name, prepared, of_files, origin.made_cage, depth.remake || hangs_on_shells, of_body[b]);
   });
   for (Promises& of_one : of_body) table.add(std::move(of_one));
+}
+
+// What lies where bodies and scenery do and is of none of them: nothing reads it, but people may.
+std::vector<std::string> of_nobody(const fs::path& folder, const scenes::Scene& scene) {
+  std::set<fs::path> known;
+  std::set<std::string> odd;
+  const auto look = [&](const fs::path& within) {
+    std::error_code missing;
+    for (fs::directory_iterator at(within, missing), end; !missing && at != end; at.increment(missing))
+      if (!known.contains(at->path())) odd.insert(at->path().lexically_relative(folder).string());
+  };
+  for (int b = 0; b < int(scene.bodies.size()); ++b) {
+    const fs::path of_body = body_folder(folder, scene.bodies[std::size_t(b)]), goal = of_body / "goal.msh";
+    known.insert(of_body);
+    if (fs::exists(goal) && !(b == scene.robot && has_goal_cage(scene)))
+      odd.insert(goal.lexically_relative(folder).string());
+  }
+  for (const scenes::BodySpec& body : scene.scenery)
+    for (const char* extension : {".ply", ".json"}) known.insert(scenery_file(folder, body, extension));
+  look(folder / "bodies"), look(folder / "scenery");
+  return {odd.begin(), odd.end()};
 }
 
 // A stiffness that is none of its bodies' changes the step, and with it the times of all frames: that is to
@@ -129,6 +152,9 @@ Verified verify(const VerifyOptions& options, std::optional<TrustedScene> truste
     const fem::World world = build_world(planned.scene, bodies, {}, shares);
     MotionFigures figures;
     Verified verified = verify_plan(folder, planned, bodies, world, figures, depth);
+    if (const auto odd = of_nobody(folder, planned.scene); !odd.empty())
+      verified.promises.measured("of no body of this plan, and not looked at",
+                                 fmt::format("{}", fmt::join(odd, ", ")));
     if (options.film) check_films(folder, options.repaint, verified.promises);
     if (options.observables) write_observables(*options.observables, world, figures);
     return verified;
@@ -140,15 +166,11 @@ Verified verify(const VerifyOptions& options, std::optional<TrustedScene> truste
                       "--observables, --film and --scene out",
                       folder.string()));
     Promises table;
-    const PreparedBody body = read_body(folder);
+    const PreparedBody body = read_made(folder);
     if (options.model) check_model("body", body, *options.model, table);
     check_body("body", body, folder, std::nullopt, options.remake, table);
     return {std::move(table), {}, {}};
   }
-  if (fs::exists(folder / "manifest.jsonl") && fs::is_directory(folder / "bodies"))
-    throw InputError(
-        fmt::format("{0}: holds many models that limber prepare made; name one of them, {0}/bodies/NAME",
-                    folder.string()));
   throw InputError(
       fmt::format("{}: holds neither plan.npz nor report.json; make them with limber run or limber prepare",
                   folder.string()));

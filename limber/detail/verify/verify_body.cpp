@@ -101,6 +101,7 @@ void check_shells(const std::string& name, const PreparedBody& body, const Prepa
               is(said.mean_overshoot, c.mean_overshoot) && is(said.max_overshoot, c.max_overshoot),
               fmt::format("mean {:.3f} %, largest {:.3f} % of the diagonal", 100 * c.mean_overshoot,
                           100 * c.max_overshoot));
+  if (!settings.has_cage()) return;
   bool labelled = body.shell_from_tet.size() == std::size_t(body.cage.tets.rows());
   if (settings.tets == 0)  // in cells
     labelled = labelled && std::count(body.shell_from_tet.begin(), body.shell_from_tet.end(), 0) ==
@@ -311,6 +312,7 @@ Json check_making(const std::string& name, const PreparedBody& body, const Prepa
   }
 
   throw_if_stopped();
+  if (!settings.has_cage()) return facts_of_making(made, settings);
   const bool in_cells = settings.tets == 0;
   made.cage = make_cage(body.surface, shells, settings,
                         in_cells ? std::optional(made_cage.value_or(body.cage)) : std::nullopt);
@@ -322,6 +324,7 @@ Json check_making(const std::string& name, const PreparedBody& body, const Prepa
             "");
 
   throw_if_stopped();
+  if (!settings.is_whole()) return facts_of_making(made, settings);
   const std::shared_ptr<const MadeContact> contact = contact_made_again(body.surface, body.cage);
   made.contact_report = contact->report;
   table.row(name + ": contact made again from surface and cage: the same",
@@ -336,10 +339,11 @@ Json check_making(const std::string& name, const PreparedBody& body, const Prepa
 std::optional<PrepareSettings> settings_told_of(const PreparedBody& body) {
   const PrepareSettings& s = body.report.input.settings;
   const auto share = [](double x) { return x >= 0 && x <= 1; };
-  const std::set<std::string> modes{"lattice", "fast", "paper", "conform"};
+  const std::set<std::string> modes{"lattice", "fast", "paper", "conform"}, parts{"", "shells", "cage"};
   const bool good = s.shells >= (s.mode == "paper" ? 1 : 0) && s.shells <= 1000 && share(s.concavity) &&
                     share(s.threshold) && share(s.inflate) && s.corners >= 8 && s.corners <= 10'000 &&
-                    (s.tets == 0 || (s.tets >= 24 && s.tets <= 200'000)) && modes.contains(s.mode);
+                    (s.tets == 0 || (s.tets >= 24 && s.tets <= 200'000)) && modes.contains(s.mode) &&
+                    parts.contains(s.only);
   return good ? std::optional(s) : std::nullopt;
 }
 
@@ -353,18 +357,28 @@ void check_body(const std::string& name, const PreparedBody& body, const fs::pat
   std::vector<ConvexShell> shells;
   if (settings.has_shells()) shells = read_obj_shells(folder / "shells.obj");
   for (const ConvexShell& shell : shells) validate(shell, (folder / "shells.obj").string());
-  const meshing::Certificate certificate = meshing::certify(body.surface, body.cage);
-  check_cage(name, body, settings, certificate, table);
+  meshing::Certificate certificate;
+  if (settings.has_cage()) {
+    certificate = meshing::certify(body.surface, body.cage);
+    check_cage(name, body, settings, certificate, table);
+  }
   check_shells(name, body, settings, shells, folder, table);
-  check_binding(name, body, table);
-  check_contact(name, body, table);
+  if (settings.is_whole()) {
+    check_binding(name, body, table);
+    check_contact(name, body, table);
+  } else {
+    table.measured(name + ": is a part",
+                   fmt::format("made with --only {}, no body to plan with", settings.only));
+  }
   table.row(name + ": its settings are some that limber takes", told.has_value(), "");
-  const Json making = check_making(name, body, settings, shells, made_cage, remake, table);
+  Json making = check_making(name, body, settings, shells, made_cage, remake, table);
   Json facts = facts_of_body(body.surface, shells, body.cage, body.binding, body.contact, certificate);
   if (!body.appearance.empty()) {
     facts["appearance"] = facts_of_appearance(body.appearance);
     check_images(name, body.appearance, table);
   }
+  keep_made(facts, settings);
+  if (!making.is_null()) keep_made(making, settings);
   std::string wrong = first_wrong(facts, body.report.json);
   if (wrong.empty() && !making.is_null()) wrong = first_wrong(making, body.report.json);
   if (wrong.empty() && !making.is_null())
@@ -379,7 +393,8 @@ void check_origin(const std::string& name, const Origin& origin, bool must_be_he
     table.row(name + ": surface is the scene's model", origin.same_surface.value_or(false),
               origin.same_surface ? "" : "its model file is not here, or is another");
   else
-    table.measured(name + ": surface", "its model file is not here to be compared with");
+    table.measured(name + ": surface",
+                   "its model file is not here, or has changed since, so it is not compared");
   if (origin.appearance == Appearing::plain) return;
   if (origin.appearance != Appearing::not_here || must_be_here)
     table.row(name + ": colors and images are the model's", origin.appearance == Appearing::same,
@@ -387,7 +402,7 @@ void check_origin(const std::string& name, const Origin& origin, bool must_be_he
                   ? "its model file, or one that it names, is not here, or is another"
                   : "");
   else
-    table.measured(name + ": colors and images", "their files are not here to be compared with");
+    table.measured(name + ": colors and images", "their files are not here, or have changed since");
 }
 
 void check_model(const std::string& name, const PreparedBody& body, const fs::path& model, Promises& table) {

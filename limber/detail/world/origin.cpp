@@ -105,7 +105,8 @@ ModelOptions words_of(const FileIdentity& identity, const fs::path& file) {
 
 void compare(const meshing::ImportedModel& model, const PreparedBody& prepared, Origin& origin) {
   origin.same_surface = same_surface(model.surface, prepared.surface);
-  if (!model.appearance.empty() || !prepared.appearance.empty())
+  const bool shows_own = prepared.report.input.settings.is_whole();
+  if (shows_own && (!model.appearance.empty() || !prepared.appearance.empty()))
     origin.appearance = *origin.same_surface && same_appearance(model.appearance, prepared.appearance)
                             ? Appearing::same
                             : Appearing::another;
