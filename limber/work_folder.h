@@ -18,10 +18,9 @@ struct Promise {
   bool kept = false;
 };
 // Every promise that limber makes of a work folder, a body's folder or one of many models (a row for each),
-// checked anew from its files: replayed,
-// searched again (which takes as long as the search did), measured. `scene`: a file or name of the one that
-// the plan must be of, without edits but those that change nothing; empty: its own word is taken. Throws
-// InputError where it is no such folder.
+// checked anew from its files: replayed, searched again (which takes as long as the search did), measured.
+// `scene`: a file or name of the one that the plan must be of, without edits but those that change nothing;
+// empty: its own word is taken. Throws InputError where it is no such folder.
 LIMBER_API std::vector<Promise> verify(const std::filesystem::path& folder, const std::string& scene = {},
                                        const Context& = {});
 // The same with the scene that the plan must be of: edits, preset and folders of models as it was read with.

@@ -295,11 +295,11 @@ ContactShape make_contact_shape(const SurfaceMesh& surface, const TetMesh& cage,
   while (true) {
     progress.update(samples.empty() ? 1 : 3, fmt::format("distances, {} cells", cells));
     shape.field = detail::grid_over(box, size / cells, settings.max_nodes);
-    const double volume = filled = detail::fill(seen, winding, closed, shape.field);
-    thickness = 2 * volume / seen.area_m2;
+    filled = detail::fill(seen, winding, closed, shape.field);
+    thickness = 2 * filled / seen.area_m2;
     if (samples.empty()) {
       r.characteristic_m = std::min(size, 3 * thickness);
-      if (!(volume > 0)) return give_up(no_inside);
+      if (!(filled > 0)) return give_up(no_inside);
       const double squares = seen.area_m2 / (r.characteristic_m * r.characteristic_m);
       const int most = int(std::clamp(settings.samples_a_square * squares,
                                       double(settings.fewest_most_samples), double(settings.max_samples)));
@@ -331,11 +331,10 @@ ContactShape make_contact_shape(const SurfaceMesh& surface, const TetMesh& cage,
   if (const double own = volume(surface);
       closed &&
       own - filled > std::max(double_share_worth_a_word * own, 0.25 * seen.area_m2 * shape.field.cell_m))
-    r.warnings.push_back(
-        fmt::format("solids of it overlap or lie in one another: its volume, {:.3g} m³, has {:.0f} % twice, "
-                    "and so has its mass; "
-                    "what it fills is {:.3g} m³; unite them, or leave out what lies within",
-                    own, 100 * (own - filled) / own, filled));
+    r.warnings.push_back(fmt::format(
+        "solids of it overlap or lie in one another: its volume, {:.3g} m³, has {:.0f} % twice, "
+        "and so has its mass; what it fills is {:.3g} m³; unite them, or leave out what lies within",
+        own, 100 * (own - filled) / own, filled));
   r.cells = int(std::lround(size / shape.field.cell_m));
   r.nodes = std::int64_t(shape.field.values.size());
   r.memory_mb = double(shape.field.values.size() * sizeof(std::int16_t)) / 1e6;

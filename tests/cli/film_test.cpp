@@ -544,6 +544,15 @@ TEST_F(WithoutScenery_slow, AModelThatIsNotFoundIsLeftOutAndTheRestIsAsWithoutIt
   const Result again = limber_program({"plan", scene(text()), "-o", out()});
   EXPECT_THAT(again.err, HasSubstr("nowhere.obj was not found in "));
   EXPECT_THAT(again.err, HasSubstr(". It is left out of the pictures."));
+  fs::create_directory(fs::path(scene(text())).parent_path() / "nowhere.obj");
+  EXPECT_THAT(limber_program({"plan", scene(text()), "-o", out()}).err, HasSubstr("nowhere.obj is a folder"));
+  // What is left of no body, for verify to tell.
+  fs::create_directory(fs::path(out()) / "bodies" / "left_over");
+  write_file(fs::path(out()) / "bodies" / "robot" / "goal.msh", "");
+  const Result told = limber_program({"verify", out()});
+  EXPECT_EQ(told.code, exit_done) << told.out << told.err;
+  EXPECT_THAT(told.out, HasSubstr("not looked at"));
+  EXPECT_THAT(told.out, HasSubstr("bodies/left_over, bodies/robot/goal.msh\n"));
   ASSERT_EQ(limber_program({"plan", scene(), "-o", out()}).code, exit_done);
   EXPECT_EQ(frame_3({}), seen);
 }

@@ -257,9 +257,8 @@ RenderedFilm render(const RenderOptions& options) {
   const std::vector<FailedFrame> failures = paint_frames(filming, missing);
   const double cpu_s = cpu_seconds() - cpu_before;
   if (stop_signal() != 0)
-    log::warn("{} of {} frames are in {} and kept; limber render {} --resume goes on",
-              std::count_if(wanted.begin(), wanted.end(), is_good), wanted.size(), files.folder.string(),
-              options.folder.string());
+    log::warn("{}: {} of {} frames are there and kept; the same command with --resume goes on",
+              files.folder.string(), std::count_if(wanted.begin(), wanted.end(), is_good), wanted.size());
   throw_if_stopped();
   for (const FailedFrame& failure : failures) log::warn("frame {}: {}", failure.frame, failure.why);
 
