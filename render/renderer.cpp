@@ -179,9 +179,9 @@ bool Renderer::Impl::has_transparent() const {
                      [](const Mesh& m) { return m.drawn() && m.transparent(); });
 }
 
-// Stage after stage. Where there are transparent surfaces, lines are drawn with them: what of a line lies
-// before a transparent surface goes into the transparent surface's lists. Passes and picture come from one
-// drawing, so they agree sample by sample.
+// Stage after stage. Where there are transparent surfaces, lines are drawn with them: by OpenGL what of a
+// line lies before a transparent surface goes into the transparent surface's lists. Passes and picture come
+// from one drawing, so they agree sample by sample.
 void Renderer::Impl::draw(const Camera& from, const RowReader& read, Passes* passes, StageTimes* times) {
   render::validate(from);
   context.make_current();
@@ -201,10 +201,10 @@ void Renderer::Impl::draw(const Camera& from, const RowReader& read, Passes* pas
   done(&StageTimes::ground_s);
   draw_opaque(passes != nullptr);
   done(&StageTimes::opaque_s);
-  if (has_transparent()) {
+  if (!are_layered && has_transparent()) {
     draw_transparent();
     done(&StageTimes::transparent_s);
-  } else {
+  } else if (!are_layered) {
     draw_lines(LinePass::draw_all);
     done(&StageTimes::lines_s);
   }

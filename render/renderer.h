@@ -17,7 +17,7 @@ namespace limber::render {
 struct RenderSettings {
   int width = 1920, height = 1080;  // pixels, 1 … 8192
   int supersampling = 2;            // samples a pixel are this squared; 1 … 4
-  bool tiles = true;                // opaque bodies are drawn on the CPU where that can be, else by OpenGL
+  bool tiles = true;                // bodies are drawn on the CPU where that can be, else by OpenGL
   // 4 samples a pixel that share one shading (MSAA); supersampling then counts for nothing. Not faster where
   // triangles are about as small as pixels: see docs/rendering.md.
   bool multisampling = false;

@@ -205,7 +205,7 @@ bool Renderer::Impl::hides_its_back(const Mesh& mesh) const {
 // object (−1) and no scalar (NaN). Colours and depth are of the tiles where these can be drawn, with passes
 // too.
 void Renderer::Impl::draw_opaque(bool passes) {
-  if (!passes && draw_opaque_in_tiles()) return;
+  if (!passes && draw_in_tiles()) return;
   clean_tiles.clear();
   glBindFramebuffer(GL_FRAMEBUFFER, passes ? targets.passes().frame : targets.samples_frame);
   const SampleGrid grid = sample_grid(settings);
@@ -248,7 +248,7 @@ void Renderer::Impl::draw_opaque(bool passes) {
   glDisable(GL_CULL_FACE);
   glDisable(GL_POLYGON_OFFSET_FILL);
   plane_defines({});
-  if (passes && draw_opaque_in_tiles()) glBindFramebuffer(GL_FRAMEBUFFER, targets.passes().frame);
+  if (passes && draw_in_tiles()) glBindFramebuffer(GL_FRAMEBUFFER, targets.passes().frame);
 }
 
 }  // namespace limber::render

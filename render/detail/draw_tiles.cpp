@@ -1,5 +1,5 @@
-// Opaque bodies drawn on the CPU, tile by tile (tiles.h, shade_tile.h), into the same targets as by OpenGL,
-// so that lines and transparent surfaces go on from there.
+// Bodies drawn on the CPU, tile by tile (tiles.h, shade_tile.h), into the same targets as by OpenGL, which
+// goes on from there where there are lines, or transparent surfaces that it has to draw.
 #define GL_GLEXT_PROTOTYPES
 #include <GL/glcorearb.h>
 
@@ -10,6 +10,7 @@
 
 #include "core/error.h"
 #include "render/detail/grain.h"
+#include "render/detail/line_quads.h"
 #include "render/detail/renderer_impl.h"
 
 namespace limber::render {
@@ -67,8 +68,15 @@ detail::ShadedMesh Renderer::Impl::shaded_in_tiles(const Mesh& mesh) {
   const float offset_m = float(2 * shadow_texel_m);
   const DrawnMesh& drawn_mesh = mesh.card.drawn();
   const MeshLook& look = mesh.look;
-  detail::ShadedMesh s{drawn_mesh.corners.data(), {}, {}, {}};
+  detail::ShadedMesh s{drawn_mesh.corners.data(), {}, {}, {}, {}};
+  const SampleGrid grid = sample_grid(settings);
+  s.in_picture << 0.5f * float(grid.width) * (clip_from_world.row(0).cast<float>() + w),
+      0.5f * float(grid.height) * (clip_from_world.row(1).cast<float>() + w), w;
   detail::Finish& finish = s.finish;
+  finish.transparent = mesh.transparent(), finish.sheet = look.sheet;
+  finish.flat_inside = !mesh.planes.empty() && !(mesh.transparent() && *mesh.solid);
+  finish.opacity = float(look.opacity);
+  finish.log2_clear = mesh.transparent() ? float(std::log2(1 - look.opacity)) : 0;
   finish.tinted = mesh.card.tinted();
   finish.roughness = float(look.roughness), finish.metallic = float(look.metallic),
   finish.sheen = float(look.sheen);
@@ -141,34 +149,55 @@ detail::Stage Renderer::Impl::stage_of_tiles() {
   return stage;
 }
 
-// False where they cannot all be drawn so: with images or colours of corners, cut open, or reaching before
-// the near plane.
-bool Renderer::Impl::draw_opaque_in_tiles() {
-  const SampleGrid grid = sample_grid(settings);
-  if (!settings.tiles || settings.multisampling || settings.supersampling != 2) return false;
-  std::vector<const Mesh*> opaque;
-  for (const Mesh& mesh : meshes)
-    if (mesh.look.seen && !mesh.transparent()) {
-      if (!mesh.card.drawn().batches.empty() || !mesh.planes.empty()) return false;
-      opaque.push_back(&mesh);
-    }
-  detail::Tiles tiles(grid.width, grid.height);
-  std::vector<detail::ShadedMesh> shaded;
-  for (const Mesh* mesh : opaque) {
-    const std::vector<Plane> planes = planes_of(*mesh);  // the ground's, or none
-    if (!tiles.add(mesh->card.drawn().positions, mesh->card.drawn().corners, clip_from_world,
-                   hides_its_back(*mesh), detail::stand_back(*mesh, settings.supersampling),
-                   planes.empty() ? nullptr : planes.data()))
-      return false;
-    shaded.push_back(shaded_in_tiles(*mesh));
+// All of these meshes, or false where one has images or colours of corners.
+bool Renderer::Impl::put_in_tiles(bool transparent, detail::Tiles& tiles,
+                                  std::vector<detail::ShadedMesh>& shaded) {
+  for (const Mesh& mesh : meshes) {
+    if (!mesh.drawn() || mesh.transparent() != transparent) continue;
+    if (!mesh.card.drawn().batches.empty()) return false;
+    tiles.add(mesh.card.drawn().positions, mesh.card.drawn().corners, clip_from_world,
+              !transparent && hides_its_back(mesh), detail::stand_back(mesh, settings.supersampling),
+              planes_of(mesh));
+    shaded.push_back(shaded_in_tiles(mesh));
   }
   tiles.sort();
+  return true;
+}
+
+// Lines, each as a mesh of its own.
+void Renderer::Impl::put_in_tiles(detail::Tiles& tiles, std::vector<detail::Stroke>& looks) {
+  std::vector<float> corners;
+  each_line([&](const Points& ends, const LineLook& look, const std::vector<Plane>& planes) {
+    const double width = look.width_px * settings.supersampling;
+    detail::line_quads(ends, screen(), width, planes, corners);
+    tiles.add_lines(corners);
+    looks.push_back({{}, float(look.opacity), float(0.5 * width)});
+    put(linear_from_srgb(look.color_srgb), looks.back().color);
+  });
+  tiles.sort();
+}
+
+// False where opaque bodies cannot all be drawn so. Where transparent surfaces can, lines are drawn with them
+// (are_layered); else OpenGL draws both.
+bool Renderer::Impl::draw_in_tiles() {
+  are_layered = false;
+  const SampleGrid grid = sample_grid(settings);
+  if (!settings.tiles || settings.multisampling || settings.supersampling != 2) return false;
+  detail::Tiles tiles(grid.width, grid.height),
+      layers(grid.width, grid.height, detail::Tiles::Of::transparent);
+  detail::Tiles strokes(grid.width, grid.height);
+  std::vector<detail::ShadedMesh> shaded, shaded_layers;
+  std::vector<detail::Stroke> looks;
+  if (!put_in_tiles(false, tiles, shaded)) return false;
+  const bool has_lines =
+      std::any_of(lines.begin(), lines.end(), [](const Lines& l) { return l.ends.rows() > 0; }) ||
+      std::any_of(meshes.begin(), meshes.end(), [](const Mesh& m) { return m.look.edges.has_value(); });
+  are_layered = has_transparent() && put_in_tiles(true, layers, shaded_layers);
+  if (are_layered) put_in_tiles(strokes, looks);
   const detail::Stage stage = stage_of_tiles();
 
   drawn = extent_of_drawn();
-  const bool more_follows =
-      has_transparent() || !lines.empty() ||
-      std::any_of(meshes.begin(), meshes.end(), [](const Mesh& m) { return m.look.edges.has_value(); });
+  const bool more_follows = !are_layered && (has_lines || has_transparent());
   clean_tiles.resize(std::size_t(tiles.columns() * tiles.rows()), false);
   constexpr int side = detail::tile_samples;
   glPixelStorei(GL_UNPACK_ROW_LENGTH, side);
@@ -176,6 +205,7 @@ bool Renderer::Impl::draw_opaque_in_tiles() {
   const std::vector<float> far(side * side, 1.0f);
   const std::vector<std::uint16_t> nothing(4 * side * side, 0);
   std::vector<std::uint16_t> halves_of_tile(4 * side * side);
+  std::vector<detail::Covered> covered;
   detail::TileShader shader;
   for (int r = 0; r < tiles.rows(); ++r)
     for (int c = 0; c < tiles.columns(); ++c) {
@@ -186,10 +216,19 @@ bool Renderer::Impl::draw_opaque_in_tiles() {
       if (left >= right || low >= high) continue;
       const std::size_t tile = std::size_t(r * tiles.columns() + c),
                         first = std::size_t((low - y0) * side + left - x0);
-      const bool empty = tiles.empty(c, r), whole = left == x0 && right == x1 && low == y0 && high == y1;
+      const bool layered = are_layered && !(layers.empty(c, r) && strokes.empty(c, r)),
+                 empty = tiles.empty(c, r) && !layered,
+                 whole = left == x0 && right == x1 && low == y0 && high == y1;
       if (!empty) {
         tiles.resolve(c, r, *shown);
         shader.shade(stage, shaded, tiles.triangles(), *shown, x0, y0, halves_of_tile.data());
+        if (layered) {
+          layers.cover(c, r, *shown, covered);
+          shader.put_surfaces(stage, shaded_layers, layers.triangles(), covered, x0, y0);
+          strokes.cover(c, r, *shown, covered);
+          shader.put_lines(strokes, looks, covered, x0, y0);
+          shader.lay_over(halves_of_tile.data());
+        }
       }
       if (!empty || !clean_tiles[tile]) {
         glBindTexture(GL_TEXTURE_2D, targets.samples.id);

@@ -159,12 +159,22 @@ void Renderer::Impl::draw_transparent() {
   glDisable(GL_SCISSOR_TEST);
 }
 
+Screen Renderer::Impl::screen() const {
+  const SampleGrid grid = sample_grid(settings);
+  return {clip_from_world, Eigen::Vector2d(grid.width, grid.height)};
+}
+
+void Renderer::Impl::each_line(
+    const std::function<void(const Points&, const LineLook&, const std::vector<Plane>&)>& visit) {
+  for (const Lines& l : lines) visit(l.ends, l.look, {});
+  for (Mesh& mesh : meshes)
+    if (mesh.drawn() && mesh.look.edges) visit(mesh.card.edge_ends(), *mesh.look.edges, planes_of(mesh));
+}
+
 // Lines test their depth against the opaque and leave it as it is. `corners` is one buffer for all of them,
 // filled anew for each.
 void Renderer::Impl::draw_lines(LinePass pass) {
   const double per_pixel = settings.multisampling ? 1 : settings.supersampling;
-  const SampleGrid grid = sample_grid(settings);
-  const Screen screen{clip_from_world, Eigen::Vector2d(grid.width, grid.height)};
   glBindFramebuffer(GL_FRAMEBUFFER, targets.samples_frame);
   glEnable(GL_BLEND);
   glBlendFunc(GL_ONE, GL_ONE_MINUS_SRC_ALPHA);
@@ -178,8 +188,8 @@ void Renderer::Impl::draw_lines(LinePass pass) {
   }
   glBindVertexArray(line_array);
   std::vector<float> corners;
-  const auto draw = [&](const Points& ends, const LineLook& line, const std::vector<Plane>& planes) {
-    line_quads(ends, screen, line.width_px * per_pixel, planes, corners);
+  each_line([&](const Points& ends, const LineLook& line, const std::vector<Plane>& planes) {
+    line_quads(ends, screen(), line.width_px * per_pixel, planes, corners);
     if (corners.empty()) return;
     const Vec3 color = linear_from_srgb(line.color_srgb);
     p.set("line_color", Eigen::Vector4d(color.x(), color.y(), color.z(), line.opacity));
@@ -187,10 +197,7 @@ void Renderer::Impl::draw_lines(LinePass pass) {
     glBindBuffer(GL_ARRAY_BUFFER, line_buffer);
     glBufferData(GL_ARRAY_BUFFER, GLsizeiptr(corners.size() * sizeof(float)), corners.data(), GL_STREAM_DRAW);
     glDrawArrays(GL_TRIANGLES, 0, GLsizei(corners.size() / line_corner_floats));
-  };
-  for (const Lines& l : lines) draw(l.ends, l.look, {});
-  for (Mesh& mesh : meshes)
-    if (mesh.drawn() && mesh.look.edges) draw(mesh.card.edge_ends(), *mesh.look.edges, planes_of(mesh));
+  });
   glDisable(GL_BLEND);
   glDepthMask(GL_TRUE);
 }

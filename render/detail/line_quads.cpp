@@ -1,7 +1,7 @@
-// Each segment is cut in clip space, by the near plane and by the planes that open bodies, before it is
-// divided by w: an end behind the eye has no place on the screen. Then the quad is made in samples of the
-// screen, along ± the normal of what is left, and goes back to clip space with the w of each end, so that
-// depths stay those of the line.
+// Each segment is cut in clip space, by the near plane, far out of the picture, and by the planes that open
+// bodies, before it is divided by w: an end behind the eye has no place on the screen. Then the quad is made
+// in samples of the screen, along ± the normal of what is left, and goes back to clip space with the w of
+// each end, so that depths stay those of the line.
 #include "render/detail/line_quads.h"
 
 #include <algorithm>
@@ -36,6 +36,12 @@ void line_quads(const Points& ends, const Screen& screen, double width_samples,
                           clip_second = screen.clip_from_world * second;
     Span left;
     left.keep_above(clip_first.z() + clip_first.w(), clip_second.z() + clip_second.w());  // the near plane
+    for (int axis = 0; axis < 2; ++axis) {  // as far again as the picture reaches, and the line's width
+      const double margin = 2 + reach / half[axis];
+      for (const double side : {-1.0, 1.0})
+        left.keep_above(margin * clip_first.w() + side * clip_first[axis],
+                        margin * clip_second.w() + side * clip_second[axis]);
+    }
     for (const Eigen::Vector4d& plane : planes) left.keep_above(plane.dot(first), plane.dot(second));
     if (!(left.from < left.to)) continue;
     const Eigen::Vector4d a = clip_first + left.from * (clip_second - clip_first),

@@ -17,8 +17,8 @@ struct Screen {
   Eigen::Vector2d size;  // samples
 };
 
-// Fills corners with two triangles a segment; ends: row 2i to row 2i + 1. What lies behind the eye, or has
-// n·p + d < 0 for one of the planes (n, d), is cut off.
+// Fills corners with two triangles a segment; ends: row 2i to row 2i + 1. What lies behind the eye or
+// far out of the picture, or has n·p + d < 0 for one of the planes (n, d), is cut off.
 void line_quads(const Points& ends, const Screen&, double width_samples,
                 std::span<const Eigen::Vector4d> planes, std::vector<float>& corners);
 

@@ -28,6 +28,7 @@
 #include "render/detail/ground_shade.h"
 #include "render/detail/image_on_card.h"
 #include "render/detail/layer_lists.h"
+#include "render/detail/line_quads.h"
 #include "render/detail/program.h"
 #include "render/detail/shade_tile.h"
 #include "render/detail/shaders.h"
@@ -138,7 +139,9 @@ struct Renderer::Impl {
   void draw_shadow_map();
   void shade_ground_maps();
   void draw_opaque(bool passes);
-  bool draw_opaque_in_tiles();
+  bool draw_in_tiles();
+  bool put_in_tiles(bool transparent, detail::Tiles&, std::vector<detail::ShadedMesh>&);
+  void put_in_tiles(detail::Tiles&, std::vector<detail::Stroke>&);
   detail::ShadedMesh shaded_in_tiles(const Mesh&);
   detail::Stage stage_of_tiles();
   struct Rectangle {               // of samples; rows go upward
@@ -157,6 +160,9 @@ struct Renderer::Impl {
   // drawn.
   enum class LinePass { draw_all, put, draw_rest };
   void draw_lines(LinePass);
+  detail::Screen screen() const;
+  // Also those along the edges of meshes, with the planes that cut these.
+  void each_line(const std::function<void(const Points& ends, const LineLook&, const std::vector<Plane>&)>&);
   void finish(const RowReader&);
   Passes finish_passes();
 
@@ -211,6 +217,7 @@ struct Renderer::Impl {
       relief_texels;  // for the tiles, plain and woven, made when they are asked for
   std::array<detail::Relief, 2> reliefs;
   std::vector<bool> clean_tiles;      // of the samples: nothing is in them
+  bool are_layered = false;           // transparent surfaces were drawn in tiles
   Rectangle drawn = {0, 0, 0, 0};     // whole pixels: beyond it nothing is, and samples are not cleared
   std::vector<std::uint16_t> halves;  // the samples of it, read back
 };

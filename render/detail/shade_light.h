@@ -1,4 +1,4 @@
-// The light that opaque bodies send to the eye, sixteen places side by side: the mesh shader of shaders.cpp
+// The light that surfaces send to the eye, sixteen places side by side: the mesh shader of shaders.cpp
 // on the CPU. Plain data and pointers only: this header is compiled for three instruction sets, as
 // fem/detail/kernels.h is.
 #pragma once
@@ -35,6 +35,8 @@ struct Stage {
 };
 
 struct Finish {
+  bool transparent, sheet, flat_inside;
+  float opacity, log2_clear;  // of transparent surfaces; the second is log2(1 − opacity)
   bool tinted;
   float roughness, metallic, sheen;
   float open_power;         // 2^(−16 roughness − 1)
@@ -59,7 +61,9 @@ struct alignas(64) LitPlaces {
   float pixel_x[places_at_once], pixel_y[places_at_once];    // whole
   float middle_x[places_at_once], middle_y[places_at_once];  // of the pixel, in samples from the place
   float weight[4][places_at_once];  // of the pixel's samples, 0 where it does not show; their sum is 1
-  float light[3][places_at_once];   // out
+  // Out. Of a transparent surface the share of the light behind it that it holds back, and its own light
+  // times that share; else 1.
+  float light[3][places_at_once], held_back[places_at_once];
 };
 
 using Shade = void (*)(const Stage&, const Finish&, LitPlaces&);
