@@ -331,7 +331,8 @@ TEST_F(Filmed_slow, EveryFalseWordOfAFilmIsNamed) {
       write_json(work / "manifest.json", manifest);
     });
   };
-  entry("size", {64, 64}, says), entry("sets", {"film.forces=true"}, says), entry("bits", 16, says);
+  entry("size", {64, 64}, "do not; the first is"), entry("sets", {"film.forces=true"}, says),
+      entry("bits", 16, says);
   entry("sets", {"film.look=dark"}, says, "render-deep"), entry("passes", Json::array(), says, "render-deep");
   named("no frame 2", says, [&] { fs::remove(work / "frames" / number(2)); });
   named("a frame for another", says, [&] {
