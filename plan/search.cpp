@@ -63,7 +63,13 @@ void require_same_search(const System& system, const Settings& settings, const P
     throw InputError(
         fmt::format("the earlier plan is of another world (hash {}, now {}); plan anew, without resuming it",
                     hex(earlier.system_hash), hex(system.hash())));
-  if (const std::string name = first_difference(earlier.settings, settings); !name.empty())
+  const std::string name = first_difference(earlier.settings, settings);
+  if (name == "seed")
+    throw InputError(fmt::format(
+        "the earlier plan was made with seed {}, and {} is asked for; go on with --seed {}, or plan "
+        "anew, without resuming it",
+        earlier.settings.seed, settings.seed, earlier.settings.seed));
+  if (!name.empty())
     throw InputError(fmt::format(
         "the earlier plan was made with another {}; plan anew, without resuming it, or set {} back", name,
         name));

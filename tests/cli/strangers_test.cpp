@@ -55,6 +55,29 @@ TEST_F(Strangers_slow, AControlAtANodeThatTheRobotLacksIsRefused) {
   expect_refused("tree_node[1] is 27");
 }
 
+// What cannot end well is told before a search begins, and what is lost before it is.
+TEST_F(Strangers_slow, WhatASearchOrASimulationReplacesIsToldFirst) {
+  const Result simulated = limber_program({"simulate", scene(), "-o", out(), "--duration", "0.01s"});
+  EXPECT_EQ(simulated.code, exit_done);
+  EXPECT_NE(simulated.err.find("is replaced when this ends: a plan of"), std::string::npos) << simulated.err;
+  EXPECT_EQ(limber_program({"plan", scene(), "-o", out()}).code, exit_done);
+  const Result other = limber_program({"plan", scene(), "-o", out(), "--resume", "--seed", "77"});
+  EXPECT_EQ(other.code, exit_bad_input);
+  EXPECT_NE(other.err.find("go on with --seed 1,"), std::string::npos) << other.err;
+  const Result beyond =
+      limber_program({"plan", scene(), "-o", out("p"), "--portfolio", "2", "--seed", "9007199254740992"});
+  EXPECT_EQ(beyond.code, exit_bad_input);
+  EXPECT_NE(beyond.err.find("its last seed would be beyond 9007199254740992"), std::string::npos)
+      << beyond.err;
+  fs::remove(file());
+  fs::create_directory(file());
+  for (const char* command : {"plan", "simulate"}) {
+    const Result refused = limber_program({command, scene(), "-o", out()});
+    EXPECT_EQ(refused.code, exit_bad_input) << refused.err;
+    EXPECT_NE(refused.err.find("is a folder"), std::string::npos) << refused.err;
+  }
+}
+
 // The whole file is of one piece, but of another world.
 TEST_F(Strangers_slow, StatesOfOtherBodiesAreRefused) {
   write([](plan::Plan& p) {
@@ -107,7 +130,7 @@ TEST_F(Strangers_slow, ATextWhereANumberBelongsIsRefused) {
            {"certificate.holds is a text", [](Json& j) { j["certificate"]["holds"] = "yes"; }},
            {"certificate is a whole number", [](Json& j) { j["certificate"] = 7; }},
            {"cpu_seconds.cage is a list", [](Json& j) { j["cpu_seconds"]["cage"] = Json::array(); }},
-           {"shells.count is a number", [](Json& j) { j["shells"]["count"] = 1e300; }},
+           {"cage.tets is a number", [](Json& j) { j["cage"]["tets"] = 1e300; }},
            {"contact.samples is nothing", [](Json& j) { j["contact"]["samples"] = nullptr; }},
            {"model is missing", [](Json& j) { j.erase("model"); }}}) {
     edited(report, change);

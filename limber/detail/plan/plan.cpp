@@ -204,18 +204,28 @@ scenes::Scene read_scene(const PlanOptions& options) {
 
 namespace {
 
+constexpr std::uint64_t largest_seed = std::uint64_t(1) << 53;  // whole numbers of JSON
+
+}  // namespace
+
 // Early enough to stop it.
 void tell_what_is_replaced(const fs::path& folder) {
-  if (!fs::exists(folder / "plan.npz")) return;
+  const fs::path file = folder / "plan.npz";
+  if (fs::is_directory(file))
+    throw InputError(
+        fmt::format("{}: is a folder, and the motion is to be written there; remove it, or name another work "
+                    "folder",
+                    file.string()));
+  if (!fs::exists(file)) return;
   try {
     const PlanFolder there = read_plan_folder(folder);
-    log::info("{}: is replaced when this search ends: a {} of {}, seed {}", (folder / "plan.npz").string(),
-              there.plan.simulation ? "simulation" : "plan", there.scene.name, there.plan.settings.seed);
+    log::info("{}: is replaced when this ends: a {} of {}{}", file.string(),
+              there.plan.simulation ? "simulation" : "plan", there.scene.name,
+              there.plan.simulation ? fmt::format(", {:.4g} s asked for", there.plan.simulation->duration_s)
+                                    : fmt::format(", seed {}", there.plan.settings.seed));
   } catch (const InputError&) {  // it is no plan
   }
 }
-
-}  // namespace
 
 KeptPlan plan(const PlanOptions& options) {
   const scenes::Scene scene = read_scene(options);
@@ -240,6 +250,10 @@ KeptPlan plan(const PlanOptions& options) {
 Found find_plan(const scenes::Scene& scene, const FemSystem& system, const PlanOptions& options,
                 std::optional<plan::Plan> earlier, const Json& earlier_summary) {
   const plan::Settings settings = settings_of(scene, options);
+  if (options.portfolio > 1 && settings.seed > largest_seed - std::uint64_t(options.portfolio - 1))
+    throw InputError(
+        fmt::format("--portfolio {} with --seed {}: its last seed would be beyond {}; take a smaller one",
+                    options.portfolio, settings.seed, largest_seed));
   std::optional<SearchLog> search_log;
   if (options.stats) search_log.emplace(*options.stats, earlier ? earlier->statistics.iterations : 0);
   std::optional<plan::PortfolioReport> searches;

@@ -47,6 +47,8 @@ KeptPlan keep_measured_plan(const fs::path& folder, const scenes::Scene&, const 
 scenes::Scene read_scene(const PlanOptions&);
 plan::Settings settings_of(const scenes::Scene&, const PlanOptions&);
 bool plan_is_up_to_date(const PlanOptions&, const scenes::Scene&);
+// Throws InputError where plan.npz cannot be written.
+void tell_what_is_replaced(const std::filesystem::path& folder);
 // Throws InputError, DiskError, and Interrupted once what was found by then is kept.
 KeptPlan plan(const PlanOptions&);
 // Of that scene, whatever is there.

@@ -9,6 +9,7 @@
 #include "core/temporary_files.h"
 #include "fem/observe.h"
 #include "limber/detail/plan/follow_plan.h"
+#include "limber/detail/plan/plan.h"
 #include "limber/detail/world/scene_world.h"
 #include "plan/simulation.h"
 #include "scenes/library.h"
@@ -132,6 +133,7 @@ KeptPlan simulate(const SimulateOptions& options) {
   const std::optional<OtherMotion> other = read_other_motion(options.from, options.frame);
   make_folder(options.out);
   const FolderLock lock(options.out, FolderLock::alone);
+  if (!options.resume) tell_what_is_replaced(options.out);
   remove_abandoned(options.out);
   const std::vector<PreparedBody> bodies =
       prepare_bodies(scene, options.scene.data, options.out, options.scene.store,

@@ -98,7 +98,8 @@ void check_simulation(const fs::path& folder, const PlanFolder& planned,
   if (simulation.steered)
     check_following(folder, planned, world, table);
   else
-    table.row("nothing acts but what the scene says", plan.trajectory.controls == std::vector{nothing}, "");
+    table.row("nothing acts but what the scene says", plan.trajectory.controls == std::vector{nothing},
+              planned.scene.script.text.empty() ? "" : "and its control file");
   const std::int64_t asked = plan::steps_of_simulation(system, simulation.duration_s);
   table.row("it lasts as long as was asked for",
             simulation.ending == plan::Simulation::whole && nothing.steps == asked,

@@ -101,6 +101,10 @@ Verified verify_plan(const fs::path& folder, const PlanFolder& planned,
     scene.folder = trusted->scene.folder;
   }
   const std::vector<fs::path> data = trusted ? trusted->data : std::vector<fs::path>{};
+  if (const scenes::ScriptText& script = scene.script; !script.text.empty())
+    table.measured("acts beside what the scene says",
+                   fmt::format("the control file {} (hash of its text {}); limber report shows it",
+                               script.name_for_messages, hex(hash_of(std::string_view(script.text)))));
   check_bodies(folder, scene, depth, table);
   for (const scenes::BodySpec& body : scene.scenery)
     check_origin(body.name, origin_of_scenery(scene, body, data, folder), trusted.has_value(), table);
