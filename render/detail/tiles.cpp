@@ -158,6 +158,11 @@ void Tiles::add_clipped(std::span<const Eigen::Vector4f> clip, std::span<const s
       add_triangle(v, part);
       continue;
     }
+    bool gone = false;  // all of it beyond one side, as most of what is behind the eye is
+    for (int side = 0; side < sides && !gone; ++side)
+      gone = above_side(clip[of[0]], side, wide) < 0 && above_side(clip[of[1]], side, wide) < 0 &&
+             above_side(clip[of[2]], side, wide) < 0;
+    if (gone) continue;
     polygon.clear();
     for (int i = 0; i < 3; ++i) {
       Eigen::VectorXf corner(4 + Eigen::Index(each));

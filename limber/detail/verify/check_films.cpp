@@ -236,9 +236,10 @@ void check_film(const fs::path& folder, const std::string& suffix, const Json& w
     wrong = fmt::format("{} frames are told of, and {} are here", entry.wanted - entry.failed, good.size());
   table.row(name + "manifest.json tells of this film", wrong.empty(), wrong);
   table.row(name + "each frame says that it shows what it should", bad.empty() && !good.empty(),
-            !bad.empty() ? fmt::format("{} do not; the first is {}; where all do not, another limber painted "
-                                       "them: render the film again",
-                                       bad.size(), first_bad_file(filming, bad[0]).string())
+            !bad.empty()
+                ? fmt::format("{} do not; the first is {}; where all do not, another limber may have painted "
+                              "them: render the film again",
+                              bad.size(), first_bad_file(filming, bad[0]).string())
             : good.empty() ? fmt::format("no frame is there, of {}", count)
                            : fmt::format("{} of {} frames", good.size(), count));
   if (!bad.empty() || good.empty()) return;
