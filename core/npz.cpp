@@ -445,9 +445,11 @@ struct NpzReader::Archive {
     if (bytes_ > 0) archive_ = zip_open_from_source(source, ZIP_RDONLY | ZIP_CHECKCONS, &error);
     if (!archive_) {
       zip_source_free(source);
-      refuse(bytes_ == 0 ? "is empty"
-                         : fmt::format("is not a whole .npz archive ({}); it may be cut short",
-                                       zip_error_strerror(&error)));
+      refuse(bytes_ == 0
+                 ? "is empty"
+                 : fmt::format("is not a whole .npz archive ({}); it may be cut short: copy it again, or "
+                               "make it anew",
+                               zip_error_strerror(&error)));
     }
     try {
       find_entries();

@@ -11,6 +11,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <optional>
 
 #include "core/error.h"
 #include "core/progress.h"
@@ -193,8 +194,13 @@ void run_batch(const System& system, const Settings& settings, std::span<Control
   double cheapest = std::numeric_limits<double>::infinity();  // in the race so far
   const bool stoppable = options.stoppable || nothing_to_keep();
   int max_steps = stoppable ? first_piece : std::numeric_limits<int>::max();
+  std::optional<std::chrono::steady_clock::time_point> stopped;
   while (true) {
-    if (stoppable) throw_if_stopped();
+    if (stoppable && stop_signal() != 0) {
+      const auto now = std::chrono::steady_clock::now();
+      if (!stopped) stopped = now;
+      if (now - *stopped >= std::chrono::duration<double>(options.grace_s)) throw_if_stopped();
+    }
     for (const Runner& runner : runners)
       if (options.race && runner.rests_in_goal()) cheapest = std::min(cheapest, runner.cost());
     going.clear();

@@ -57,8 +57,9 @@ struct ControlRolloutOptions {
   double most = std::numeric_limits<double>::infinity();
   bool race = false;
   // Throws Interrupted soon after a stop signal, as where there is nothing_to_keep(); else whoever calls has
-  // something to keep.
+  // something to keep. With a grace it goes on that long after the signal.
   bool stoppable = false;
+  double grace_s = 0;
   std::function<void(const State&)> on_progress = {};  // called with every frame that is kept
 };
 

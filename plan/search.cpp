@@ -17,6 +17,9 @@ namespace limber::plan {
 
 namespace {
 
+// What a stop signal ends is kept soon: the path to the nearest node if it takes no longer than this.
+constexpr double grace_s = 1;
+
 // At the root of a leg, with the system and settings of that leg: it may already lie in the leg's goal.
 void begin_leg(const System& system, const Settings& settings, Plan& plan) {
   const int root = plan.legs.back().root;
@@ -124,9 +127,15 @@ Plan plan(const System& system, const Settings& settings, std::optional<Plan> ea
       begin_leg(system.on_leg(leg + 1), settings_of_leg(settings, leg + 1), plan);
       continue;
     }
-    plan.trajectory = way && leg == 0
-                          ? std::move(*way)
-                          : trajectory_to(on_leg, of_leg, plan.tree, plan.best_node, plan.solved());
+    const auto to = [&](int node) { return trajectory_to(on_leg, of_leg, plan.tree, node, plan.solved()); };
+    if (way && leg == 0)
+      plan.trajectory = std::move(*way);
+    else if (plan.solved())
+      plan.trajectory = to(plan.best_node);
+    else if (auto nearest = trajectory_within(grace_s, on_leg, of_leg, plan.tree, plan.best_node))
+      plan.trajectory = std::move(*nearest);
+    else
+      plan.trajectory = to(0);
     return plan;
   }
 }

@@ -62,8 +62,10 @@ struct Plan {
   Ending ending = Ending::iterations;
   Statistics statistics;
   std::optional<Simulation> simulation;
-  bool measured = true;             // false: a signal came before what is told of its motion was worked out
-  Trajectory trajectory;            // to best_node, and with a settle when that is goal_node
+  bool measured = true;  // false: a signal came before what is told of its motion was worked out
+  // To best_node, and with a settle when that is goal_node. The start alone where a stop signal came and the
+  // path would have taken longer than a second.
+  Trajectory trajectory;
   std::optional<LeftOut> left_out;  // nothing: the tree is whole
   bool solved() const { return goal_node >= 0; }
   int leg() const { return int(legs.size()) - 1; }  // the last that began; its goal is the one sought

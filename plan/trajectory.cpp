@@ -67,16 +67,17 @@ bool comes_to_rest(const System& system, const Settings& s, const State& in_goal
   return course.result == ControlRollout::rests_in_goal;
 }
 
-Trajectory trajectory_to(const System& system, const Settings& s, const Tree& tree, int node, bool settle) {
+namespace {
+
+Trajectory trajectory_of_path(const System& system, const Settings& s, const Tree& tree, int node,
+                              ControlRolloutOptions options) {
   const std::vector<int> path = path_to(tree, node);
   ControlRollout course;
   course.from = system.start();
   for (std::size_t i = 1; i < path.size(); ++i)
     course.controls.push_back(tree.controls[std::size_t(path[i])]);
-  run(system, s, {&course, 1},
-      {.settle = settle ? ControlRolloutOptions::anywhere : ControlRolloutOptions::never,
-       .keep_frames = true,
-       .ask_acceptable = false});
+  options.keep_frames = true, options.ask_acceptable = false;
+  run(system, s, {&course, 1}, options);
   const std::vector<State>& states = course.states;
   LIMBER_CHECK(states.size() + 1 == path.size(), states.size(), path.size());
   for (std::size_t i = 0; i < states.size(); ++i) {
@@ -86,6 +87,22 @@ Trajectory trajectory_to(const System& system, const Settings& s, const Tree& tr
   Trajectory t = trajectory_of(std::move(course), s.frames_per_second);
   if (t.settle_steps > 0) t.controls.push_back(settle_control(s, t.settle_steps));
   return t;
+}
+
+}  // namespace
+
+Trajectory trajectory_to(const System& system, const Settings& s, const Tree& tree, int node, bool settle) {
+  return trajectory_of_path(
+      system, s, tree, node,
+      {.settle = settle ? ControlRolloutOptions::anywhere : ControlRolloutOptions::never});
+}
+
+std::optional<Trajectory> trajectory_within(double grace_s, const System& system, const Settings& s,
+                                            const Tree& tree, int node) try {
+  return trajectory_of_path(system, s, tree, node,
+                            {.settle = ControlRolloutOptions::never, .stoppable = true, .grace_s = grace_s});
+} catch (const Interrupted&) {
+  return std::nullopt;
 }
 
 }  // namespace limber::plan

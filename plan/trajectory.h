@@ -1,6 +1,7 @@
 // A way through the tree as it is simulated: controls from the start, and the states they lead to.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -34,5 +35,9 @@ bool comes_to_rest(const System&, const Settings&, const State& in_goal);
 // The simulated path to a node; `settle` adds interpolation towards the goal until the robot rests or the
 // settle's time is up. An InternalError when the simulation does not end in the node's very state.
 Trajectory trajectory_to(const System&, const Settings&, const Tree&, int node, bool settle);
+
+// The same without a settle, and after a stop signal for at most so long: nothing where that is too short.
+std::optional<Trajectory> trajectory_within(double grace_s, const System&, const Settings&, const Tree&,
+                                            int node);
 
 }  // namespace limber::plan

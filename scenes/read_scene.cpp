@@ -153,7 +153,13 @@ void require_plannable(const Scene& scene) {
 
 Scene read_scene_file(const fs::path& file, const std::vector<std::string>& sets, const fs::path& script) {
   ScriptText more;
-  if (!script.empty()) more = {read_file(script, max_scene_bytes), script.string()};
+  if (!script.empty()) {
+    if (!fs::exists(script) || fs::is_directory(script))
+      throw InputError(fmt::format("{}: {}; name a file with [[forces]], [[pressures]] or [[motions]]",
+                                   script.string(),
+                                   fs::exists(script) ? "is a folder" : "there is no such file"));
+    more = {read_file(script, max_scene_bytes), script.string()};
+  }
   Scene scene = read_scene(read_file(file, max_scene_bytes), file.string(), sets, more);
   scene.folder = fs::absolute(file).parent_path();
   return scene;

@@ -1,4 +1,6 @@
 // limber simulate: a scene left to itself, as a user meets it (docs/simulation.md).
+#include <gmock/gmock.h>
+
 #include <csignal>
 #include <thread>
 
@@ -513,6 +515,37 @@ TEST_F(Simulate_slow, WrongInputsSayWhatAndWhere) {
   refused(run(stranger, "out", {"--from", out("short"), "--control", lift}),
           "there cube can be pushed, and here dice");
   refused(run(thrown, "nothing", {"--resume"}), "there is none to go on from");
+}
+
+// It is taken, with a word; a force that acts in the last step, and a lift that stays in the bounds, without.
+TEST_F(Simulate_slow, WhatNeverActsAndWhatLeavesTheBoundsIsTold) {
+  const auto told = [&](const std::string& script, std::vector<std::string> more = {}) {
+    more.insert(more.end(), {"--duration", "0.5", "--control", file("c.toml", script)});
+    const Result result = run(thrown, "out", std::move(more));
+    EXPECT_EQ(result.code, exit_done) << result.err;
+    return result.err;
+  };
+  const auto force = [](const char* from_s, const char* to_s) {
+    return fmt::format("[[forces]]\nbody = \"cube\"\nfrom_s = {}\nto_s = {}\nforce_n = [0, 0, 1]\n", from_s,
+                       to_s);
+  };
+  const auto rises_to = [](double z_m) {
+    return fmt::format(
+        "[[motions]]\nbody = \"plate\"\nkeyframes = [{{ at_s = 4, position_m = [1.9, 1, {}] }}]\n", z_m);
+  };
+  using testing::HasSubstr, testing::Not;
+  EXPECT_THAT(told(force("0.5", "1")), HasSubstr("c.toml:1:1: a force on cube acts from 0.5 s to 1 s"));
+  EXPECT_THAT(told(force("0.1", "0.100001")), HasSubstr("c.toml:1:1: a force on cube acts from 0.1 s"));
+  EXPECT_THAT(told("[[pressures]]\nbody = \"cube\"\nfrom_s = 1\nto_s = 2\npressure_pa = 5\n"),
+              HasSubstr("c.toml:1:1: a pressure in cube acts from 1 s to 2 s"));
+  EXPECT_THAT(told(force("0", "1")), Not(HasSubstr("c.toml")));
+  EXPECT_THAT(told(force("0.49", "1")), Not(HasSubstr("c.toml")));
+  // The room ends at 4 m, half of the plate's 0.2 m above its middle.
+  EXPECT_THAT(told(rises_to(5)), HasSubstr("c.toml:1:1: the keyframe at 4 s takes plate 1.1"));
+  EXPECT_THAT(told(rises_to(3.5)), Not(HasSubstr("c.toml")));
+  simulate(thrown, "before", {"--duration", "0.5"});
+  EXPECT_THAT(told(force("0", "0.2"), {"--from", out("before"), "--frame", "9"}),
+              HasSubstr("and the motion begins at 0.4"));
 }
 
 // In its own world the plan comes out again, bit for bit; in another, where its controls alone go astray, the

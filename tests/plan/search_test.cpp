@@ -269,13 +269,36 @@ TEST(Search, ASignalKeepsWhatIsFinished) {
     ASSERT_LE(stopped.statistics.iterations, 60);
     EXPECT_EQ(limber::hash_of(stopped.trajectory.end),
               limber::hash_of(stopped.tree.states[std::size_t(stopped.best_node)]));
-    // It is a prefix of the whole, and goes on to the whole.
+    // It is a prefix of the whole, and goes on to the whole, also without its path.
     toy.before_each_rollout = nullptr;
     const Plan whole = plan(toy, toy_settings());
-    const Plan resumed = plan(toy, toy_settings(), stopped);
-    EXPECT_EQ(hash_of(resumed.tree), hash_of(whole.tree));
-    EXPECT_EQ(hash_of(resumed.trajectory), hash_of(whole.trajectory));
+    Plan without_path = stopped;
+    without_path.trajectory = trajectory_to(toy, toy_settings(), stopped.tree, 0, false);
+    for (const Plan& plan_so_far : {stopped, without_path}) {
+      const Plan resumed = plan(toy, toy_settings(), plan_so_far);
+      EXPECT_EQ(hash_of(resumed.tree), hash_of(whole.tree));
+      EXPECT_EQ(hash_of(resumed.trajectory), hash_of(whole.trajectory));
+    }
   }
+}
+
+TEST(Search, AStopSignalLeavesOutAPathThatTakesLonger) {
+  Toy toy(1, true, false, 99);
+  Settings s = toy_settings();
+  s.max_iterations = 40;
+  const Plan p = plan(toy, s);
+  ASSERT_GT(p.best_node, 0);
+  const std::uint64_t whole = hash_of(p.trajectory);
+  const auto path_within = [&](double grace_s) {
+    return trajectory_within(grace_s, toy, s, p.tree, p.best_node);
+  };
+  ASSERT_TRUE(path_within(0));
+  EXPECT_EQ(hash_of(*path_within(0)), whole);
+  request_stop(SIGINT);
+  EXPECT_FALSE(path_within(0));
+  ASSERT_TRUE(path_within(1e9));
+  EXPECT_EQ(hash_of(*path_within(1e9)), whole);
+  request_stop(0);
 }
 
 TEST(Search, InterruptedAndResumedEqualsUninterrupted) {

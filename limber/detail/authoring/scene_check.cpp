@@ -19,6 +19,7 @@
 #include "limber/detail/film/start.h"
 #include "limber/detail/plan/diagnosis.h"
 #include "limber/detail/plan/plan.h"
+#include "limber/detail/world/script_doubts.h"
 #include "meshing/surface_overlap.h"
 #include "render/film.h"
 #include "scenes/library.h"
@@ -286,6 +287,9 @@ class Check {
     StartFindings& found = found_.start.emplace();
     found.prepared = start->prepared;
     if (start->step_known) found.dt_s = start->world.dt_s;
+    if (start->prepared)
+      for (std::string& doubt : doubts_of_script(scene_, start->world))
+        found_.warnings.push_back(std::move(doubt));
     const bool can_be_planned = scene_.lacks.empty();
     if (can_be_planned && start->prepared)
       try_search(*start);

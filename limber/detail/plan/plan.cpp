@@ -17,6 +17,7 @@
 #include "limber/detail/world/analysis.h"
 #include "limber/detail/world/fem_system.h"
 #include "limber/detail/world/scene_world.h"
+#include "limber/detail/world/script_doubts.h"
 #include "plan/timings.h"
 #include "scenes/library.h"
 
@@ -302,6 +303,7 @@ KeptPlan plan(const PlanOptions& options, const scenes::Scene& scene) {
   const Beginning beginning = beginning_of(other, options.out, scene, world);
   const FemSystem system(world, bodies, goal_rules_of(scene), beginning.start);
   system.surfaces()->require_apart(system.start(), true);
+  for (const std::string& doubt : doubts_of_script(scene, world)) log::warn("{}", doubt);
   const fs::path file = options.out / "plan.npz";
   if (options.portfolio > 1 && (options.resume || options.stats))
     throw InputError(fmt::format("--portfolio is of several searches, {} of one; leave one of the two out",
@@ -341,7 +343,9 @@ KeptPlan plan(const PlanOptions& options, const scenes::Scene& scene) {
       keep_plan(options.out, scene, bodies, world, system, plan, found.extra, options.keep_tree == "path");
   kept.also_done = std::move(found.also_done);
   if (stop_signal() != 0) {
-    log::info("{}: the plan so far is kept; go on with --resume", file.string());
+    const bool all = !plan.trajectory.controls.empty() || plan.best_node == 0;
+    log::info("{}: the plan so far is kept{}; go on with --resume", file.string(),
+              all ? "" : ", but for the path to its nearest node, which takes longer to simulate");
     throw_if_stopped();
   }
   return kept;

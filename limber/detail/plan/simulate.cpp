@@ -11,6 +11,7 @@
 #include "limber/detail/plan/follow_plan.h"
 #include "limber/detail/plan/plan.h"
 #include "limber/detail/world/scene_world.h"
+#include "limber/detail/world/script_doubts.h"
 #include "plan/simulation.h"
 #include "scenes/library.h"
 
@@ -146,6 +147,9 @@ KeptPlan simulate(const SimulateOptions& options) {
   std::optional<FollowedPlan> followed;
   if (!options.follow.empty()) followed.emplace(options.follow, scene, world);
   const double duration_s = options.duration_s.value_or(followed ? followed->duration_s() : 5);
+  const double begins_s = fem::time_s(world, system.start());
+  for (const std::string& doubt : doubts_of_script(scene, world, begins_s, begins_s + duration_s))
+    log::warn("{}", doubt);
   const fs::path file = options.out / "plan.npz";
 
   std::optional<plan::Plan> earlier;
