@@ -190,6 +190,48 @@ SurfaceMesh cap_of(const Points& positions, const Triangles& triangles, const Ei
   return cap;
 }
 
+SurfaceMesh clipped(SurfaceMesh mesh, std::span<const Eigen::Vector4d> planes) {
+  for (const Eigen::Vector4d& plane : planes) {
+    const Eigen::VectorXd height = (mesh.positions * plane.head<3>()).array() + plane[3];
+    if (height.size() == 0 || height.minCoeff() >= 0) continue;
+    std::vector<Vec3> points;
+    std::vector<int> point_of_vertex(std::size_t(height.size()), -1);
+    std::unordered_map<std::uint64_t, int> point_of_edge;
+    const auto kept = [&](int v) {
+      int& point = point_of_vertex[std::size_t(v)];
+      if (point < 0) point = int(points.size()), points.push_back(mesh.positions.row(v));
+      return point;
+    };
+    const auto point_on = [&](int a, int b) {
+      const auto [at, fresh] = point_of_edge.try_emplace(key_of(a, b), int(points.size()));
+      if (fresh) {
+        if (a > b) std::swap(a, b);
+        const double share = height[a] / (height[a] - height[b]);
+        points.push_back(mesh.positions.row(a) + share * (mesh.positions.row(b) - mesh.positions.row(a)));
+      }
+      return at->second;
+    };
+    std::vector<std::array<int, 3>> made;
+    for (const auto t : mesh.triangles.rowwise()) {
+      std::array<int, 4> corner;
+      int corners = 0;
+      for (int i = 0; i < 3; ++i) {
+        const int a = t[i], b = t[(i + 1) % 3];
+        if (height[a] >= 0) corner[std::size_t(corners++)] = kept(a);
+        if ((height[a] >= 0) != (height[b] >= 0)) corner[std::size_t(corners++)] = point_on(a, b);
+      }
+      for (int i = 2; i < corners; ++i)
+        made.push_back({corner[0], corner[std::size_t(i - 1)], corner[std::size_t(i)]});
+    }
+    mesh = {Points(Eigen::Index(points.size()), 3), Triangles(Eigen::Index(made.size()), 3)};
+    for (std::size_t p = 0; p < points.size(); ++p)
+      mesh.positions.row(Eigen::Index(p)) = points[p].transpose();
+    for (std::size_t t = 0; t < made.size(); ++t)
+      mesh.triangles.row(Eigen::Index(t)) << made[t][0], made[t][1], made[t][2];
+  }
+  return mesh;
+}
+
 Points rim_of(const SurfaceMesh& mesh) {
   std::map<std::pair<int, int>, int> triangles_of_edge;
   for (Eigen::Index t = 0; t < mesh.triangles.rows(); ++t)

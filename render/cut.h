@@ -16,6 +16,9 @@ bool has_inside(const Triangles&);
 // side n·p + d < 0 and share their vertices along common edges. Empty where the plane misses the surface.
 SurfaceMesh cap_of(const Points&, const Triangles&, const Eigen::Vector4d& plane);
 
+// What of it has n·p + d ≥ 0 for each of the planes. Triangles are cut, and share their vertices as before.
+SurfaceMesh clipped(SurfaceMesh, std::span<const Eigen::Vector4d> planes);
+
 // Its rim: the edges that one triangle has, row 2i to row 2i + 1.
 Points rim_of(const SurfaceMesh&);
 

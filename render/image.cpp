@@ -13,8 +13,6 @@ namespace limber::render {
 
 namespace {
 
-constexpr double knee = 0.7;
-
 std::uint8_t level(double srgb) { return std::uint8_t(std::lround(255 * std::clamp(srgb, 0.0, 1.0))); }
 
 // Sign, exponent and the upper 13 bits of the mantissa pick the entry, so its value is right to 1/16384.
@@ -73,10 +71,13 @@ Vec3 linear_from_srgb(const Vec3& color) {
 }
 
 double tone_mapped(double linear) {
-  return linear <= knee ? linear : 1 - (1 - knee) * std::exp((knee - linear) / (1 - knee));
+  return linear <= tone_knee ? linear
+                             : 1 - (1 - tone_knee) * std::exp((tone_knee - linear) / (1 - tone_knee));
 }
 double tone_unmapped(double shown) {
-  return shown <= knee ? shown : knee - (1 - knee) * std::log((1 - std::min(shown, 0.9999)) / (1 - knee));
+  return shown <= tone_knee
+             ? shown
+             : tone_knee - (1 - tone_knee) * std::log((1 - std::min(shown, 0.9999)) / (1 - tone_knee));
 }
 
 namespace {

@@ -43,6 +43,7 @@ double linear_from_srgb(double);
 Vec3 linear_from_srgb(const Vec3&);
 
 // Identity up to 0.7, so that a body under full light keeps its colour; above, an exponential shoulder to 1.
+constexpr double tone_knee = 0.7;  // up to here it is the identity
 double tone_mapped(double linear);
 double tone_unmapped(double shown);  // inverse, for colours that must come out as they were asked for; < 1
 

@@ -33,6 +33,7 @@ namespace {
 
 constexpr double cap_shade = 0.86, rim_shade = 0.6;  // of the mesh's color, sRGB
 constexpr double rim_px = 1.6;
+constexpr double cap_step = 5e-5;  // of the farthest that is seen
 
 // ---- what is asked for, checked ----
 
@@ -186,7 +187,6 @@ void Renderer::Impl::draw(const Camera& from, const RowReader& read, Passes* pas
   render::validate(from);
   context.make_current();
   remove_caps();  // of a picture that failed
-  add_caps();
   double before = times ? cpu_seconds() : 0;
   const auto done = [&](double StageTimes::*stage) {
     if (!times) return;
@@ -195,6 +195,7 @@ void Renderer::Impl::draw(const Camera& from, const RowReader& read, Passes* pas
     times->*stage += now - std::exchange(before, now);
   };
   look_through(from);
+  add_caps();
   draw_shadow_map();
   done(&StageTimes::shadow_map_s);
   shade_ground_maps();
@@ -354,33 +355,65 @@ void Renderer::set_clip_planes(int number, const std::vector<Plane>& planes) {
   mesh.solid = has_inside(mesh.triangles);
 }
 
-// A cap is a mesh of the frame, cut by the other planes; in passes it is of the mesh that it closes. Casters
-// that are not seen cast by their far sides alone, and the cap of what they stand in for is seen.
+namespace {
+
+struct Cap {
+  std::size_t mesh;
+  Plane plane;
+  SurfaceMesh face;
+  double area_m2;
+};
+
+// Caps of several meshes in one plane lie in one another: where one mesh is inside another, its own is to be
+// seen. That is the smaller one, so each stands before all larger ones of its plane, by a little that
+// depths can tell apart.
+void put_smaller_before_larger(std::vector<Cap>& caps, double step_m) {
+  std::stable_sort(caps.begin(), caps.end(),
+                   [](const Cap& a, const Cap& b) { return a.area_m2 > b.area_m2; });
+  for (std::size_t c = 0; c < caps.size(); ++c) {
+    const Plane& plane = caps[c].plane;
+    const auto larger = std::count_if(caps.begin(), caps.begin() + std::ptrdiff_t(c), [&](const Cap& other) {
+      return (other.plane - plane).cwiseAbs().maxCoeff() <= 1e-9 * (1 + plane.cwiseAbs().maxCoeff());
+    });
+    caps[c].face.positions.rowwise() -= double(larger) * step_m * plane.head<3>().transpose();
+  }
+}
+
+}  // namespace
+
+// A cap is a mesh of the frame; in passes it is of the mesh that it closes. Casters that are not seen cast by
+// their far sides alone, and the cap of what they stand in for is seen.
 void Renderer::Impl::add_caps() {
-  for (std::size_t m = 0, count = meshes.size(); m < count; ++m) {
+  std::vector<Cap> faces;
+  for (std::size_t m = 0; m < meshes.size(); ++m) {
     if (meshes[m].planes.empty() || !*meshes[m].solid || !meshes[m].drawn()) continue;
     const Points positions = meshes[m].card.positions();
     for (std::size_t i = 0; i < meshes[m].planes.size(); ++i) {
-      const SurfaceMesh cap = cap_of(positions, meshes[m].triangles, meshes[m].planes[i]);
-      if (cap.triangles.rows() == 0) continue;
-      MeshLook look = meshes[m].look;
-      look.color_srgb *= cap_shade;
-      look.roughness = std::max(look.roughness, 0.7), look.metallic = look.sheen = 0;
-      look.grain = look.translucency = 0;
-      look.edges.reset();
-      Mesh made{look, GpuMesh(cap.triangles, cap.positions, 180)};
-      made.number = meshes[m].number;
-      made.planes = meshes[m].planes;
-      made.planes.erase(made.planes.begin() + std::ptrdiff_t(i));
-      made.solid = true;
-      meshes.push_back(std::move(made));
-      ++caps;
-      if (look.opacity == 1) continue;  // a transparent surface's is hardly seen without its rim
-      lines.push_back(
-          {{.color_srgb = rim_shade * meshes[m].look.color_srgb, .width_px = rim_px, .opacity = 0.9},
-           rim_of(cap)});
-      ++rims;
+      std::vector<Plane> others = meshes[m].planes;
+      others.erase(others.begin() + std::ptrdiff_t(i));
+      const Plane& plane = meshes[m].planes[i];
+      SurfaceMesh face = clipped(cap_of(positions, meshes[m].triangles, plane), others);
+      if (face.triangles.rows() == 0) continue;
+      const double area_m2 = area(face);
+      faces.push_back({m, plane, std::move(face), area_m2});
     }
+  }
+  put_smaller_before_larger(faces, cap_step * far_m);
+  for (const Cap& cap : faces) {
+    MeshLook look = meshes[cap.mesh].look;
+    const Vec3 rim_color = rim_shade * look.color_srgb;
+    look.color_srgb *= cap_shade;
+    look.roughness = std::max(look.roughness, 0.7), look.metallic = look.sheen = 0;
+    look.grain = look.translucency = 0;
+    look.edges.reset();
+    Mesh made{look, GpuMesh(cap.face.triangles, cap.face.positions, 180)};
+    made.number = meshes[cap.mesh].number;
+    made.solid = true;
+    meshes.push_back(std::move(made));
+    ++caps;
+    if (look.opacity == 1) continue;  // a transparent surface's is hardly seen without its rim
+    lines.push_back({{.color_srgb = rim_color, .width_px = rim_px, .opacity = 0.9}, rim_of(cap.face)});
+    ++rims;
   }
 }
 

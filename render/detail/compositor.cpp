@@ -1,6 +1,6 @@
 // A row of the picture: samples averaged, then put over what is behind them.
 //
-//     pixel = Σ samples / n + (1 − α) × behind,
+//     pixel = Σ samples / n + (1 − α) × behind,           (over(): as it is shown, where that is bright)
 //     behind = floor faded into the far ground, hazed into the horizon; or sky; or two colours of a
 //     background.
 //
@@ -19,6 +19,8 @@
 #include <cmath>
 #include <cstring>
 #include <numbers>
+
+#include "render/image.h"
 
 namespace limber::render::detail {
 
@@ -60,6 +62,22 @@ bool any(Words mask) {
 // Not Eigen's, which begins with an estimate that differs between makes of CPU.
 Floats root(const Floats& x) {
   return Floats{std::sqrt(x[0]), std::sqrt(x[1]), std::sqrt(x[2]), std::sqrt(x[3])};
+}
+
+// What is behind, laid under a pixel of which `open` is free. What the tone map compresses is mixed as it is
+// shown: its inverse of white is huge, and a half covered pixel before white would be white.
+constexpr float knee = float(tone_knee);
+Floats over(Floats drawn, float open, Floats behind) {
+  const Floats linear = drawn + open * behind;
+  if (open >= 1 || !any(Words(behind > knee))) return linear;
+  Floats mixed = linear;
+  for (int c = 0; c < 3; ++c) {
+    if (!(behind[c] > knee)) continue;
+    const double shown = tone_mapped(double(drawn[c] + open * knee)) +
+                         double(open) * (tone_mapped(double(behind[c])) - tone_knee);
+    mixed[c] = float(tone_unmapped(shown));
+  }
+  return mixed;
 }
 
 Floats colour(const Vec3& rgb) { return Floats{float(rgb.x()), float(rgb.y()), float(rgb.z()), 0}; }
@@ -202,12 +220,12 @@ void Compositor::put_over_ground(int y, float* rgba) const {
       if (b.transparent)
         pixel_rgba[3] += open * shown[i] * std::max(shade[1], 0.0f);
       else if (!b.ground_seen)
-        pixel_rgba += open * upright;
+        pixel_rgba = over(pixel_rgba, open, upright);
       else if (down[i] > 1e-6f) {
         const Floats floor = far_ground + shown[i] * (ground - ground * shade - far_ground);
-        pixel_rgba += open * (floor + haze[i] * (bottom - floor));
+        pixel_rgba = over(pixel_rgba, open, floor + haze[i] * (bottom - floor));
       } else
-        pixel_rgba += open * (bottom + std::min(rise[i] * sky_rise, 1.0f) * (top - bottom));
+        pixel_rgba = over(pixel_rgba, open, bottom + std::min(rise[i] * sky_rise, 1.0f) * (top - bottom));
       std::memcpy(block + 4 * i, &pixel_rgba, sizeof pixel_rgba);
     }
   }

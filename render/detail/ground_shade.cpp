@@ -57,8 +57,10 @@ struct Corner {
   double height;  // in units of band 0
 };
 
-// Cells whose centre the triangle covers, either way round.
-void rasterize(const std::array<Corner, 3>& c, float blocks, Raster& raster) {
+// Cells whose centre the triangle covers, either way round. `above`: how far above each plane that cuts it
+// the corners are.
+void rasterize(const std::array<Corner, 3>& c, std::span<const Eigen::Vector3d> above, float blocks,
+               Raster& raster) {
   const auto [u0, u1] = std::minmax({c[0].u, c[1].u, c[2].u});
   const auto [v0, v1] = std::minmax({c[0].v, c[1].v, c[2].v});
   const int left = std::max(0, int(std::ceil(u0 - 0.5))),
@@ -74,6 +76,10 @@ void rasterize(const std::array<Corner, 3>& c, float blocks, Raster& raster) {
       const double w1 = ((u - c[0].u) * (c[2].v - c[0].v) - (c[2].u - c[0].u) * (v - c[0].v)) / area;
       const double w2 = ((c[1].u - c[0].u) * (v - c[0].v) - (u - c[0].u) * (c[1].v - c[0].v)) / area;
       if (w1 < 0 || w2 < 0 || w1 + w2 > 1) continue;
+      const Eigen::Vector3d weights(1 - w1 - w2, w1, w2);
+      if (std::any_of(above.begin(), above.end(),
+                      [&](const Eigen::Vector3d& heights) { return heights.dot(weights) < 0; }))
+        continue;
       raster.mark(column, row,
                   c[0].height + w1 * (c[1].height - c[0].height) + w2 * (c[2].height - c[0].height), blocks);
     }
@@ -180,18 +186,16 @@ ShadeMap shade_ground(std::span<const GroundCaster> casters, const GroundFrame& 
       const Eigen::Vector2d at = (onto_ground(p) - map.lower) / map.cell_m;
       corners[v] = {at.x(), at.y(), height(p) / band_0_m};
     }
-    const auto is_cut = [&, mesh = mesh, planes = planes](std::size_t c) {
-      Vec3 middle = Vec3::Zero();
-      for (std::size_t i = 0; i < 3; ++i)
-        for (std::size_t k = 0; k < 3; ++k)
-          middle[int(k)] += mesh->positions[3 * mesh->corners[c + i] + k] / 3;
-      return std::any_of(planes.begin(), planes.end(),
-                         [&](const Eigen::Vector4d& plane) { return plane.dot(middle.homogeneous()) < 0; });
-    };
-    for (std::size_t c = 0; c < mesh->corners.size(); c += 3)
-      if (planes.empty() || !is_cut(c))
-        rasterize({corners[mesh->corners[c]], corners[mesh->corners[c + 1]], corners[mesh->corners[c + 2]]},
-                  blocks, raster);
+    std::vector<Eigen::Vector3d> above(planes.size());
+    for (std::size_t c = 0; c < mesh->corners.size(); c += 3) {
+      for (std::size_t i = 0; i < 3 && !planes.empty(); ++i) {
+        const float* p = &mesh->positions[3 * mesh->corners[c + i]];
+        for (std::size_t k = 0; k < planes.size(); ++k)
+          above[k][int(i)] = planes[k].dot(Eigen::Vector4d(p[0], p[1], p[2], 1));
+      }
+      rasterize({corners[mesh->corners[c]], corners[mesh->corners[c + 1]], corners[mesh->corners[c + 2]]},
+                above, blocks, raster);
+    }
   }
 
   map.blocked.assign(std::size_t(map.columns) * map.rows, 0.0f);

@@ -60,9 +60,6 @@ out float gl_ClipDistance[PLANES];
 centroid
 #endif
 out vec3 position, normal, shadow_place;
-#ifdef TRANSPARENT
-noperspective centroid out float depth;
-#endif
 void main() {
   position = position_in;
   normal = normal_in;
@@ -70,9 +67,6 @@ void main() {
   vec3 offset = shadow_offset_m * (dot(normal_in, toward_key) < 0.0 ? -normal_in : normal_in);
   shadow_place = (shadow_from_world * vec4(position_in + offset, 1.0)).xyz;
   gl_Position = clip_from_world * vec4(position_in, 1.0);
-#ifdef TRANSPARENT
-  depth = 0.5 + 0.5 * gl_Position.z / gl_Position.w;
-#endif
 #ifdef TINTED
   tint = tint_in;
 #endif
@@ -102,8 +96,14 @@ centroid                         // a pixel is shaded once, where the triangle c
 #endif
 in vec3 position, normal, shadow_place;
 #ifdef TRANSPARENT
-noperspective centroid in float depth;  // beyond the triangle, a far side would come before its near one along an outline
-uniform float stand_back;               // as glPolygonOffset's factor
+uniform float stand_back;        // as glPolygonOffset's factor
+uniform mat4 clip_from_world;
+// Of the centroid: beyond the triangle, a far side would come before its near one along an outline. Not handed over:
+// what is noperspective is lost where Mesa 22.3 clips a triangle by several sides.
+float depth() {
+  vec4 clip = clip_from_world * vec4(position, 1.0);
+  return 0.5 + 0.5 * clip.z / clip.w;
+}
 #endif
 #ifdef TINTED
 #ifdef TRANSPARENT
@@ -374,7 +374,7 @@ void main() {
   put(ivec2(gl_FragCoord.xy), 1u, vec4(light * covered, covered), gl_FragCoord.z);
 #else
   uint samples = seen();
-  if (samples != 0u) put(ivec2(gl_FragCoord.xy), samples, vec4(light * covered, covered), depth + stand_back * fwidth(gl_FragCoord.z));
+  if (samples != 0u) put(ivec2(gl_FragCoord.xy), samples, vec4(light * covered, covered), depth() + stand_back * fwidth(gl_FragCoord.z));
 #endif
 #else
   color = vec4(light, 1.0);

@@ -8,6 +8,7 @@
 #include <numbers>
 
 #include "render/camera.h"
+#include "render/image.h"
 
 namespace limber::render::detail {
 namespace {
@@ -99,6 +100,32 @@ TEST_F(FinishTest, APixelIsTheMeanOfItsSamplesOverTheBackground) {
     EXPECT_NEAR(lower[8 + c], 0.75 * background + (c == 0 ? 0.25 : 0), 1e-6);
   }
   EXPECT_EQ(lower[11], 0.25f);
+}
+
+// Half a pixel of black before a background is shown half as bright in linear light, also before white, of
+// which the tone map's inverse is huge; and a background that is a little brighter changes a pixel by no more
+// than its own change.
+TEST_F(FinishTest, WhatIsHalfCoveredIsMixedAsItIsShown) {
+  const auto shown = [&](double background, std::uint16_t red, std::uint16_t alpha) {
+    backdrop.background_top = backdrop.background_bottom = Vec3::Constant(tone_unmapped(background));
+    return tone_mapped(double(row({red, 0, 0, alpha}, 1, 1, 1, 0)[0]));
+  };
+  constexpr std::uint16_t half_half = 0x3800, half_quarter = 0x3400;
+  for (const double background : {0.3, 0.7, 0.9, 0.9999}) {
+    EXPECT_NEAR(shown(background, 0, half_half), 0.5 * background, 1e-6) << background;
+    EXPECT_NEAR(shown(background, 0, half_quarter), 0.75 * background, 1e-6) << background;
+    EXPECT_NEAR(shown(background, 0, 0), background, 1e-6);
+    EXPECT_EQ(shown(background, half_third, half_one), tone_mapped(value_of_half(half_third)));
+  }
+  for (const std::uint16_t red : {std::uint16_t(0), half_third, half_two})
+    for (const std::uint16_t alpha : {half_quarter, half_half}) {
+      constexpr double step = 1.0 / 512;
+      for (double background = 0.5; background + step < 1; background += step) {
+        const double more = shown(background + step, red, alpha) - shown(background, red, alpha);
+        EXPECT_GE(more, -1e-6) << background;
+        EXPECT_LE(more, 1.01 * step) << background;
+      }
+    }
 }
 
 TEST_F(FinishTest, TheGroundIsLitAndFadesByWhereARayMeetsIt) {

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <map>
 
 #include "core/random.h"
@@ -89,6 +90,39 @@ TEST(Cut, PiecesThatOverlapAreOneAndHollowsStayHollow) {
   EXPECT_NEAR(cap_area(both(cube, within), middle), 1, 1e-12);
   EXPECT_NEAR(cap_area(both(cube, inside_out(within)), middle), 0.75, 1e-12);
   EXPECT_NEAR(cap_area(inside_out(cube), middle), 1, 1e-12);
+}
+
+// With what is on the other side it is the whole surface; its rim is that of the cap; and it still is one
+// surface: its pieces share their vertices.
+TEST(Cut, WhatIsClippedIsOnThisSideOfAllPlanes) {
+  const SurfaceMesh ring = torus(50, 20);
+  const auto length_of = [](const Points& ends) {
+    double length = 0;
+    for (Eigen::Index i = 0; i < ends.rows(); i += 2) length += (ends.row(i + 1) - ends.row(i)).norm();
+    return length;
+  };
+  for (std::uint64_t round = 0; round < 30; ++round) {
+    Rng random(12, round);
+    const Eigen::Vector4d one = plane_at(random.direction(), 0.5 * random.direction()),
+                          other = plane_at(random.direction(), 0.5 * random.direction());
+    const SurfaceMesh this_side = clipped(ring, std::array{one}),
+                      that_side = clipped(ring, std::array<Eigen::Vector4d, 1>{-one});
+    EXPECT_NEAR(area(this_side) + area(that_side), area(ring), 1e-9);
+    EXPECT_GE(((this_side.positions * one.head<3>()).array() + one[3]).minCoeff(), -1e-12);
+    EXPECT_NEAR(length_of(rim_of(this_side)), length_of(rim_of(cap_of(ring.positions, ring.triangles, one))),
+                1e-9);
+    double quarters = 0;
+    for (const double a : {1, -1})
+      for (const double b : {1, -1}) {
+        const SurfaceMesh quarter = clipped(ring, std::array<Eigen::Vector4d, 2>{a * one, b * other});
+        quarters += area(quarter);
+        EXPECT_NEAR(area(quarter), area(clipped(ring, std::array<Eigen::Vector4d, 2>{b * other, a * one})),
+                    1e-9);
+      }
+    EXPECT_NEAR(quarters, area(ring), 1e-9);
+  }
+  EXPECT_EQ(clipped(ring, std::array{plane_at({0, 0, 1}, {0, 0, 5})}).triangles.rows(), 0);
+  EXPECT_EQ(clipped(ring, std::array{plane_at({0, 0, 1}, {0, 0, -5})}).positions, ring.positions);
 }
 
 // Through vertices, along edges and in faces: of each side together the plane's share of the box is filled at

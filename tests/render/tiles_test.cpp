@@ -372,6 +372,29 @@ TEST(TileLight, ThatReachesBehindTheEyeIsThatOfTheShader) {
   }
 }
 
+// A pane of two triangles a side, each of which several sides of the picture cut.
+TEST(TileLight, APaneThatIsLargerThanThePictureIsThatOfTheShader) {
+  RenderSettings settings;
+  settings.width = 320, settings.height = 180;
+  const SurfaceMesh ball = sphere_mesh({0, 0.5, 0}, 0.4, 24),
+                    pane = box_mesh({-3, -1.025, -3}, {3, -0.975, 3});
+  Image8 pictures[2];
+  for (const bool tiles : {true, false}) {
+    settings.tiles = tiles;
+    Renderer renderer(settings);
+    renderer.add_mesh(ball.triangles, ball.positions, {.color_srgb = {0.8, 0.3, 0.2}});
+    renderer.add_mesh(pane.triangles, pane.positions, {.color_srgb = {0.2, 0.7, 0.4}, .opacity = 0.5});
+    Camera camera;
+    camera.eye = Vec3(0, -7, 1), camera.target = Vec3(0, 0, 0), camera.fov_deg = 25;
+    pictures[tiles] = renderer.draw_shown(camera);
+  }
+  EXPECT_LT(apart(pictures[0], pictures[1]), 1);
+  for (const auto& [x, y] : {std::pair(3, 3), {316, 3}, {3, 176}, {316, 176}}) {
+    const std::uint8_t* p = &pictures[0].rgb[3 * std::size_t(y * settings.width + x)];
+    EXPECT_GT(p[1], p[0] + 20) << x << ' ' << y;
+  }
+}
+
 // What a picture leaves in the targets is not seen in the next.
 TEST(TileLight, AMotionLeavesNoTrace) {
   RenderSettings settings;

@@ -30,7 +30,7 @@ struct Output {
   bool occlusion = true;            // what cages hide of one another's sky; false where none are made yet
 };
 // Raised when the same film comes out otherwise, so that it is painted anew (a test holds one by the other).
-inline constexpr int picture_generation = 15;
+inline constexpr int picture_generation = 16;
 
 struct Picture {
   std::variant<render::Image8, render::Raster8, render::Raster16> frame;
