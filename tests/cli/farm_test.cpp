@@ -145,6 +145,14 @@ class Farm : public Program {
     }
     return found;
   }
+  // Whether a process lives whose command names this folder.
+  static bool anyone_works_on(const std::string& folder) {
+    return std::ranges::any_of(fs::directory_iterator("/proc"), [&](const fs::directory_entry& entry) {
+      std::ifstream file(entry.path() / "cmdline");
+      return std::string(std::istreambuf_iterator<char>(file), {}).find(folder) != std::string::npos;
+    });
+  }
+
   template <class Condition>
   static bool soon(const Condition& holds) {
     for (int tries = 0; tries < 12000; ++tries, ::usleep(5000))
@@ -378,6 +386,7 @@ TEST_F(Farm_slow, ManyModelsHaveTheBytesOfOneBatch) {
   EXPECT_TRUE(soon([&] { return owners("farm", "models-2").size() == 1; }));
   ::kill(process.pid, SIGKILL);  // its workers end with it, and theirs with them
   wait_for(process);
+  EXPECT_TRUE(soon([&] { return !anyone_works_on(out("farm")); }));
   EXPECT_FALSE(fs::exists(fs::path(out("farm")) / "index.html"));
   const Ended ended = run(on_a_farm);
   ASSERT_EQ(ended.code, exit_models_failed) << ended.json;
