@@ -343,9 +343,9 @@ KeptPlan plan(const PlanOptions& options, const scenes::Scene& scene) {
       keep_plan(options.out, scene, bodies, world, system, plan, found.extra, options.keep_tree == "path");
   kept.also_done = std::move(found.also_done);
   if (stop_signal() != 0) {
-    const bool all = !plan.trajectory.controls.empty() || plan.best_node == 0;
-    log::info("{}: the plan so far is kept{}; go on with --resume", file.string(),
-              all ? "" : ", but for the path to its nearest node, which takes longer to simulate");
+    log::info(
+        "{}: the plan so far is kept{}; go on with --resume", file.string(),
+        lacks_path(plan) ? ", but for the path to its nearest node, which takes longer to simulate" : "");
     throw_if_stopped();
   }
   return kept;

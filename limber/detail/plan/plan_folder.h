@@ -40,6 +40,12 @@ inline bool is_unmeasured(const plan::Plan& plan) {
   return !plan.measured || (plan.simulation && plan.simulation->ending == plan::Simulation::stopped);
 }
 
+// A stop signal came before the path to the nearest node was simulated (plan/search.h): it is the start
+// alone.
+inline bool lacks_path(const plan::Plan& plan) {
+  return plan.trajectory.controls.empty() && plan.best_node != 0;
+}
+
 // All of a summary that follows from the plan: not what the dynamics cost, nor what came after the search.
 Json facts_of(const plan::Plan&, const fem::World&, const FemSystem&, const MotionFigures&);
 

@@ -31,10 +31,9 @@ void check_path(const plan::Plan& plan, const plan::Settings& settings, const Re
            same_bits(replay.after(i), plan.tree.states[std::size_t(nodes[i])]);
   if (same && settles)
     same = same_bits(path.controls.back(), plan::settle_control(settings, path.settle_steps));
-  const bool left_out = path.controls.empty() && nodes.size() > 1 && plan.ending == plan::Ending::stopped;
   table.row("the path is the way through the tree", same,
-            left_out ? "it was left out when the search was stopped; go on with --resume"
-                     : fmt::format("{} nodes", nodes.size()));
+            lacks_path(plan) ? "it was left out when the search was stopped; go on with --resume"
+                             : fmt::format("{} nodes", nodes.size()));
 }
 
 }  // namespace limber::detail

@@ -44,8 +44,8 @@ std::string out_of_bounds(const scenes::MotionSpec& motion, const fem::World& wo
         std::max((bounds.lower - box.lower).maxCoeff(), (box.upper - bounds.upper).maxCoeff());
     if (beyond > seen_beyond_bounds * size)
       return fmt::format(
-          "{}: the keyframe at {:g} s takes {} {:.3g} m out of the bounds, which nothing "
-          "that moves by keyframes is stopped by; move it, or enlarge world.bounds_m",
+          "{}: the keyframe at {:g} s takes {} {:.3g} m out of the bounds, which do not "
+          "stop what moves by keyframes; move it, or enlarge world.bounds_m",
           motion.where, frame.at_s, body.name, beyond);
   }
   return "";
